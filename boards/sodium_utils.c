@@ -11,14 +11,12 @@ int sodium_is_zero(const uint8_t *bytes, size_t size);
 int sodium_memcmp(const void *a, const void *b, size_t size);
 void sodium_misuse(void) __attribute__((noreturn));
 
-void sodium_memzero(void *memory, size_t size)
-{
+void sodium_memzero(void *memory, size_t size) {
     secure_wipe(memory, size);
 }
 
 /* In a time that says nothing of the bytes, as the next. */
-int sodium_is_zero(const uint8_t *bytes, size_t size)
-{
+int sodium_is_zero(const uint8_t *bytes, size_t size) {
     unsigned bits = 0;
     while (size-- > 0) {
         bits |= *bytes++;
@@ -26,8 +24,7 @@ int sodium_is_zero(const uint8_t *bytes, size_t size)
     return bits == 0;
 }
 
-int sodium_memcmp(const void *a, const void *b, size_t size)
-{
+int sodium_memcmp(const void *a, const void *b, size_t size) {
     const uint8_t *x = a, *y = b;
     unsigned bits = 0;
     while (size-- > 0) {
@@ -36,7 +33,6 @@ int sodium_memcmp(const void *a, const void *b, size_t size)
     return bits == 0 ? 0 : -1;
 }
 
-void sodium_misuse(void)
-{
+void sodium_misuse(void) {
     __builtin_trap();
 }

@@ -52,8 +52,7 @@ struct simple {
     struct host_error *error;
 };
 
-static error_t parse_simple(int key, char *value, struct argp_state *state)
-{
+static error_t parse_simple(int key, char *value, struct argp_state *state) {
     struct simple *s = state->input;
     switch (key) {
     case 'o':
@@ -96,8 +95,7 @@ static error_t parse_simple(int key, char *value, struct argp_state *state)
 
 /* As argp asks for it: `text` itself, or with the formats behind it, to be
  * freed. */
-static char *list_formats(int key, const char *text, void *input)
-{
+static char *list_formats(int key, const char *text, void *input) {
     char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
     (void)input;
     if (key != KEY_FORMAT_IN && key != KEY_FORMAT_OUT) {
@@ -112,8 +110,7 @@ static char *list_formats(int key, const char *text, void *input)
 /* Not 0: the command ends with error->code. */
 static int parse(int argc, char **argv, const struct argp_option *options,
                  const char *arguments, const char *about, unsigned count,
-                 struct simple *simple, struct host_error *error)
-{
+                 struct simple *simple, struct host_error *error) {
     const struct argp argp = {options, parse_simple, arguments, about,
                               NULL,    list_formats, NULL};
     simple->least = count;
@@ -123,8 +120,7 @@ static int parse(int argc, char **argv, const struct argp_option *options,
     return host_options_parse(&argp, argc, argv, 0, simple, error);
 }
 
-static int command_run(int argc, char **argv, struct host_error *error)
-{
+static int command_run(int argc, char **argv, struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options options = {0};
     int rank = host_launch_rank();
@@ -144,8 +140,7 @@ static int command_run(int argc, char **argv, struct host_error *error)
     return host_run(&options, &result, error);
 }
 
-static int command_gen(int argc, char **argv, struct host_error *error)
-{
+static int command_gen(int argc, char **argv, struct host_error *error) {
     static const struct argp_option options[] = {
         {"seed", 's', "S", 0,
          "Another seed makes other points; bluntfin, grid and rotated have no "
@@ -200,8 +195,7 @@ static int command_gen(int argc, char **argv, struct host_error *error)
     return host_output_commit(error);
 }
 
-static int command_verify(int argc, char **argv, struct host_error *error)
-{
+static int command_verify(int argc, char **argv, struct host_error *error) {
     static const struct argp_option options[] = {
         {"format", KEY_FORMAT_IN, "NAME", 0,
          "What POINTS holds, where no extension tells:", 0},
@@ -243,8 +237,7 @@ static int command_verify(int argc, char **argv, struct host_error *error)
     return status;
 }
 
-static int command_digest(int argc, char **argv, struct host_error *error)
-{
+static int command_digest(int argc, char **argv, struct host_error *error) {
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
     struct simple s = {0};
@@ -264,8 +257,7 @@ static int command_digest(int argc, char **argv, struct host_error *error)
     return status;
 }
 
-static int command_convert(int argc, char **argv, struct host_error *error)
-{
+static int command_convert(int argc, char **argv, struct host_error *error) {
     static const struct argp_option options[] = {
         {"format", KEY_FORMAT_IN, "NAME", 0,
          "IN holds points, and no extension tells of what format:", 0},
@@ -280,8 +272,7 @@ static int command_convert(int argc, char **argv, struct host_error *error)
     return host_convert(s.argument[0], s.format, s.argument[1], error);
 }
 
-static int command_draw(int argc, char **argv, struct host_error *error)
-{
+static int command_draw(int argc, char **argv, struct host_error *error) {
     struct host_draw_options options = {0};
     if (host_draw_arguments(argc, argv, &options, error) != 0) {
         return error->code;
@@ -289,8 +280,7 @@ static int command_draw(int argc, char **argv, struct host_error *error)
     return host_draw(&options, error);
 }
 
-static int command_key(int argc, char **argv, struct host_error *error)
-{
+static int command_key(int argc, char **argv, struct host_error *error) {
     static const struct argp_option options[] = {
         {"sign", KEY_SIGN, NULL, 0,
          "Makes a pair to sign images with instead: the secret half in FILE, "
@@ -310,8 +300,7 @@ static int command_key(int argc, char **argv, struct host_error *error)
                   : host_key_make(s.argument[0], error);
 }
 
-static int command_sim(int argc, char **argv, struct host_error *error)
-{
+static int command_sim(int argc, char **argv, struct host_error *error) {
     struct host_sim_options options = {0};
     if (host_sim_arguments(argc, argv, &options, error) != 0) {
         return error->code;
@@ -373,8 +362,7 @@ static const struct command commands[] = {
 enum { COMMANDS = sizeof commands / sizeof commands[0] };
 
 /* "run, gen, verify" */
-static const char *command_names(void)
-{
+static const char *command_names(void) {
     static char names[TEXT_MAX];
     size_t used = 0;
     for (size_t i = 0; i < COMMANDS; i++) {
@@ -385,8 +373,7 @@ static const char *command_names(void)
 }
 
 /* As argp asks for it: the commands, where its text has %s. */
-static char *list_commands(int key, const char *text, void *input)
-{
+static char *list_commands(int key, const char *text, void *input) {
     char rows[TEXT_MAX] = "", usage[64], *whole = NULL;
     size_t used = 0;
     (void)input;
@@ -408,16 +395,14 @@ static char *list_commands(int key, const char *text, void *input)
     return asprintf(&whole, text, rows) < 0 ? NULL : whole;
 }
 
-static const char *command_name(const void *unused, unsigned i)
-{
+static const char *command_name(const void *unused, unsigned i) {
     (void)unused;
     return i < COMMANDS ? commands[i].name : NULL;
 }
 
 /* Stops at the first word that is no option: the command. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
-static error_t parse_top(int key, char *value, struct argp_state *state)
-{
+static error_t parse_top(int key, char *value, struct argp_state *state) {
     int *command = state->input;
     if (key != ARGP_KEY_ARG) {
         return ARGP_ERR_UNKNOWN;
@@ -440,8 +425,7 @@ static const struct argp top = {
     NULL};
 
 /* No command: what was meant. */
-static int refuse_command(const char *word, struct host_error *error)
-{
+static int refuse_command(const char *word, struct host_error *error) {
     char quoted[512];
     const char *nearest = host_text_nearest(word, command_name, NULL);
     bool there = nearest == NULL && access(word, F_OK) == 0;
@@ -459,8 +443,7 @@ static int refuse_command(const char *word, struct host_error *error)
         nearest == NULL ? "" : "? ", command_names());
 }
 
-static int dispatch(int argc, char **argv, struct host_error *error)
-{
+static int dispatch(int argc, char **argv, struct host_error *error) {
     static char name[64];
     for (size_t i = 0; i < COMMANDS; i++) {
         if (strcmp(argv[0], commands[i].name) == 0) {
@@ -472,8 +455,7 @@ static int dispatch(int argc, char **argv, struct host_error *error)
     return refuse_command(argv[0], error);
 }
 
-static int command_help(int argc, char **argv, struct host_error *error)
-{
+static int command_help(int argc, char **argv, struct host_error *error) {
     static char program[] = "incode", option[] = "--help";
     if (argc > 2) {
         return host_fail(error, HOST_USAGE,
@@ -490,8 +472,7 @@ static int command_help(int argc, char **argv, struct host_error *error)
 }
 
 /* What was printed, help included, has to arrive. */
-static void finish_stdout(void)
-{
+static void finish_stdout(void) {
     struct host_error error = {0};
     if (host_output_printed(&error) != 0) {
         (void)fprintf(stderr, "incode: %s\n", error.text);
@@ -499,8 +480,7 @@ static void finish_stdout(void)
     }
 }
 
-static int run(int argc, char **argv, struct host_error *error)
-{
+static int run(int argc, char **argv, struct host_error *error) {
     int command = 0;
     if (host_options_parse(&top, argc, argv, ARGP_IN_ORDER, &command, error) !=
         0) {
@@ -521,8 +501,7 @@ static int run(int argc, char **argv, struct host_error *error)
     return dispatch(argc - command, argv + command, error);
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     static char name[] = "incode";
     struct host_error error = {0};
     host_begin("incode");

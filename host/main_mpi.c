@@ -21,8 +21,7 @@ static struct host_ranks ranks;
 
 static int begin(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     if (host_ranks_begin(&ranks, result->nodes, options->memory,
                          options->window, error) != 0) {
         return error->code;
@@ -34,8 +33,7 @@ static int begin(const struct host_run_options *options,
     return 0;
 }
 
-static int run(int argc, char **argv, struct host_error *error)
-{
+static int run(int argc, char **argv, struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options options = {0};
     if (host_ranks_open(&ranks, error) != 0 ||
@@ -55,8 +53,7 @@ static int run(int argc, char **argv, struct host_error *error)
     return host_run(&options, &result, error);
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     struct host_error error = {0};
     static char name[] = "incode run";
     host_begin("incode-mpi");

@@ -4,29 +4,25 @@
 
 #include "incode/front/exchange.h"
 
-static uint32_t between(size_t least, size_t a, size_t most)
-{
+static uint32_t between(size_t least, size_t a, size_t most) {
     return (uint32_t)(a < least ? least : a > most ? most : a);
 }
 
 /* The horizon of a maker: a box for 4 KB, a copy for 64 KB. */
-static struct incode_maker_share horizon_of(size_t bytes)
-{
+static struct incode_maker_share horizon_of(size_t bytes) {
     size_t boxes = bytes >> 12, copies = bytes >> 16;
     return (struct incode_maker_share){
         between(INCODE_HORIZON_MIN, boxes / 64 * 64, INCODE_HORIZON_MAX),
         between(16, copies, INCODE_HORIZON_COPIES), 0};
 }
 
-struct incode_maker_share incode_arena_maker(size_t bytes)
-{
+struct incode_maker_share incode_arena_maker(size_t bytes) {
     struct incode_maker_share share = horizon_of(bytes);
     share.frames = incode_maker_frames(&share, bytes);
     return share;
 }
 
-size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes)
-{
+size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes) {
     size_t bits = ((size_t)setup->bricks + 63) / 64 * sizeof(uint64_t);
     if (setup->owner_rule == INCODE_OWNER_LOWEST)
         return incode_exchange_bytes(setup->bricks);
@@ -36,8 +32,7 @@ size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes)
 /* Divides the memory beside the control block into faces, bricks and frames;
  * false: too little of it is left for frames. */
 static bool divide_rest(struct incode_shares *s, struct incode_map *map,
-                        size_t bytes, size_t faces, size_t entries)
-{
+                        size_t bytes, size_t faces, size_t entries) {
     size_t horizon = incode_horizon_bytes(s->maker.boxes, s->maker.copies);
     map->afl_faces = faces;
     map->brick_entries = entries;
@@ -61,8 +56,7 @@ static bool divide_rest(struct incode_shares *s, struct incode_map *map,
  * a small set gets a shorter list, of at least a third of a face a point, and
  * no more entries than its bricks take with the free part that they need. */
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
-                         const struct incode_setup *setup, size_t bytes)
-{
+                         const struct incode_setup *setup, size_t bytes) {
     memset(map, 0, sizeof *map);
     s->maker = horizon_of(bytes);
     map->control = incode_arena_aligned(sizeof(struct incode_triangulator) +
@@ -88,8 +82,7 @@ bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
     return divide_rest(s, map, bytes, faces, entries);
 }
 
-size_t incode_arena_min(const struct incode_setup *setup)
-{
+size_t incode_arena_min(const struct incode_setup *setup) {
     size_t bytes = sizeof(struct incode_triangulator);
     struct incode_map map;
     struct incode_shares shares;
@@ -101,8 +94,8 @@ size_t incode_arena_min(const struct incode_setup *setup)
 /* The maker's share point by point, where few bricks are wanted at a time, but
  * all pages of boxes again and again: as many as go into a part of the arena.
  */
-static struct incode_maker_share few_frames(const struct incode_triangulator *t)
-{
+static struct incode_maker_share
+few_frames(const struct incode_triangulator *t) {
     struct incode_maker_share share = t->shares.maker;
     const struct incode_tree *tree = &t->maker.tree;
     size_t boxes = tree->base[tree->levels] - tree->bricks;
@@ -113,16 +106,14 @@ static struct incode_maker_share few_frames(const struct incode_triangulator *t)
     return share;
 }
 
-size_t incode_arena_room(const struct incode_triangulator *t)
-{
+size_t incode_arena_room(const struct incode_triangulator *t) {
     struct incode_maker_share few = few_frames(t);
     size_t maker = incode_maker_bytes(&few);
     return t->bytes > maker ? t->bytes - maker : 0;
 }
 
 /* Bytes of the arena in use up to now, as it is divided. */
-static size_t in_use(const struct incode_triangulator *t)
-{
+static size_t in_use(const struct incode_triangulator *t) {
     size_t unused = (t->maker.pager.frame_count - t->maker.pager.frames_used) *
                     sizeof(struct incode_frame);
     struct incode_maker_share few = few_frames(t);
@@ -132,14 +123,12 @@ static size_t in_use(const struct incode_triangulator *t)
            t->insertion.used;
 }
 
-size_t incode_arena_high_water(const struct incode_triangulator *t)
-{
+size_t incode_arena_high_water(const struct incode_triangulator *t) {
     size_t now = in_use(t);
     return now > t->high_water ? now : t->high_water;
 }
 
-bool incode_arena_turn(struct incode_triangulator *t, bool points)
-{
+bool incode_arena_turn(struct incode_triangulator *t, bool points) {
     struct incode_maker_share share = points ? few_frames(t) : t->shares.maker;
     size_t maker = incode_maker_bytes(&share);
     if (t->by_points != points && t->maker.pager.loading > 0)

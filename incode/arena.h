@@ -11,8 +11,7 @@
 
 #include "state.h"
 
-static inline size_t incode_arena_aligned(size_t bytes)
-{
+static inline size_t incode_arena_aligned(size_t bytes) {
     return (bytes + 63) & ~(size_t)63;
 }
 

@@ -8,19 +8,16 @@
 
 enum { SEARCH = INCODE_TASKS /* of the maker: behind those of tasks */ };
 
-static bool is_among(uint32_t v, uint32_t first, uint32_t last)
-{
+static bool is_among(uint32_t v, uint32_t first, uint32_t last) {
     uint32_t brick = v / INCODE_BRICK_POINTS;
     return brick >= first && brick < last;
 }
 
-static bool is_lenders(const struct incode_borrower *b, uint32_t v)
-{
+static bool is_lenders(const struct incode_borrower *b, uint32_t v) {
     return is_among(v, b->first, b->last);
 }
 
-bool incode_loan_is_sound(const struct incode_loan *loan, uint32_t bricks)
-{
+bool incode_loan_is_sound(const struct incode_loan *loan, uint32_t bricks) {
     uint32_t vertices = 0;
     bool sound = loan->count >= 1 && loan->count <= INCODE_LOAN_FACES &&
                  loan->first < loan->last && loan->last <= bricks;
@@ -37,8 +34,7 @@ bool incode_loan_is_sound(const struct incode_loan *loan, uint32_t bricks)
 
 void incode_borrower_begin(struct incode_borrower *b,
                            struct incode_triangulator *t,
-                           const struct incode_loan *loan)
-{
+                           const struct incode_loan *loan) {
     b->first = loan->first;
     b->last = loan->last;
     memcpy(b->face, loan->v, loan->count * sizeof loan->v[0]);
@@ -53,8 +49,7 @@ void incode_borrower_begin(struct incode_borrower *b,
     incode_maker_forget(&t->maker, SEARCH);
 }
 
-bool incode_triangulator_may_borrow(const struct incode_triangulator *t)
-{
+bool incode_triangulator_may_borrow(const struct incode_triangulator *t) {
     uint32_t own = t->job.last - t->job.first;
     return incode_triangulator_is_quiet(t) &&
            incode_triangulator_left(t) <= own / 2;
@@ -65,8 +60,7 @@ bool incode_triangulator_may_borrow(const struct incode_triangulator *t)
 /* Whether the lender pursues a face and has it in the list of a vertex that it
  * has lent: *turn is its index. */
 static bool is_pursued(const struct incode_borrower *b, const uint32_t f[3],
-                       unsigned *turn)
-{
+                       unsigned *turn) {
     unsigned lowest = f[1] < f[0], highest = 3;
     lowest = f[2] < f[lowest] ? 2 : lowest;
     for (unsigned i = 0; i < 3; i++)
@@ -79,15 +73,13 @@ static bool is_pursued(const struct incode_borrower *b, const uint32_t f[3],
     return lent && is_lenders(b, f[lowest]);
 }
 
-static void drop(struct incode_borrower *b, uint32_t i)
-{
+static void drop(struct incode_borrower *b, uint32_t i) {
     memcpy(b->face[i], b->face[--b->open], sizeof b->face[i]);
 }
 
 /* Opens a face or closes its twin, if it is of a star at work; false: there is
  * no room. */
-static bool toggle(struct incode_borrower *b, const uint32_t f[3])
-{
+static bool toggle(struct incode_borrower *b, const uint32_t f[3]) {
     unsigned turn;
     if (!is_pursued(b, f, &turn))
         return true;
@@ -105,8 +97,7 @@ static bool toggle(struct incode_borrower *b, const uint32_t f[3])
 }
 
 /* The face that is next: of the vertex at work, or of the highest one. */
-static uint32_t next_face(const struct incode_borrower *b)
-{
+static uint32_t next_face(const struct incode_borrower *b) {
     uint32_t best = 0;
     for (uint32_t i = 0; i < b->open; i++) {
         if (b->face[i][0] == b->v)
@@ -119,8 +110,7 @@ static uint32_t next_face(const struct incode_borrower *b)
 
 /* Notes the tetrahedron beside face i, and goes on across its other faces if it
  * is the lender's to build. */
-static void note(struct incode_borrower *b, uint32_t i, const uint32_t f[4])
-{
+static void note(struct incode_borrower *b, uint32_t i, const uint32_t f[4]) {
     static const uint8_t face[3][3] = {{0, 3, 2}, {0, 1, 3}, {1, 2, 3}};
     INCODE_ASSERT(b->found.count < INCODE_LOAN_FACES);
     memcpy(b->found.v[b->found.count++], f, sizeof b->found.v[0]);
@@ -136,8 +126,7 @@ static void note(struct incode_borrower *b, uint32_t i, const uint32_t f[4])
 /* ---- steps ---- */
 
 static enum incode_outcome go_on(struct incode_borrower *b,
-                                 struct incode_maker *maker)
-{
+                                 struct incode_maker *maker) {
     enum incode_outcome r = INCODE_OK;
     while (r == INCODE_OK && maker->walker.left > 0 && maker->fault == NULL &&
            !b->done) {
@@ -165,8 +154,7 @@ static enum incode_outcome go_on(struct incode_borrower *b,
 
 enum incode_step incode_borrower_step(struct incode_borrower *b,
                                       struct incode_triangulator *t,
-                                      uint32_t units)
-{
+                                      uint32_t units) {
     struct incode_maker *maker = &t->maker;
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;

@@ -12,13 +12,11 @@ static const char *const UNSOUND = "a list of no faces";
 
 /* ---- memory ---- */
 
-static size_t lent_bytes(uint32_t lists)
-{
+static size_t lent_bytes(uint32_t lists) {
     return incode_arena_aligned(lists * sizeof(struct incode_lent));
 }
 
-size_t incode_builder_min(uint32_t lists)
-{
+size_t incode_builder_min(uint32_t lists) {
     size_t bytes = incode_maker_bytes(&(struct incode_maker_share){
         INCODE_HORIZON_MIN, 16, INCODE_FRAMES_MIN});
     while (incode_arena_maker(bytes).frames < INCODE_FRAMES_MIN)
@@ -29,8 +27,7 @@ size_t incode_builder_min(uint32_t lists)
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
                          const struct incode_page_source *source,
-                         const struct incode_pause *pause)
-{
+                         const struct incode_pause *pause) {
     INCODE_ASSERT(lists >= 1 && lists <= INCODE_LISTS_MAX);
     INCODE_ASSERT(bytes >= incode_builder_min(lists));
     size_t places = lent_bytes(lists);
@@ -56,8 +53,7 @@ void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
 /* ---- lists ---- */
 
 static bool is_sound(const struct incode_builder *b,
-                     const struct incode_list *list)
-{
+                     const struct incode_list *list) {
     uint32_t bricks = b->maker.tree.bricks;
     bool sound = list->count >= 1 && list->count <= INCODE_LIST_MAX &&
                  list->kind >= INCODE_LIST_FACES &&
@@ -78,8 +74,7 @@ static bool is_sound(const struct incode_builder *b,
 }
 
 bool incode_builder_take(struct incode_builder *b,
-                         const struct incode_list *list)
-{
+                         const struct incode_list *list) {
     struct incode_lent *lent = NULL;
     for (uint32_t i = 0; i < b->lists && lent == NULL; i++)
         lent = b->lent[i].born == 0 ? &b->lent[i] : NULL;
@@ -104,13 +99,11 @@ bool incode_builder_take(struct incode_builder *b,
     return true;
 }
 
-static bool is_complete(const struct incode_lent *lent)
-{
+static bool is_complete(const struct incode_lent *lent) {
     return lent->born != 0 && lent->done == lent->list.count;
 }
 
-static struct incode_lent *oldest_complete(const struct incode_builder *b)
-{
+static struct incode_lent *oldest_complete(const struct incode_builder *b) {
     struct incode_lent *oldest = NULL;
     for (uint32_t i = 0; i < b->lists; i++)
         if (is_complete(&b->lent[i]) &&
@@ -120,21 +113,18 @@ static struct incode_lent *oldest_complete(const struct incode_builder *b)
 }
 
 const struct incode_answers *
-incode_builder_answers(const struct incode_builder *b)
-{
+incode_builder_answers(const struct incode_builder *b) {
     const struct incode_lent *lent = oldest_complete(b);
     return lent == NULL ? NULL : &lent->answers;
 }
 
-void incode_builder_drop(struct incode_builder *b)
-{
+void incode_builder_drop(struct incode_builder *b) {
     struct incode_lent *lent = oldest_complete(b);
     INCODE_ASSERT(lent != NULL);
     lent->born = 0;
 }
 
-uint32_t incode_builder_held(const struct incode_builder *b)
-{
+uint32_t incode_builder_held(const struct incode_builder *b) {
     uint32_t held = 0;
     for (uint32_t i = 0; i < b->lists; i++)
         held += b->lent[i].born != 0;
@@ -143,15 +133,13 @@ uint32_t incode_builder_held(const struct incode_builder *b)
 
 /* ---- faces ---- */
 
-static bool has_vertex(const uint32_t t[4], uint32_t v)
-{
+static bool has_vertex(const uint32_t t[4], uint32_t v) {
     return t[0] == v || t[1] == v || t[2] == v || t[3] == v;
 }
 
 /* All faces of a list were open at a time, so that those which have their
  * vertices of one tetrahedron have it on the same side: it is found once. */
-static void share_apex(struct incode_lent *lent, const uint32_t t[4])
-{
+static void share_apex(struct incode_lent *lent, const uint32_t t[4]) {
     for (uint32_t i = lent->done + 1; i < lent->list.count; i++) {
         const uint32_t *f = lent->list.v[i];
         if (has_vertex(t, f[0]) && has_vertex(t, f[1]) && has_vertex(t, f[2])) {
@@ -164,8 +152,7 @@ static void share_apex(struct incode_lent *lent, const uint32_t t[4])
 }
 
 static enum incode_outcome answer_face(struct incode_builder *b,
-                                       struct incode_lent *lent)
-{
+                                       struct incode_lent *lent) {
     struct incode_answer a;
     uint32_t i = lent->done, done = 0;
     uint64_t before = b->maker.counts.candidates;
@@ -187,8 +174,7 @@ static enum incode_outcome answer_face(struct incode_builder *b,
 }
 
 static enum incode_outcome answer_first(struct incode_builder *b,
-                                        struct incode_lent *lent)
-{
+                                        struct incode_lent *lent) {
     struct incode_answer a;
     enum incode_outcome r = incode_maker_first(
         &b->maker, (unsigned)(lent - b->lent), lent->list.v[0][0], &a);
@@ -201,8 +187,7 @@ static enum incode_outcome answer_first(struct incode_builder *b,
 }
 
 static enum incode_outcome answer_count(struct incode_builder *b,
-                                        struct incode_lent *lent)
-{
+                                        struct incode_lent *lent) {
     uint32_t i = lent->done, brick = lent->list.v[i][0];
     uint32_t count = incode_maker_count(&b->maker, brick);
     const uint32_t answer[4] = {brick, count, 0, 0};
@@ -217,8 +202,7 @@ static enum incode_outcome answer_count(struct incode_builder *b,
 /* ---- steps ---- */
 
 /* The list that goes on, the oldest first; NULL: none may. */
-static struct incode_lent *choose(const struct incode_builder *b)
-{
+static struct incode_lent *choose(const struct incode_builder *b) {
     struct incode_lent *oldest = NULL, *ready = NULL;
     for (uint32_t i = 0; i < b->lists; i++) {
         struct incode_lent *lent = &b->lent[i];
@@ -236,8 +220,7 @@ static struct incode_lent *choose(const struct incode_builder *b)
 }
 
 static enum incode_step go_on(struct incode_builder *b,
-                              struct incode_lent *lent)
-{
+                              struct incode_lent *lent) {
     enum incode_outcome r = INCODE_OK;
     while (r == INCODE_OK && lent->done < lent->list.count &&
            b->maker.walker.left > 0 && b->maker.fault == NULL) {
@@ -258,8 +241,7 @@ static enum incode_step go_on(struct incode_builder *b,
                : INCODE_WAITING;
 }
 
-enum incode_step incode_builder_step(struct incode_builder *b, uint32_t units)
-{
+enum incode_step incode_builder_step(struct incode_builder *b, uint32_t units) {
     if (incode_builder_fault(b) != NULL)
         return INCODE_BROKEN;
     bool released = incode_pager_release(&b->maker.pager, false);
@@ -278,14 +260,12 @@ enum incode_step incode_builder_step(struct incode_builder *b, uint32_t units)
 
 /* ---- reports ---- */
 
-const char *incode_builder_fault(const struct incode_builder *b)
-{
+const char *incode_builder_fault(const struct incode_builder *b) {
     return b->fault != NULL ? b->fault : b->maker.fault;
 }
 
 void incode_builder_statistics(const struct incode_builder *b,
-                               struct incode_statistics *s)
-{
+                               struct incode_statistics *s) {
     const struct incode_maker *maker = &b->maker;
     const struct incode_pager *pager = &maker->pager;
     size_t unused =

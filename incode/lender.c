@@ -5,21 +5,18 @@
 enum { USED = 32 /* tetrahedra a step, at most: a star's room suffices */ };
 
 bool incode_triangulator_lend(struct incode_triangulator *t,
-                              struct incode_loan *loan)
-{
+                              struct incode_loan *loan) {
     return t->phase == INCODE_PHASE_FACES &&
            incode_triangulator_fault(t) == NULL &&
            incode_front_lend_run(&t->front, loan);
 }
 
-static uint32_t lesser(uint32_t a, size_t b)
-{
+static uint32_t lesser(uint32_t a, size_t b) {
     return a < b ? a : (uint32_t)b;
 }
 
 /* As many as there is room for. */
-static uint32_t most_of(const struct incode_front *front, uint32_t units)
-{
+static uint32_t most_of(const struct incode_front *front, uint32_t units) {
     const struct incode_front_outside *outside = &front->outside;
     const struct incode_front_peers *peers = &front->exchange.peers;
     uint32_t most = lesser(USED, units > 0 ? units : 1);
@@ -30,8 +27,7 @@ static uint32_t most_of(const struct incode_front *front, uint32_t units)
 enum incode_step incode_triangulator_use(struct incode_triangulator *t,
                                          const struct incode_loan *loan,
                                          const struct incode_found *found,
-                                         uint32_t *used, uint32_t units)
-{
+                                         uint32_t *used, uint32_t units) {
     uint32_t task;
     struct incode_front *front = &t->front;
     if (incode_triangulator_fault(t) != NULL)

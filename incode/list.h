@@ -42,13 +42,11 @@ struct incode_answers {
     uint32_t v[INCODE_LIST_MAX][4];
 };
 
-static inline size_t incode_list_bytes(uint32_t count)
-{
+static inline size_t incode_list_bytes(uint32_t count) {
     return offsetof(struct incode_list, v) + count * 3 * sizeof(uint32_t);
 }
 
-static inline size_t incode_answers_bytes(uint32_t count)
-{
+static inline size_t incode_answers_bytes(uint32_t count) {
     return offsetof(struct incode_answers, v) + count * 4 * sizeof(uint32_t);
 }
 

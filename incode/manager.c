@@ -20,8 +20,7 @@ static const char *const SHORT =
 /* ---- memory ---- */
 
 /* A seventh for the bricks that are touched, as in a triangulator. */
-static struct incode_front_share share_of(size_t bytes)
-{
+static struct incode_front_share share_of(size_t bytes) {
     size_t face = sizeof(struct incode_afl_node) + sizeof(uint32_t);
     size_t brick = sizeof(struct incode_touched) + sizeof(uint32_t);
     size_t most = UINT32_MAX / 2;
@@ -42,8 +41,7 @@ static struct incode_front_share share_of(size_t bytes)
     return share;
 }
 
-size_t incode_manager_min(void)
-{
+size_t incode_manager_min(void) {
     const struct incode_front_share share = {INCODE_FACES_MIN,
                                              INCODE_ENTRIES_MIN};
     return (incode_front_bytes(&share) + 63) / 64 * 64;
@@ -52,8 +50,7 @@ size_t incode_manager_min(void)
 void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_front_outside *outside,
-                         const struct incode_pause *pause)
-{
+                         const struct incode_pause *pause) {
     struct incode_front_share share = share_of(bytes);
     INCODE_ASSERT(setup->face_rule == INCODE_FACE_OWN);
     INCODE_ASSERT(incode_front_bytes(&share) <= bytes);
@@ -67,8 +64,7 @@ void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
 }
 
 void incode_manager_start(struct incode_manager *m,
-                          const struct incode_job *job)
-{
+                          const struct incode_job *job) {
     INCODE_ASSERT(m->lists == 0 && incode_manager_is_free(m));
     incode_front_start(&m->front, job);
     m->asked = job->first;
@@ -82,8 +78,8 @@ void incode_manager_start(struct incode_manager *m,
 /* ---- what is lent ---- */
 
 /* Bricks are counted before they are passed, so that none waits for it. */
-static uint32_t lend_bricks(struct incode_manager *m, struct incode_list *list)
-{
+static uint32_t lend_bricks(struct incode_manager *m,
+                            struct incode_list *list) {
     uint32_t first, last, count = 0;
     incode_front_own_left(&m->front, &first, &last);
     if (first >= last || m->asked >= last || m->asked >= first + AHEAD)
@@ -96,14 +92,12 @@ static uint32_t lend_bricks(struct incode_manager *m, struct incode_list *list)
     return count;
 }
 
-static bool is_seed_open(const struct incode_manager *m)
-{
+static bool is_seed_open(const struct incode_manager *m) {
     return (incode_front_suspended(&m->front) >> m->seed.task & 1) != 0 &&
            incode_front_vertex(&m->front, m->seed.task) == m->seed.v;
 }
 
-static uint32_t lend_seed(struct incode_manager *m, struct incode_list *list)
-{
+static uint32_t lend_seed(struct incode_manager *m, struct incode_list *list) {
     if (!m->seed.wanted)
         return 0;
     m->seed.wanted = false;
@@ -117,8 +111,7 @@ static uint32_t lend_seed(struct incode_manager *m, struct incode_list *list)
 }
 
 uint32_t incode_manager_lend(struct incode_manager *m, uint32_t most,
-                             struct incode_list *list)
-{
+                             struct incode_list *list) {
     INCODE_ASSERT(most >= 1 && most <= INCODE_LIST_MAX);
     list->count = 0;
     if (incode_manager_fault(m) != NULL || incode_front_is_finished(&m->front))
@@ -139,14 +132,12 @@ uint32_t incode_manager_lend(struct incode_manager *m, uint32_t most,
 
 /* ---- what is answered ---- */
 
-static bool is_vertex(const struct incode_manager *m, uint32_t v)
-{
+static bool is_vertex(const struct incode_manager *m, uint32_t v) {
     return v / INCODE_BRICK_POINTS < m->front.bricks;
 }
 
 static bool is_sound(const struct incode_manager *m, uint32_t kind,
-                     const uint32_t v[4])
-{
+                     const uint32_t v[4]) {
     if (kind == INCODE_LIST_COUNT)
         return v[1] >= 1 && v[1] <= INCODE_BRICK_POINTS;
     bool hull = kind == INCODE_LIST_FACES && v[3] == INCODE_NONE;
@@ -158,8 +149,7 @@ static bool is_sound(const struct incode_manager *m, uint32_t kind,
 /* As many as some lists of their kind had, and, when the last list is back, as
  * all of them. */
 static bool fits(const struct incode_manager *m,
-                 const struct incode_answers *answers)
-{
+                 const struct incode_answers *answers) {
     uint32_t left = 0;
     if (m->lists == 0 || answers->count < 1 ||
         answers->count > INCODE_LIST_MAX || answers->kind < INCODE_LIST_FACES ||
@@ -173,8 +163,7 @@ static bool fits(const struct incode_manager *m,
 }
 
 void incode_manager_take(struct incode_manager *m,
-                         const struct incode_answers *answers)
-{
+                         const struct incode_answers *answers) {
     INCODE_ASSERT(incode_manager_is_free(m));
     bool sound = fits(m, answers);
     for (uint32_t i = 0; sound && i < answers->count; i++)
@@ -189,8 +178,7 @@ void incode_manager_take(struct incode_manager *m,
     m->due[answers->kind] -= answers->count;
 }
 
-static void use_seed(struct incode_manager *m, const uint32_t v[4])
-{
+static void use_seed(struct incode_manager *m, const uint32_t v[4]) {
     bool open = is_seed_open(m);
     if (!m->seed.asked || v[0] != m->seed.v)
         m->fault = UNSOUND;
@@ -202,8 +190,7 @@ static void use_seed(struct incode_manager *m, const uint32_t v[4])
         incode_front_seed(&m->front, v, NOWHERE);
 }
 
-static void use(struct incode_manager *m, const uint32_t v[4])
-{
+static void use(struct incode_manager *m, const uint32_t v[4]) {
     if (m->taken.kind == INCODE_LIST_COUNT) {
         m->brick[v[0] % INCODE_COUNTS] = v[0];
         m->points[v[0] % INCODE_COUNTS] = v[1];
@@ -217,8 +204,7 @@ static void use(struct incode_manager *m, const uint32_t v[4])
     }
 }
 
-static void use_some(struct incode_manager *m, uint32_t units)
-{
+static void use_some(struct incode_manager *m, uint32_t units) {
     const struct incode_front_outside *outside = &m->front.outside;
     uint32_t left = m->taken.count - m->used, most = USED;
     size_t room = outside->emit_room(outside->context);
@@ -232,8 +218,7 @@ static void use_some(struct incode_manager *m, uint32_t units)
 
 /* ---- steps ---- */
 
-static enum incode_step want_seed(struct incode_manager *m, uint32_t task)
-{
+static enum incode_step want_seed(struct incode_manager *m, uint32_t task) {
     if (m->seed.asked) /* of a brick that has been spilled and came back */
         return INCODE_WAITING;
     m->seed.task = task;
@@ -244,8 +229,7 @@ static enum incode_step want_seed(struct incode_manager *m, uint32_t task)
 }
 
 /* Passes a brick, if it is closed. */
-static enum incode_step pass(struct incode_manager *m)
-{
+static enum incode_step pass(struct incode_manager *m) {
     uint32_t which;
     enum incode_turn turn = incode_front_next(&m->front, &which);
     if (turn == INCODE_TURN_COUNT) {
@@ -261,8 +245,7 @@ static enum incode_step pass(struct incode_manager *m)
                : INCODE_WAITING;
 }
 
-static enum incode_step work(struct incode_manager *m, uint32_t units)
-{
+static enum incode_step work(struct incode_manager *m, uint32_t units) {
     uint32_t task;
     if (incode_front_is_finished(&m->front)) {
         m->used = m->taken.count; /* they come too late to count */
@@ -280,8 +263,7 @@ static enum incode_step work(struct incode_manager *m, uint32_t units)
 
 /* Whether it waits for an answer that nobody owes: to a face, a vertex or a
  * brick. */
-static bool is_left_alone(const struct incode_manager *m)
-{
+static bool is_left_alone(const struct incode_manager *m) {
     uint32_t first, last;
     if (m->lists > 0 || !incode_manager_is_free(m) ||
         incode_front_is_finished(&m->front))
@@ -292,8 +274,7 @@ static bool is_left_alone(const struct incode_manager *m)
             m->brick[first % INCODE_COUNTS] != first);
 }
 
-enum incode_step incode_manager_step(struct incode_manager *m, uint32_t units)
-{
+enum incode_step incode_manager_step(struct incode_manager *m, uint32_t units) {
     if (is_left_alone(m) && m->fault == NULL)
         m->fault = SHORT;
     if (incode_manager_fault(m) != NULL)
@@ -305,23 +286,20 @@ enum incode_step incode_manager_step(struct incode_manager *m, uint32_t units)
 
 int incode_manager_unspill(struct incode_manager *m, uint32_t brick,
                            const struct incode_face *faces, size_t count,
-                           bool last)
-{
+                           bool last) {
     return incode_front_unspill(&m->front, brick, faces, count, last);
 }
 
 /* ---- reports ---- */
 
-const char *incode_manager_fault(const struct incode_manager *m)
-{
+const char *incode_manager_fault(const struct incode_manager *m) {
     if (m->front.afl.fault != NULL)
         return m->front.afl.fault;
     return m->front.fault != NULL ? m->front.fault : m->fault;
 }
 
 void incode_manager_statistics(const struct incode_manager *m,
-                               struct incode_statistics *s)
-{
+                               struct incode_statistics *s) {
     const struct incode_front *front = &m->front;
     *s = (struct incode_statistics){.tetrahedra_kept = front->counts.kept,
                                     .hull_facets = front->counts.hull_facets,

@@ -64,8 +64,7 @@ uint32_t incode_manager_lend(struct incode_manager *m, uint32_t most,
                              struct incode_list *list);
 
 /* Whether it takes answers: false until those before are used. */
-static inline bool incode_manager_is_free(const struct incode_manager *m)
-{
+static inline bool incode_manager_is_free(const struct incode_manager *m) {
     return m->used == m->taken.count;
 }
 

@@ -13,8 +13,7 @@ static_assert((int)INCODE_HINT_NONE == INCODE_LOCAL_NONE, "hints are indices");
 static_assert((int)INCODE_TASKS < INCODE_SEARCHES,
               "a search for each task, and one for what is borrowed");
 
-static const char *grid_fault(const uint32_t cells[3])
-{
+static const char *grid_fault(const uint32_t cells[3]) {
     uint64_t product = 1;
     for (int d = 0; d < 3; d++) {
         if (cells[d] < 1 || cells[d] > INCODE_CELLS_MAX)
@@ -26,8 +25,7 @@ static const char *grid_fault(const uint32_t cells[3])
     return NULL;
 }
 
-const char *incode_setup_fault(const struct incode_setup *setup)
-{
+const char *incode_setup_fault(const struct incode_setup *setup) {
     if (setup->bricks == 0)
         return "there are no points";
     if (setup->bricks > INCODE_NONE / INCODE_BRICK_POINTS)
@@ -55,17 +53,14 @@ const char *incode_setup_fault(const struct incode_setup *setup)
     return NULL;
 }
 
-static bool may_insert(const struct incode_setup *setup)
-{
+static bool may_insert(const struct incode_setup *setup) {
     return setup->index == INCODE_KD && setup->face_rule == INCODE_FACE_OWN &&
            setup->owner_rule == INCODE_OWNER_SMALLEST;
 }
 
-struct incode_triangulator *
-incode_triangulator_init(void *arena, size_t bytes,
-                         const struct incode_setup *setup,
-                         const struct incode_outside *outside, const char **why)
-{
+struct incode_triangulator *incode_triangulator_init(
+    void *arena, size_t bytes, const struct incode_setup *setup,
+    const struct incode_outside *outside, const char **why) {
     struct incode_shares shares;
     struct incode_map map;
     INCODE_ASSERT((uintptr_t)arena % 64 == 0);
@@ -115,8 +110,7 @@ incode_triangulator_init(void *arena, size_t bytes,
 
 /* Whether the bricks of a page of boxes are mostly of a surface: their lifted
  * boxes tell more than those along the axes.  1, 0, or -1: it is missing. */
-static int is_surface(struct incode_triangulator *t, uint32_t brick)
-{
+static int is_surface(struct incode_triangulator *t, uint32_t brick) {
     const struct incode_tree *tree = &t->maker.tree;
     const struct incode_frame *f = incode_pager_get(
         &t->maker.pager, tree->base[1] + brick / INCODE_FANOUT);
@@ -132,8 +126,7 @@ static int is_surface(struct incode_triangulator *t, uint32_t brick)
 
 /* Whether what is not final of a volume of so many bricks takes no more than
  * half the memory: it has some 8 n^(2/3) cells, measured on uniform points. */
-static bool fits(const struct incode_triangulator *t, uint32_t bricks)
-{
+static bool fits(const struct incode_triangulator *t, uint32_t bricks) {
     uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
     uint64_t cells =
         t->bytes / 2 /
@@ -146,8 +139,7 @@ static bool fits(const struct incode_triangulator *t, uint32_t bricks)
 /* 1: point by point, 0: face by face, -1: a page is missing.  A part of the
  * bricks needs some points of others, too, which for a volume takes as long as
  * the faces do. */
-static int choose_points(struct incode_triangulator *t)
-{
+static int choose_points(struct incode_triangulator *t) {
     uint32_t own = t->job.last - t->job.first;
     bool all = own == t->maker.tree.bricks;
     size_t words = (t->maker.tree.bricks + 63) / 64;
@@ -161,8 +153,7 @@ static int choose_points(struct incode_triangulator *t)
 }
 
 /* Begins the job; false: a page is missing, or on its way. */
-static bool choose(struct incode_triangulator *t)
-{
+static bool choose(struct incode_triangulator *t) {
     int points = choose_points(t);
     if (points < 0 || !incode_arena_turn(t, points == 1))
         return false;
@@ -173,8 +164,7 @@ static bool choose(struct incode_triangulator *t)
 }
 
 void incode_triangulator_start(struct incode_triangulator *t,
-                               const struct incode_job *job)
-{
+                               const struct incode_job *job) {
     incode_maker_start(&t->maker);
     t->job = *job;
     t->phase = INCODE_PHASE_CHOOSE;
@@ -184,42 +174,36 @@ void incode_triangulator_start(struct incode_triangulator *t,
 }
 
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
-                             const void *data, size_t bytes)
-{
+                             const void *data, size_t bytes) {
     return incode_maker_page(&t->maker, page, data, bytes);
 }
 
 int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
-                            const void *data, size_t bytes)
-{
+                            const void *data, size_t bytes) {
     return incode_maker_put(&t->maker, page, data, bytes);
 }
 
-bool incode_triangulator_has(const struct incode_triangulator *t, uint32_t page)
-{
+bool incode_triangulator_has(const struct incode_triangulator *t,
+                             uint32_t page) {
     return incode_pager_has(&t->maker.pager, page);
 }
 
 size_t incode_triangulator_copy(const struct incode_triangulator *t,
-                                uint32_t page, void *data)
-{
+                                uint32_t page, void *data) {
     return incode_pager_copy(&t->maker.pager, page, data);
 }
 
 uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
-                                    uint32_t page)
-{
+                                    uint32_t page) {
     return incode_pager_label(&t->maker.pager, page);
 }
 
 bool incode_triangulator_awaits(const struct incode_triangulator *t,
-                                uint32_t page)
-{
+                                uint32_t page) {
     return incode_pager_loading(&t->maker.pager, page);
 }
 
-bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
-{
+bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page) {
     /* No step of this node's own lets go what the shuffle keeps back. */
     while (t->phase == INCODE_PHASE_IDLE &&
            incode_pager_release(&t->maker.pager, true)) {
@@ -228,45 +212,40 @@ bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
            incode_maker_fetch(&t->maker, page);
 }
 
-uint32_t incode_triangulator_awaited(const struct incode_triangulator *t)
-{
+uint32_t incode_triangulator_awaited(const struct incode_triangulator *t) {
     return incode_pager_awaited(&t->maker.pager);
 }
 
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
-                                bool last)
-{
+                                bool last) {
     return incode_front_unspill(&t->front, brick, faces, count, last);
 }
 
 /* ---- with others ---- */
 
-bool incode_triangulator_may_take(struct incode_triangulator *t, uint32_t count)
-{
+bool incode_triangulator_may_take(struct incode_triangulator *t,
+                                  uint32_t count) {
     return t->phase != INCODE_PHASE_FACES ||
            incode_front_may_take(&t->front, count);
 }
 
-int incode_triangulator_take(struct incode_triangulator *t, const uint32_t v[4])
-{
+int incode_triangulator_take(struct incode_triangulator *t,
+                             const uint32_t v[4]) {
     return t->phase == INCODE_PHASE_FACES ? incode_front_take(&t->front, v)
                                           : -1;
 }
 
-void incode_triangulator_seed(struct incode_triangulator *t)
-{
+void incode_triangulator_seed(struct incode_triangulator *t) {
     if (t->phase == INCODE_PHASE_FACES)
         incode_front_seed_all(&t->front);
 }
 
-bool incode_triangulator_is_quiet(const struct incode_triangulator *t)
-{
+bool incode_triangulator_is_quiet(const struct incode_triangulator *t) {
     return t->phase == INCODE_PHASE_IDLE || incode_front_is_quiet(&t->front);
 }
 
-uint32_t incode_triangulator_left(const struct incode_triangulator *t)
-{
+uint32_t incode_triangulator_left(const struct incode_triangulator *t) {
     return incode_front_left(&t->front);
 }
 
@@ -276,15 +255,14 @@ struct corners {
     const double *p[4];
 };
 
-static inline struct corners corners_of(const struct incode_answer *a)
-{
+static inline struct corners corners_of(const struct incode_answer *a) {
     return (struct corners){{a->p[0], a->p[1], a->p[2], a->p[3]}};
 }
 
 /* One face of the star: that under search goes first, then the last one opened.
  */
-static enum incode_outcome advance(struct incode_triangulator *t, unsigned task)
-{
+static enum incode_outcome advance(struct incode_triangulator *t,
+                                   unsigned task) {
     struct incode_answer a;
     struct incode_star_face face;
     enum incode_outcome r;
@@ -306,8 +284,7 @@ static enum incode_outcome advance(struct incode_triangulator *t, unsigned task)
 }
 
 #ifdef INCODE_PLANT_TWICE /* a fault that the simulation has to find */
-static void plant(struct incode_triangulator *t)
-{
+static void plant(struct incode_triangulator *t) {
     const struct incode_star *star = &t->front.star;
     if (star->faces > 0 && t->maker.pager.shuffle != 0)
         incode_afl_toggle(&t->front.afl, star->v, star->b[0], star->c[0]);
@@ -315,8 +292,7 @@ static void plant(struct incode_triangulator *t)
 #endif
 
 /* A face is a unit, and so are as many points as a brick has. */
-static void spend_candidates(struct incode_triangulator *t, uint64_t before)
-{
+static void spend_candidates(struct incode_triangulator *t, uint64_t before) {
     uint64_t looked = t->maker.counts.candidates - before;
     incode_walker_spend(&t->maker.walker,
                         1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
@@ -324,8 +300,7 @@ static void spend_candidates(struct incode_triangulator *t, uint64_t before)
 
 /* Closes the star of a vertex as far as it goes. */
 static enum incode_outcome close_star(struct incode_triangulator *t,
-                                      unsigned task)
-{
+                                      unsigned task) {
     struct incode_front *front = &t->front;
     uint32_t v = incode_front_vertex(front, task);
     if (!incode_star_open(front, v))
@@ -355,8 +330,7 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
 /* The paper's InCoDe, face by face: any open face of the vertex.  It stays open
  * until its answer comes, as another search may close it meanwhile. */
 static enum incode_outcome pursue_face(struct incode_triangulator *t,
-                                       unsigned task)
-{
+                                       unsigned task) {
     struct incode_answer a;
     uint32_t f[3];
     if (!incode_maker_is_searching(&t->maker, task) &&
@@ -369,8 +343,7 @@ static enum incode_outcome pursue_face(struct incode_triangulator *t,
 }
 
 static enum incode_outcome build_first(struct incode_triangulator *t,
-                                       unsigned task)
-{
+                                       unsigned task) {
     struct incode_answer a;
     uint32_t v = incode_front_vertex(&t->front, task);
     /* Other stars go on while a seed waits for a page. */
@@ -384,8 +357,7 @@ static enum incode_outcome build_first(struct incode_triangulator *t,
 
 /* ---- steps ---- */
 
-static enum incode_step run(struct incode_triangulator *t, unsigned task)
-{
+static enum incode_step run(struct incode_triangulator *t, unsigned task) {
     enum incode_outcome r;
     incode_front_run(&t->front, t->maker.walker.left);
     if (incode_front_is_seed(&t->front, task))
@@ -408,8 +380,7 @@ static enum incode_step run(struct incode_triangulator *t, unsigned task)
                : INCODE_WAITING;
 }
 
-static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
-{
+static enum incode_turn next(struct incode_triangulator *t, uint32_t *task) {
     const struct incode_job *job = &t->job;
     uint32_t first, last;
     incode_front_own_left(&t->front, &first, &last);
@@ -429,8 +400,7 @@ static enum incode_turn next(struct incode_triangulator *t, uint32_t *task)
     return turn;
 }
 
-static enum incode_step close_stars(struct incode_triangulator *t)
-{
+static enum incode_step close_stars(struct incode_triangulator *t) {
     uint32_t task;
     uint32_t waiting =
         incode_maker_waiting(&t->maker, incode_front_suspended(&t->front));
@@ -453,8 +423,7 @@ static enum incode_step close_stars(struct incode_triangulator *t)
     }
 }
 
-static enum incode_step insert_points(struct incode_triangulator *t)
-{
+static enum incode_step insert_points(struct incode_triangulator *t) {
     switch (incode_insertion_step(&t->insertion)) {
     case INCODE_INSERTION_FINISHED:
         t->phase = INCODE_PHASE_IDLE;
@@ -477,8 +446,7 @@ static enum incode_step insert_points(struct incode_triangulator *t)
 }
 
 /* What is open goes out, and comes back brick by brick. */
-static enum incode_step hand_over(struct incode_triangulator *t)
-{
+static enum incode_step hand_over(struct incode_triangulator *t) {
     enum incode_insertion_step r =
         incode_handover_step(&t->handover, &t->front);
     if (r != INCODE_INSERTION_FINISHED)
@@ -490,8 +458,7 @@ static enum incode_step hand_over(struct incode_triangulator *t)
     return INCODE_WORKED;
 }
 
-static enum incode_step step(struct incode_triangulator *t)
-{
+static enum incode_step step(struct incode_triangulator *t) {
     enum incode_step r = INCODE_FINISHED;
     switch (t->phase) {
     case INCODE_PHASE_CHOOSE:
@@ -511,8 +478,7 @@ static enum incode_step step(struct incode_triangulator *t)
     }
 }
 
-enum incode_step incode_triangulator_step(struct incode_triangulator *t)
-{
+enum incode_step incode_triangulator_step(struct incode_triangulator *t) {
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
     if (t->phase == INCODE_PHASE_IDLE)
@@ -530,21 +496,18 @@ enum incode_step incode_triangulator_step(struct incode_triangulator *t)
     return r;
 }
 
-void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units)
-{
+void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units) {
     t->units = units > 0 ? units : 1;
 }
 
-uint64_t incode_triangulator_spent(const struct incode_triangulator *t)
-{
+uint64_t incode_triangulator_spent(const struct incode_triangulator *t) {
     return t->spent;
 }
 
 /* ---- reports ---- */
 
 void incode_triangulator_statistics(const struct incode_triangulator *t,
-                                    struct incode_statistics *s)
-{
+                                    struct incode_statistics *s) {
     const struct incode_front *front = &t->front;
     const struct incode_maker *maker = &t->maker;
     const struct incode_insertion *insertion = &t->insertion;
@@ -575,8 +538,7 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
 }
 
 void incode_triangulator_gauge(const struct incode_triangulator *t,
-                               struct incode_gauge *gauge)
-{
+                               struct incode_gauge *gauge) {
     const struct incode_pager *pager = &t->maker.pager;
     const struct incode_afl *afl = &t->front.afl;
     gauge->pages = pager->frame_count;
@@ -586,13 +548,11 @@ void incode_triangulator_gauge(const struct incode_triangulator *t,
 }
 
 const struct incode_map *
-incode_triangulator_map(const struct incode_triangulator *t)
-{
+incode_triangulator_map(const struct incode_triangulator *t) {
     return &t->map;
 }
 
-const char *incode_triangulator_fault(const struct incode_triangulator *t)
-{
+const char *incode_triangulator_fault(const struct incode_triangulator *t) {
     if (t->front.afl.fault != NULL)
         return t->front.afl.fault;
     return t->front.fault != NULL ? t->front.fault : t->maker.fault;

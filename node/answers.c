@@ -12,22 +12,19 @@ enum {
 
 void node_answers_init(struct node_answers *answers,
                        const struct node_board *board,
-                       struct node_counted *counted)
-{
+                       struct node_counted *counted) {
     memset(answers, 0, sizeof *answers);
     answers->board = board;
     answers->counted = counted;
     answers->start_us = board->now_us(board->context);
 }
 
-void node_answers_forget(struct node_answers *answers)
-{
+void node_answers_forget(struct node_answers *answers) {
     answers->asked_count = answers->echo_count = 0;
     answers->probing = false;
 }
 
-bool node_answers_is_for(const struct cube_message *message)
-{
+bool node_answers_is_for(const struct cube_message *message) {
     return message->type == NODE_QUESTION || message->type == NODE_RESTART ||
            message->type == NODE_ECHO || message->type == NODE_ECHOED;
 }
@@ -36,8 +33,7 @@ bool node_answers_is_for(const struct cube_message *message)
  */
 
 static void begin_probe(struct node_answers *a,
-                        const struct node_question_message *question)
-{
+                        const struct node_question_message *question) {
     const struct node_identity *identity = &a->board->identity;
     bool there = question->node < 1u << identity->dimension &&
                  cube_reaches(a->counted->cube, (uint16_t)question->node);
@@ -50,8 +46,7 @@ static void begin_probe(struct node_answers *a,
 }
 
 static void take_question(struct node_answers *a,
-                          const struct cube_message *message)
-{
+                          const struct cube_message *message) {
     struct node_question_message question;
     if (message->size != sizeof question) {
         return; /* of another version: the host has no answer then */
@@ -67,8 +62,7 @@ static void take_question(struct node_answers *a,
 }
 
 static void take_restart(struct node_answers *a,
-                         const struct cube_message *message, uint64_t now_us)
-{
+                         const struct cube_message *message, uint64_t now_us) {
     struct node_restart_message order;
     if (message->size != sizeof order) {
         return;
@@ -82,8 +76,7 @@ static void take_restart(struct node_answers *a,
 }
 
 static void take_echo(struct node_answers *a,
-                      const struct cube_message *message, uint64_t now_us)
-{
+                      const struct cube_message *message, uint64_t now_us) {
     struct node_echo_message echo;
     if (message->size != sizeof echo ||
         message->source >= 1u << a->board->identity.dimension) {
@@ -103,8 +96,7 @@ static void take_echo(struct node_answers *a,
 }
 
 void node_answers_take(struct node_answers *answers,
-                       const struct cube_message *message, uint64_t now_us)
-{
+                       const struct cube_message *message, uint64_t now_us) {
     if (message->type == NODE_QUESTION && message->source == CUBE_HOST) {
         take_question(answers, message);
     } else if (message->type == NODE_RESTART && message->source == CUBE_HOST) {
@@ -117,13 +109,11 @@ void node_answers_take(struct node_answers *answers,
 /* --- what is answered ------------------------------------------------------
  */
 
-static uint32_t least(uint64_t value)
-{
+static uint32_t least(uint64_t value) {
     return value < UINT32_MAX ? (uint32_t)value : UINT32_MAX;
 }
 
-void node_who_name(uint8_t *field, size_t size, const char *name)
-{
+void node_who_name(uint8_t *field, size_t size, const char *name) {
     size_t length = 0;
     while (length < size && name[length] != '\0') {
         length++;
@@ -134,8 +124,7 @@ void node_who_name(uint8_t *field, size_t size, const char *name)
 
 static size_t tell_who(const struct node_answers *a,
                        const struct node_teller *teller, uint64_t now_us,
-                       uint8_t *bytes)
-{
+                       uint8_t *bytes) {
     const struct node_board *board = a->board;
     struct node_who who;
     memset(&who, 0, sizeof who);
@@ -157,8 +146,7 @@ static size_t tell_who(const struct node_answers *a,
 }
 
 static void fill_link(const struct node_answers *a, unsigned d,
-                      struct node_link_state *link)
-{
+                      struct node_link_state *link) {
     const struct cube *cube = a->counted->cube;
     const struct node_board *board = a->board;
     const struct link_statistics *s = cube_link_statistics(cube, d);
@@ -181,8 +169,7 @@ static void fill_link(const struct node_answers *a, unsigned d,
 }
 
 unsigned node_answers_links(const struct node_answers *answers,
-                            struct node_link_state state[CUBE_LINKS_MAX])
-{
+                            struct node_link_state state[CUBE_LINKS_MAX]) {
     unsigned links = cube_links(answers->counted->cube);
     for (unsigned d = 0; d < links; d++) {
         fill_link(answers, d, &state[d]);
@@ -190,8 +177,7 @@ unsigned node_answers_links(const struct node_answers *answers,
     return links;
 }
 
-static size_t tell_links(const struct node_answers *a, uint8_t *bytes)
-{
+static size_t tell_links(const struct node_answers *a, uint8_t *bytes) {
     struct node_link_state state[CUBE_LINKS_MAX];
     size_t size = node_answers_links(a, state) * sizeof state[0];
     memcpy(bytes, state, size);
@@ -200,8 +186,7 @@ static size_t tell_links(const struct node_answers *a, uint8_t *bytes)
 
 static size_t tell_top(const struct node_answers *a,
                        const struct node_teller *teller, uint64_t now_us,
-                       uint8_t *bytes)
-{
+                       uint8_t *bytes) {
     const struct node_board *board = a->board;
     struct node_top top;
     memset(&top, 0, sizeof top);
@@ -222,8 +207,7 @@ static size_t tell_top(const struct node_answers *a,
     return sizeof top;
 }
 
-static size_t tell_memory(const struct node_teller *teller, uint8_t *bytes)
-{
+static size_t tell_memory(const struct node_teller *teller, uint8_t *bytes) {
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
@@ -235,8 +219,7 @@ static size_t tell_memory(const struct node_teller *teller, uint8_t *bytes)
 }
 
 static size_t tell_totals(const struct node_answers *a,
-                          const struct node_teller *teller, uint8_t *bytes)
-{
+                          const struct node_teller *teller, uint8_t *bytes) {
     struct node_finished_message totals;
     memset(&totals, 0, sizeof totals);
     if (teller->totals == NULL) {
@@ -251,8 +234,7 @@ static size_t tell_totals(const struct node_answers *a,
 
 static size_t tell_log(const struct node_answers *a,
                        const struct node_teller *teller, uint8_t *bytes,
-                       size_t size)
-{
+                       size_t size) {
     const struct node_board *board = a->board;
     size_t used = 0;
     if (board->log != NULL) {
@@ -268,8 +250,7 @@ static size_t tell_log(const struct node_answers *a,
 /* Bytes behind the head. */
 static size_t tell(const struct node_answers *a,
                    const struct node_teller *teller, uint32_t what,
-                   uint64_t now_us, uint8_t *bytes, size_t size)
-{
+                   uint64_t now_us, uint8_t *bytes, size_t size) {
     switch (what) {
     case NODE_WHO:
         return tell_who(a, teller, now_us, bytes);
@@ -291,8 +272,7 @@ static size_t tell(const struct node_answers *a,
 /* An answer is made where there is room for it alone. */
 static bool answer(struct node_answers *a, const struct node_teller *teller,
                    const struct node_question_message *question,
-                   uint64_t now_us)
-{
+                   uint64_t now_us) {
     uint8_t bytes[CUBE_PAYLOAD_MAX];
     struct node_answer_head head = {question->tag, question->what};
     if (cube_room(a->counted->cube, CUBE_HOST) == 0) {
@@ -307,8 +287,8 @@ static bool answer(struct node_answers *a, const struct node_teller *teller,
 }
 
 static unsigned send_answers(struct node_answers *a,
-                             const struct node_teller *teller, uint64_t now_us)
-{
+                             const struct node_teller *teller,
+                             uint64_t now_us) {
     unsigned sent = 0;
     while (sent < a->asked_count &&
            answer(a, teller, &a->asked[sent], now_us)) {
@@ -319,8 +299,7 @@ static unsigned send_answers(struct node_answers *a,
     return sent;
 }
 
-static unsigned send_echoes(struct node_answers *a)
-{
+static unsigned send_echoes(struct node_answers *a) {
     unsigned sent = 0;
     while (sent < a->echo_count) {
         struct node_echo_message echo = {a->echo[sent].tag};
@@ -336,8 +315,7 @@ static unsigned send_echoes(struct node_answers *a)
 }
 
 /* The way out, and the answer once it is known. */
-static unsigned send_probe(struct node_answers *a, uint64_t now_us)
-{
+static unsigned send_probe(struct node_answers *a, uint64_t now_us) {
     struct {
         struct node_answer_head head;
         struct node_probe probe;
@@ -362,8 +340,7 @@ static unsigned send_probe(struct node_answers *a, uint64_t now_us)
 }
 
 unsigned node_answers_send(struct node_answers *answers,
-                           const struct node_teller *teller, uint64_t now_us)
-{
+                           const struct node_teller *teller, uint64_t now_us) {
     unsigned sent = send_echoes(answers);
     if (answers->asked_count > 0) {
         sent += send_answers(answers, teller, now_us);
@@ -375,8 +352,7 @@ unsigned node_answers_send(struct node_answers *answers,
 }
 
 enum node_reset node_answers_restart(const struct node_answers *answers,
-                                     uint64_t now_us)
-{
+                                     uint64_t now_us) {
     uint64_t passed_us = now_us - answers->restart_us;
     if (answers->restart == 0 || passed_us < RESTART_US_MIN ||
         (passed_us < RESTART_US_MAX && !cube_idle(answers->counted->cube))) {

@@ -14,8 +14,7 @@
 enum { NODE_ALIGNMENT = 64 };
 
 /* Bytes, rounded up so that what follows is aligned for anything. */
-static inline size_t node_aligned(size_t bytes)
-{
+static inline size_t node_aligned(size_t bytes) {
     return (bytes + NODE_ALIGNMENT - 1) / NODE_ALIGNMENT * NODE_ALIGNMENT;
 }
 

@@ -9,14 +9,12 @@ enum { HOST_WINDOW = 16, HOST_WINDOW_FROM = 3 << 20 };
 
 /* Frames a window, where the identity leaves it open: an eighth of a small
  * memory at most goes to windows. */
-static uint16_t window_for(size_t bytes)
-{
+static uint16_t window_for(size_t bytes) {
     return bytes >= 2u << 20 ? 8 : bytes >= 1u << 20 ? 4 : 2;
 }
 
 struct cube_config node_configure(const struct node_identity *identity,
-                                  size_t memory)
-{
+                                  size_t memory) {
     struct cube_config config;
     memset(&config, 0, sizeof config);
     config.self = identity->self;

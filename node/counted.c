@@ -3,8 +3,7 @@
 #include "incode/predicates/check.h"
 
 int node_counted_write(struct node_counted *counted, uint16_t dest,
-                       uint8_t type, const void *data, size_t size)
-{
+                       uint8_t type, const void *data, size_t size) {
     int status =
         counted->write == NULL
             ? cube_write(counted->cube, dest, type, data, size)
@@ -14,8 +13,7 @@ int node_counted_write(struct node_counted *counted, uint16_t dest,
 }
 
 void node_counted_put(struct node_counted *counted, uint16_t dest, uint8_t type,
-                      const void *data, size_t size)
-{
+                      const void *data, size_t size) {
     int status = node_counted_write(counted, dest, type, data, size);
     INCODE_ASSERT(status == 0);
 }

@@ -3,8 +3,7 @@
 #include "transport/text.h"
 
 void node_fault_set(struct node_fault *fault, const char *words, uint32_t a,
-                    uint32_t b)
-{
+                    uint32_t b) {
     struct cube_text text;
     if (node_fault_is_set(fault)) {
         return;

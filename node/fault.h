@@ -26,8 +26,7 @@ struct node_fault {
 void node_fault_set(struct node_fault *fault, const char *words, uint32_t a,
                     uint32_t b);
 
-static inline bool node_fault_is_set(const struct node_fault *fault)
-{
+static inline bool node_fault_is_set(const struct node_fault *fault) {
     return fault->size > 0;
 }
 

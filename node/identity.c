@@ -2,8 +2,7 @@
 
 enum { TRIES = 8 /* a draw is 0 once in 2^32 times */ };
 
-static bool draw(struct secure_source *source, uint32_t *epoch)
-{
+static bool draw(struct secure_source *source, uint32_t *epoch) {
     *epoch = 0;
     for (int i = 0; i < TRIES && *epoch == 0; i++) {
         if (source->random == NULL ||
@@ -15,8 +14,7 @@ static bool draw(struct secure_source *source, uint32_t *epoch)
 }
 
 bool node_identity_epoch(struct node_identity *identity,
-                         struct secure_source *source)
-{
+                         struct secure_source *source) {
     uint32_t epoch;
     if (!draw(source, &epoch)) {
         /* 1 .. 2^32 - 1 in turn, for a number of 64 bits. */
@@ -29,25 +27,22 @@ bool node_identity_epoch(struct node_identity *identity,
 }
 
 void node_identity_listen(struct learner *learner,
-                          const struct node_board *board, unsigned links)
-{
+                          const struct node_board *board, unsigned links) {
     learner_init(learner, board->pipes, links);
 }
 
 void node_identity_listen_ports(struct learner *learner,
                                 const struct node_board *board, unsigned ports,
-                                bool host)
-{
+                                bool host) {
     learner_init_ports(learner, board->pipes, ports, host);
 }
 
-void node_identity_ask(struct learner *learner, uint64_t now_us)
-{
+void node_identity_ask(struct learner *learner, uint64_t now_us) {
     learner_ask(learner, now_us);
 }
 
-bool node_identity_hear(struct learner *learner, struct node_identity *identity)
-{
+bool node_identity_hear(struct learner *learner,
+                        struct node_identity *identity) {
     struct learned learned;
     if (!learner_poll(learner, &learned)) {
         return false;
@@ -61,15 +56,13 @@ bool node_identity_hear(struct learner *learner, struct node_identity *identity)
 }
 
 bool node_identity_epoch_behind(const struct learner *learner,
-                                struct node_identity *identity)
-{
+                                struct node_identity *identity) {
     uint32_t known = learner->known.epoch;
     identity->epoch = known == UINT32_MAX ? 1 : known + 1;
     return known != 0;
 }
 
-const char *node_identity_doubt(const struct learner *learner)
-{
+const char *node_identity_doubt(const struct learner *learner) {
     if (learner->misfits > 0) {
         return "a neighbour takes this node for one with another number of "
                "wires";

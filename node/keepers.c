@@ -1,8 +1,7 @@
 #include "keepers.h"
 
 bool node_keepers_fit(const struct node_setup_message *setup, unsigned self,
-                      bool keeps, struct node_fault *fault)
-{
+                      bool keeps, struct node_fault *fault) {
     bool among = self >= 1 && self <= setup->holders;
     if (setup->holders >= setup->nodes) {
         node_fault_set(fault, "invalid setup: # holders of # nodes",

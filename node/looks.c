@@ -18,8 +18,7 @@ enum {
 };
 
 void node_looks_init(struct node_looks *looks, const struct node_board *board,
-                     struct cube *cube)
-{
+                     struct cube *cube) {
     memset(looks, 0, sizeof *looks);
     looks->board = board;
     looks->cube = cube;
@@ -28,8 +27,7 @@ void node_looks_init(struct node_looks *looks, const struct node_board *board,
 }
 
 /* The frames are moved now. */
-static void note_poll(struct node_looks *looks, uint64_t now_us)
-{
+static void note_poll(struct node_looks *looks, uint64_t now_us) {
     uint64_t passed_us = looks->busy ? now_us - looks->polled_us : 0;
     if (passed_us > looks->poll_us_max) {
         looks->poll_us_max =
@@ -40,16 +38,14 @@ static void note_poll(struct node_looks *looks, uint64_t now_us)
     looks->working = false;
 }
 
-unsigned node_looks_poll(struct node_looks *looks, uint64_t now_us)
-{
+unsigned node_looks_poll(struct node_looks *looks, uint64_t now_us) {
     note_poll(looks, now_us);
     return (unsigned)cube_poll(looks->cube, now_us);
 }
 
 /* How long a unit takes: longer at once, and shorter by and by, as it is not
  * known that all that was to be done since the last look was done. */
-static void measure(struct node_looks *looks, uint64_t passed_us)
-{
+static void measure(struct node_looks *looks, uint64_t passed_us) {
     uint64_t unit_ns = passed_us * 1000 / looks->units;
     looks->unit_ns = unit_ns >= looks->unit_ns
                          ? unit_ns
@@ -61,8 +57,7 @@ static void measure(struct node_looks *looks, uint64_t passed_us)
 }
 
 /* Returns the time afterwards. */
-static uint64_t tend(struct node_looks *looks, uint64_t now_us)
-{
+static uint64_t tend(struct node_looks *looks, uint64_t now_us) {
     if (now_us - looks->polled_us < TEND_US) {
         return now_us;
     }
@@ -71,15 +66,13 @@ static uint64_t tend(struct node_looks *looks, uint64_t now_us)
     return looks->board->now_us(looks->board->context);
 }
 
-void node_looks_between(struct node_looks *looks)
-{
+void node_looks_between(struct node_looks *looks) {
     if (looks->tends) {
         (void)tend(looks, looks->board->now_us(looks->board->context));
     }
 }
 
-static uint32_t at_pause(void *context)
-{
+static uint32_t at_pause(void *context) {
     struct node_looks *looks = context;
     if (!looks->tends) {
         return INCODE_PAUSE_UNITS_MAX;
@@ -94,20 +87,18 @@ static uint32_t at_pause(void *context)
     return looks->units;
 }
 
-struct incode_pause node_looks_pause(struct node_looks *looks)
-{
+struct incode_pause node_looks_pause(struct node_looks *looks) {
     return (struct incode_pause){.look = at_pause, .context = looks};
 }
 
-void node_looks_idle(struct node_looks *looks)
-{
+void node_looks_idle(struct node_looks *looks) {
     looks->busy = looks->working = false;
 }
 
 /* Whether a link that was up has said nothing for long, by this node's own
  * time: while it stood still itself it could not hear. */
-static bool is_silent(struct node_looks *looks, unsigned d, uint32_t passed_us)
-{
+static bool is_silent(struct node_looks *looks, unsigned d,
+                      uint32_t passed_us) {
     const struct link_statistics *s = cube_link_statistics(looks->cube, d);
     uint32_t baud = looks->board->identity.serial_baud;
     uint32_t limit_us =
@@ -122,8 +113,7 @@ static bool is_silent(struct node_looks *looks, unsigned d, uint32_t passed_us)
     return looks->heard[d].quiet_us > limit_us;
 }
 
-bool node_looks_silent(struct node_looks *looks, uint64_t now_us)
-{
+bool node_looks_silent(struct node_looks *looks, uint64_t now_us) {
     uint64_t passed_us = now_us - looks->looked_us;
     uint32_t silent = 0;
     if (passed_us < LOOK_US) {
@@ -141,8 +131,7 @@ bool node_looks_silent(struct node_looks *looks, uint64_t now_us)
 }
 
 /* A wire whose ends never met is missing, or not there yet: the host says. */
-uint32_t node_looks_seen(const struct node_looks *looks)
-{
+uint32_t node_looks_seen(const struct node_looks *looks) {
     uint32_t seen = 0;
     for (unsigned d = 0; d < cube_links(looks->cube); d++) {
         bool up = cube_link_statistics(looks->cube, d)->sessions > 0;
@@ -151,16 +140,14 @@ uint32_t node_looks_seen(const struct node_looks *looks)
     return seen;
 }
 
-bool node_looks_parted(const struct node_looks *looks, unsigned d)
-{
+bool node_looks_parted(const struct node_looks *looks, unsigned d) {
     enum link_state state = cube_link_state(looks->cube, d);
     return state == LINK_CLOSED || state == LINK_DOWN ||
            cube_link_statistics(looks->cube, d)->pipe_closed > 0;
 }
 
 void node_looks_totals(const struct node_looks *looks,
-                       struct node_finished_message *finished)
-{
+                       struct node_finished_message *finished) {
     const struct node_board *board = looks->board;
     struct node_gauges gauges = {0};
     for (unsigned d = 0; d < cube_links(looks->cube); d++) {

@@ -179,14 +179,12 @@ struct node_setup_message {
 };
 
 static inline bool node_is_builder(const struct node_setup_message *setup,
-                                   unsigned node)
-{
+                                   unsigned node) {
     return (setup->builders[node / 8] >> node % 8 & 1) != 0;
 }
 
 static inline void node_add_builder(struct node_setup_message *setup,
-                                    unsigned node)
-{
+                                    unsigned node) {
     setup->builders[node / 8] |= (uint8_t)(1u << node % 8);
 }
 
@@ -291,8 +289,8 @@ struct node_found_message {
     struct incode_found found;
 };
 
-static inline size_t node_found_bytes(const struct node_found_message *message)
-{
+static inline size_t
+node_found_bytes(const struct node_found_message *message) {
     return offsetof(struct node_found_message, found) +
            incode_found_bytes(&message->found);
 }

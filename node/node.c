@@ -40,22 +40,19 @@ struct node {
 };
 
 /* Stands in for the links of a node that is only measured. */
-static int nowhere(void *context, const uint8_t *bytes, size_t size)
-{
+static int nowhere(void *context, const uint8_t *bytes, size_t size) {
     (void)context, (void)bytes, (void)size;
     return 0;
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): a pipe's signature */
-static int nothing(void *context, uint8_t *bytes, size_t size)
-{
+static int nothing(void *context, uint8_t *bytes, size_t size) {
     (void)context, (void)bytes, (void)size;
     return 0;
 }
 
 size_t node_arena_needed(const struct node_identity *identity, size_t memory,
-                         const struct node_setup_message *setup)
-{
+                         const struct node_setup_message *setup) {
     struct cube_config config = node_configure(identity, memory);
     const struct node_role *role = node_role_named(setup->role);
     INCODE_ASSERT(role != NULL);
@@ -67,8 +64,7 @@ size_t node_arena_needed(const struct node_identity *identity, size_t memory,
            role->arena_min(memory, setup);
 }
 
-struct node *node_start(const struct node_board *board, const char **why)
-{
+struct node *node_start(const struct node_board *board, const char **why) {
     uint8_t *memory = board->arena;
     size_t own = node_aligned(sizeof(struct node));
     struct cube_config config = node_configure(
@@ -112,14 +108,13 @@ struct node *node_start(const struct node_board *board, const char **why)
 }
 
 /* Of its memory, but for its role's. */
-static size_t own_bytes(const struct node *n)
-{
+static size_t own_bytes(const struct node *n) {
     return n->board->fixed_bytes + node_aligned(sizeof *n) + n->cube_bytes;
 }
 
 /* Adds what the role has done. */
-static void role_totals(const struct node *n, struct node_finished_message *sum)
-{
+static void role_totals(const struct node *n,
+                        struct node_finished_message *sum) {
     struct node_finished_message totals;
     memset(&totals, 0, sizeof totals);
     n->role->totals(n->role_arena, &totals, n->now_us);
@@ -128,8 +123,7 @@ static void role_totals(const struct node *n, struct node_finished_message *sum)
 }
 
 /* What the role did stays counted; what it has is of no use any more. */
-static void end_role(struct node *n)
-{
+static void end_role(struct node *n) {
     if (n->role != NULL) {
         role_totals(n, &n->before);
         n->role = NULL;
@@ -137,8 +131,7 @@ static void end_role(struct node *n)
 }
 
 /* Whatever went before, the setup begins anew. */
-static void take_setup(struct node *n, const struct cube_message *message)
-{
+static void take_setup(struct node *n, const struct cube_message *message) {
     struct node_setup_message setup;
     end_role(n);
     n->fault.size = 0;
@@ -161,8 +154,7 @@ static void take_setup(struct node *n, const struct cube_message *message)
     }
 }
 
-static void take_ping(struct node *n, const struct cube_message *message)
-{
+static void take_ping(struct node *n, const struct cube_message *message) {
     struct node_ping_message ping;
     if (message->size != sizeof ping) {
         node_fault_set(&n->fault, "ping in # bytes, expected #", message->size,
@@ -176,8 +168,7 @@ static void take_ping(struct node *n, const struct cube_message *message)
 }
 
 /* What comes from the host alone, and what has no content. */
-static bool is_expected(struct node *n, const struct cube_message *message)
-{
+static bool is_expected(struct node *n, const struct cube_message *message) {
     uint8_t type = message->type;
     bool host_only = type == NODE_SETUP || type == NODE_JOB ||
                      type == NODE_CREDIT || type == NODE_UNSPILL ||
@@ -200,13 +191,11 @@ static bool is_expected(struct node *n, const struct cube_message *message)
 }
 
 /* What is for a board's loader, which this one may have had before. */
-static bool is_for_loader(const struct cube_message *message)
-{
+static bool is_for_loader(const struct cube_message *message) {
     return message->type >= NODE_IMAGE_BEGIN && message->type <= NODE_IMAGE_DO;
 }
 
-static void serve_message(struct node *n, const struct cube_message *message)
-{
+static void serve_message(struct node *n, const struct cube_message *message) {
     if (node_answers_is_for(message)) {
         node_answers_take(&n->answers, message, n->now_us);
         return;
@@ -237,8 +226,7 @@ static void serve_message(struct node *n, const struct cube_message *message)
     }
 }
 
-static void take_message(struct node *n, const struct cube_message *message)
-{
+static void take_message(struct node *n, const struct cube_message *message) {
     if (is_expected(n, message)) {
         serve_message(n, message);
     }
@@ -246,8 +234,7 @@ static void take_message(struct node *n, const struct cube_message *message)
         message->source == CUBE_HOST && message->type != NODE_STOP;
 }
 
-static void fill_map(const struct node *n, struct node_map *map)
-{
+static void fill_map(const struct node *n, struct node_map *map) {
     memset(map, 0, sizeof *map);
     map->fixed = (uint32_t)n->board->fixed_bytes;
     map->arena = (uint32_t)n->board->arena_bytes;
@@ -260,8 +247,7 @@ static void fill_map(const struct node *n, struct node_map *map)
     }
 }
 
-static bool send_ready(struct node *n)
-{
+static bool send_ready(struct node *n) {
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
@@ -273,14 +259,12 @@ static bool send_ready(struct node *n)
 
 /* What is new of silent neighbours the host is told unasked: its pings may not
  * come through. */
-static void look_at_links(struct node *n)
-{
+static void look_at_links(struct node *n) {
     bool news = node_looks_silent(&n->looks, n->now_us);
     n->owes_pong = n->owes_pong || (news && n->pinged);
 }
 
-static bool send_pong(struct node *n)
-{
+static bool send_pong(struct node *n) {
     n->pong.start = n->board->identity.epoch;
     n->pong.sent = n->counted.sent;
     n->pong.links = node_looks_seen(&n->looks);
@@ -299,8 +283,7 @@ static bool send_pong(struct node *n)
 
 /* The statistics, where there is room for them on the link.  epoch: of the job
  * that is done, or 0. */
-static bool send_finished(struct node *n, uint32_t epoch)
-{
+static bool send_finished(struct node *n, uint32_t epoch) {
     struct node_finished_message finished = n->before;
     if (cube_room(n->cube, CUBE_HOST) == 0) {
         return false;
@@ -317,8 +300,7 @@ static bool send_finished(struct node *n, uint32_t epoch)
 
 /* A new generation of the wiring: the host begins again with all nodes.  What
  * this one had is of no use, but for what it knows of its work. */
-static void follow_wiring(struct node *n)
-{
+static void follow_wiring(struct node *n) {
     const struct cube_wiring *wiring = cube_wiring(n->cube);
     if (wiring_together(wiring, &n->followed)) {
         return;
@@ -335,14 +317,12 @@ static void follow_wiring(struct node *n)
 /* --- what it tells who asks ------------------------------------------------
  */
 
-static void tell_who(void *context, struct node_who *who)
-{
+static void tell_who(void *context, struct node_who *who) {
     const struct node *n = context;
     who->role = n->role == NULL ? 0 : n->role_number;
 }
 
-static void tell_top(void *context, struct node_top *top)
-{
+static void tell_top(void *context, struct node_top *top) {
     const struct node *n = context;
     struct node_finished_message totals;
     struct incode_gauge gauge = {0};
@@ -362,23 +342,20 @@ static void tell_top(void *context, struct node_top *top)
     top->built = totals.statistics.tetrahedra_built;
 }
 
-static bool tell_memory(void *context, struct node_ready_message *ready)
-{
+static bool tell_memory(void *context, struct node_ready_message *ready) {
     const struct node *n = context;
     fill_map(n, &ready->map);
     ready->role = n->role == NULL ? 0 : n->role_number;
     return true;
 }
 
-static void tell_totals(void *context, struct node_finished_message *totals)
-{
+static void tell_totals(void *context, struct node_finished_message *totals) {
     const struct node *n = context;
     node_account(n, totals);
     node_looks_totals(&n->looks, totals);
 }
 
-static size_t tell_log(void *context, char *text, size_t size)
-{
+static size_t tell_log(void *context, char *text, size_t size) {
     const struct node *n = context;
     if (!node_fault_is_set(&n->fault) || n->fault.size + 1 > size) {
         return 0;
@@ -388,8 +365,7 @@ static size_t tell_log(void *context, char *text, size_t size)
     return n->fault.size + 1;
 }
 
-static unsigned send_answers(struct node *n)
-{
+static unsigned send_answers(struct node *n) {
     const struct node_teller teller = {n,           tell_who,    tell_top,
                                        tell_memory, tell_totals, tell_log};
     return node_answers_send(&n->answers, &teller, n->now_us);
@@ -397,15 +373,13 @@ static unsigned send_answers(struct node *n)
 
 /* Tells the host what is wrong, once.  The node goes on to pass messages of
  * others and to answer pings; it takes another setup. */
-static void send_fault(struct node *n)
-{
+static void send_fault(struct node *n) {
     n->fault_sent = node_counted_write(&n->counted, CUBE_HOST, NODE_FAULT,
                                        n->fault.text, n->fault.size) == 0;
 }
 
 /* What the role has to say, and what is asked of it. */
-static unsigned send_role(struct node *n)
-{
+static unsigned send_role(struct node *n) {
     const struct node_role *role = n->role;
     unsigned moved = role->send(n->role_arena);
     n->work += moved;
@@ -423,8 +397,7 @@ static unsigned send_role(struct node *n)
 }
 
 /* The farewell is passed on to other nodes first, then said on each link. */
-static bool may_stop(struct node *n)
-{
+static bool may_stop(struct node *n) {
     uint64_t end = n->stop_us + FAREWELL_US;
     if (!n->stopping) {
         return false;
@@ -441,22 +414,19 @@ static bool may_stop(struct node *n)
     return true;
 }
 
-static bool is_sound(const struct node *n)
-{
+static bool is_sound(const struct node *n) {
     return !node_fault_is_set(&n->fault) && n->role != NULL;
 }
 
 /* Whether the role takes what has come; one that is broken takes all. */
-static bool may_take(struct node *n, const struct cube_message *message)
-{
+static bool may_take(struct node *n, const struct cube_message *message) {
     return !is_sound(n) || n->role->may_take == NULL ||
            node_answers_is_for(message) ||
            n->role->may_take(n->role_arena, message);
 }
 
 /* Reads a link up to what is not to be taken yet. */
-static unsigned read_link(struct node *n, unsigned d)
-{
+static unsigned read_link(struct node *n, unsigned d) {
     struct cube_message message;
     unsigned moved = 0;
     while (cube_read_from(n->cube, d, &message)) {
@@ -472,8 +442,7 @@ static unsigned read_link(struct node *n, unsigned d)
     return moved;
 }
 
-unsigned node_receive(struct node *node)
-{
+unsigned node_receive(struct node *node) {
     node->now_us = node->board->now_us(node->board->context);
     unsigned moved = node_looks_poll(&node->looks, node->now_us);
     follow_wiring(node);
@@ -484,8 +453,7 @@ unsigned node_receive(struct node *node)
     return moved;
 }
 
-unsigned node_work(struct node *node)
-{
+unsigned node_work(struct node *node) {
     if (!is_sound(node) || node->owes_pong || node->owes_ready) {
         return 0;
     }
@@ -495,8 +463,7 @@ unsigned node_work(struct node *node)
     return worked;
 }
 
-enum node_event node_send(struct node *node, unsigned moved)
-{
+enum node_event node_send(struct node *node, unsigned moved) {
     bool sound = is_sound(node);
     node_looks_between(&node->looks);
     if (node_fault_is_set(&node->fault) && !node->fault_sent) {
@@ -520,20 +487,17 @@ enum node_event node_send(struct node *node, unsigned moved)
     return NODE_IDLE;
 }
 
-enum node_reset node_reset_why(const struct node *node)
-{
+enum node_reset node_reset_why(const struct node *node) {
     return node_answers_restart(&node->answers, node->now_us);
 }
 
-enum node_event node_step(struct node *node)
-{
+enum node_event node_step(struct node *node) {
     node->looks.tends = true;
     unsigned moved = node_receive(node);
     return node_send(node, moved + node_work(node));
 }
 
-uint64_t node_wait_us(const struct node *node)
-{
+uint64_t node_wait_us(const struct node *node) {
     uint64_t due = cube_next_due_us(node->cube, node->now_us);
     if (node->stopping && due > FAREWELL_US) {
         due = FAREWELL_US;
@@ -542,36 +506,31 @@ uint64_t node_wait_us(const struct node *node)
 }
 
 unsigned node_links(const struct node *node,
-                    struct node_link_state state[CUBE_LINKS_MAX])
-{
+                    struct node_link_state state[CUBE_LINKS_MAX]) {
     return node_answers_links(&node->answers, state);
 }
 
-bool node_has_met(const struct node *node)
-{
+bool node_has_met(const struct node *node) {
     return node_looks_seen(&node->looks) != 0;
 }
 
-uint32_t node_held(const struct node *node)
-{
+uint32_t node_held(const struct node *node) {
     return node->role == NULL ? 0 : node->role->held(node->role_arena);
 }
 
-void node_account(const struct node *node, struct node_finished_message *totals)
-{
+void node_account(const struct node *node,
+                  struct node_finished_message *totals) {
     *totals = node->before;
     if (node->role != NULL) {
         role_totals(node, totals);
     }
 }
 
-const struct cube_statistics *node_messages(const struct node *node)
-{
+const struct cube_statistics *node_messages(const struct node *node) {
     return cube_statistics(node->cube);
 }
 
-enum node_reset node_run(struct node *node)
-{
+enum node_reset node_run(struct node *node) {
     const struct node_board *board = node->board;
     enum node_event event;
     while ((event = node_step(node)) != NODE_STOPPED) {

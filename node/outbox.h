@@ -37,8 +37,7 @@ struct node_outbox {
 void node_outbox_init(struct node_outbox *box, void *memory, uint32_t slots);
 
 /* Slots that are neither closed nor waiting. */
-static inline uint32_t node_outbox_free(const struct node_outbox *box)
-{
+static inline uint32_t node_outbox_free(const struct node_outbox *box) {
     return box->slot_count - box->used;
 }
 

@@ -1,15 +1,13 @@
 #include "pace.h"
 
 void node_pace_init(struct node_pace *pace, uint64_t (*now_us)(void *context),
-                    void *context)
-{
+                    void *context) {
     *pace = (struct node_pace){.now_us = now_us, .context = context};
     pace->units = 1;
     pace->unit_ns = NODE_PACE_STEP_US * UINT64_C(1000);
 }
 
-void node_pace_begin(struct node_pace *pace, uint64_t now_us)
-{
+void node_pace_begin(struct node_pace *pace, uint64_t now_us) {
     pace->begun_us = pace->looked_us = now_us;
 }
 
@@ -17,8 +15,7 @@ void node_pace_begin(struct node_pace *pace, uint64_t now_us)
  * thought, at most, as the clock goes on while others have the processor; and
  * less by and by, as units differ, by the time that they took: many that take
  * next to none do not hide those that take long. */
-static void look(struct node_pace *pace, uint32_t units)
-{
+static void look(struct node_pace *pace, uint32_t units) {
     uint64_t now = pace->now_us(pace->context);
     uint64_t passed_us = now - pace->looked_us;
     uint64_t unit_ns = passed_us * 1000 / (units > 0 ? units : 1);
@@ -42,22 +39,19 @@ static void look(struct node_pace *pace, uint32_t units)
                                             : (uint32_t)fit;
 }
 
-bool node_pace_goes_on(struct node_pace *pace, uint32_t units)
-{
+bool node_pace_goes_on(struct node_pace *pace, uint32_t units) {
     look(pace, units);
     return pace->looked_us - pace->begun_us < NODE_PACE_LAST_US;
 }
 
-void node_pace_end(struct node_pace *pace, uint32_t units)
-{
+void node_pace_end(struct node_pace *pace, uint32_t units) {
     look(pace, units);
 }
 
 unsigned node_pace_work(struct node_pace *pace,
                         bool (*step)(void *context, uint32_t units,
                                      uint32_t *spent),
-                        void *context)
-{
+                        void *context) {
     unsigned worked = 0;
     uint32_t units = 0; /* since the last look at the clock */
     bool goes_on = true;

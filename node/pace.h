@@ -54,8 +54,7 @@ void node_pace_begin(struct node_pace *pace, uint64_t now_us);
 
 /* Whether so many units since the last look at the clock are worth another. */
 static inline bool node_pace_is_due(const struct node_pace *pace,
-                                    uint32_t units)
-{
+                                    uint32_t units) {
     return units * NODE_PACE_LOOKS >= pace->units;
 }
 

@@ -8,13 +8,11 @@ struct sip {
     uint32_t v0, v1, v2, v3;
 };
 
-static inline uint32_t left(uint32_t x, unsigned bits)
-{
+static inline uint32_t left(uint32_t x, unsigned bits) {
     return x << bits | x >> (32 - bits);
 }
 
-static inline struct sip rounds(struct sip s, unsigned count)
-{
+static inline struct sip rounds(struct sip s, unsigned count) {
     for (; count > 0; count--) {
         s.v0 += s.v1;
         s.v1 = left(s.v1, 5) ^ s.v0;
@@ -30,8 +28,7 @@ static inline struct sip rounds(struct sip s, unsigned count)
     return s;
 }
 
-static inline struct sip absorb(struct sip s, uint32_t word)
-{
+static inline struct sip absorb(struct sip s, uint32_t word) {
     s.v3 ^= word;
     s = rounds(s, 2);
     s.v0 ^= word;
@@ -39,8 +36,7 @@ static inline struct sip absorb(struct sip s, uint32_t word)
 }
 
 uint64_t node_half_siphash(uint64_t key, const uint32_t *words, size_t count,
-                           const uint8_t *bytes, size_t size)
-{
+                           const uint8_t *bytes, size_t size) {
     const uint32_t k0 = (uint32_t)key, k1 = (uint32_t)(key >> 32);
     struct sip s = {k0, k1 ^ 0xee, k0 ^ 0x6c796765, k1 ^ 0x74656462};
     uint32_t word, last = (uint32_t)(count * sizeof word + size) << 24;
@@ -66,15 +62,13 @@ uint64_t node_half_siphash(uint64_t key, const uint32_t *words, size_t count,
 /* ---- pages ---- */
 
 static uint64_t tag_of(uint64_t key, uint32_t page, const uint8_t *bytes,
-                       size_t size)
-{
+                       size_t size) {
     const uint32_t words[] = {page, (uint32_t)size};
     return node_half_siphash(key, words, 2, bytes, size);
 }
 
 size_t node_page_seal(struct node_page_message *message, uint64_t key,
-                      size_t bytes)
-{
+                      size_t bytes) {
     uint64_t tag = tag_of(key, message->head.page, message->data, bytes);
     memcpy(message->head.tag, &tag, sizeof tag);
     return sizeof message->head + bytes;
@@ -83,8 +77,7 @@ size_t node_page_seal(struct node_page_message *message, uint64_t key,
 void node_page_check_init(struct node_page_check *check,
                           const struct node_setup_message *setup,
                           struct node_counted *counted,
-                          struct node_fault *fault)
-{
+                          struct node_fault *fault) {
     memset(check, 0, sizeof *check);
     check->counted = counted;
     check->fault = fault;
@@ -93,8 +86,7 @@ void node_page_check_init(struct node_page_check *check,
 
 bool node_page_check_take(struct node_page_check *check,
                           const struct cube_message *message,
-                          struct node_page *page)
-{
+                          struct node_page *page) {
     struct node_page_head head;
     *page =
         (struct node_page){.number = INCODE_NONE, .source = message->source};
@@ -121,16 +113,14 @@ bool node_page_check_take(struct node_page_check *check,
 }
 
 void node_page_check_report(struct node_page_check *check, uint16_t sender,
-                            uint32_t page)
-{
+                            uint32_t page) {
     if (!check->owed) {
         check->owed = true;
         check->wrong = (struct node_wrong_page_message){page, sender};
     }
 }
 
-unsigned node_page_check_send(struct node_page_check *check)
-{
+unsigned node_page_check_send(struct node_page_check *check) {
     if (!check->owed ||
         node_counted_write(check->counted, CUBE_HOST, NODE_WRONG_PAGE,
                            &check->wrong, sizeof check->wrong) != 0) {

@@ -8,33 +8,28 @@
 enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT, KIND_FINDER };
 enum { FINDER_FOLLOWS = 63 /* in a finder's head */ };
 
-static inline uint32_t zigzag(uint32_t difference)
-{
+static inline uint32_t zigzag(uint32_t difference) {
     return (difference << 1) ^ (0u - (difference >> 31));
 }
 
-static inline uint32_t unzigzag(uint32_t value)
-{
+static inline uint32_t unzigzag(uint32_t value) {
     return (value >> 1) ^ (0u - (value & 1));
 }
 
 /* Length of a value in bytes, less one. */
-static inline uint32_t length_of(uint32_t value)
-{
+static inline uint32_t length_of(uint32_t value) {
     return (31u - (uint32_t)__builtin_clz(value | 1)) >> 3;
 }
 
 /* Writes all four bytes; the next value overwrites those not counted.  Hence
  * the slack at the end of a buffer. */
-static inline uint8_t *put(uint8_t *at, uint32_t value, uint32_t length)
-{
+static inline uint8_t *put(uint8_t *at, uint32_t value, uint32_t length) {
     memcpy(at, &value, 4);
     return at + length + 1;
 }
 
 void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
-                       size_t size_max, uint16_t sender)
-{
+                       size_t size_max, uint16_t sender) {
     writer->buffer = buffer;
     writer->size = 0;
     writer->size_max = size_max;
@@ -43,8 +38,7 @@ void node_result_begin(struct node_result_writer *writer, uint8_t *buffer,
 }
 
 static void put_single(struct node_result_writer *writer, uint32_t kind,
-                       uint32_t difference)
-{
+                       uint32_t difference) {
     uint32_t value = zigzag(difference);
     uint32_t length = length_of(value);
     uint8_t *at = writer->buffer + writer->size;
@@ -52,8 +46,7 @@ static void put_single(struct node_result_writer *writer, uint32_t kind,
     writer->size = (size_t)(put(at + 1, value, length) - writer->buffer);
 }
 
-int node_result_finder(struct node_result_writer *writer, uint16_t node)
-{
+int node_result_finder(struct node_result_writer *writer, uint16_t node) {
     if (node == writer->finder) {
         return 1;
     }
@@ -72,8 +65,7 @@ int node_result_finder(struct node_result_writer *writer, uint16_t node)
 }
 
 size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
-                        const uint32_t (*apexes)[3], size_t count)
-{
+                        const uint32_t (*apexes)[3], size_t count) {
     size_t room = writer->size_max - writer->size;
     if (room < NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX ||
         count == 0) {
@@ -98,8 +90,7 @@ size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
     return count;
 }
 
-int node_result_commit(struct node_result_writer *writer, uint32_t brick)
-{
+int node_result_commit(struct node_result_writer *writer, uint32_t brick) {
     if (writer->size_max - writer->size < NODE_RESULT_COMMIT_MAX) {
         return 0;
     }
@@ -110,8 +101,7 @@ int node_result_commit(struct node_result_writer *writer, uint32_t brick)
 
 void node_result_open(struct node_result_reader *reader, const uint8_t *data,
                       size_t size, uint32_t vertices, uint32_t sender,
-                      uint32_t nodes)
-{
+                      uint32_t nodes) {
     reader->next = data;
     reader->end = data + size;
     reader->vertex = 0;
@@ -122,8 +112,7 @@ void node_result_open(struct node_result_reader *reader, const uint8_t *data,
     reader->in_star = 0;
 }
 
-static inline uint32_t get(const uint8_t *at, uint32_t length)
-{
+static inline uint32_t get(const uint8_t *at, uint32_t length) {
     static const uint32_t mask[4] = {0xff, 0xffff, 0xffffff, 0xffffffff};
     uint32_t value;
     memcpy(&value, at, 4);
@@ -133,8 +122,7 @@ static inline uint32_t get(const uint8_t *at, uint32_t length)
 /* A tetrahedron whose head is at `at`, four readable bytes beyond each value.
  * Returns the address of the next record. */
 static inline const uint8_t *get_row(const uint8_t *at, uint32_t vertex,
-                                     uint32_t row[4])
-{
+                                     uint32_t row[4]) {
     uint32_t head = *at++;
     uint32_t la = head >> 2 & 3, lb = head >> 4 & 3, lc = head >> 6;
     row[0] = vertex;
@@ -144,14 +132,12 @@ static inline const uint8_t *get_row(const uint8_t *at, uint32_t vertex,
     return at + la + lb + lc + 3;
 }
 
-static inline bool row_in_range(const uint32_t row[4], uint32_t vertices)
-{
+static inline bool row_in_range(const uint32_t row[4], uint32_t vertices) {
     return (row[1] < vertices) & (row[2] < vertices) & (row[3] < vertices);
 }
 
 /* Size of the record with this head, or 0 where no record has such a head. */
-static size_t record_size(uint32_t head)
-{
+static size_t record_size(uint32_t head) {
     size_t first = 2 + (head >> 2 & 3);
     if ((head & 3) == KIND_TETRAHEDRON) {
         return first + 2 + (head >> 4 & 3) + (head >> 6);
@@ -165,8 +151,7 @@ static size_t record_size(uint32_t head)
 /* One record near the end of the batch, by way of a padded copy.  Returns its
  * size, 0 for garbage; *rows_read becomes 1 for a tetrahedron. */
 static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
-                          size_t *rows_read, int *committed)
-{
+                          size_t *rows_read, int *committed) {
     uint8_t copy[NODE_RESULT_TETRAHEDRON_MAX + 4] = {0};
     size_t left = (size_t)(reader->end - reader->next);
     size_t size = record_size(*reader->next);
@@ -202,8 +187,7 @@ static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
 
 /* Tetrahedra one after another while none can reach past the end. */
 static size_t read_fast(struct node_result_reader *reader, uint32_t (*rows)[4],
-                        size_t rows_max, bool *good)
-{
+                        size_t rows_max, bool *good) {
     const uint8_t *at = reader->next;
     const uint8_t *safe = reader->end - (NODE_RESULT_TETRAHEDRON_MAX + 3);
     size_t count = 0;
@@ -218,8 +202,7 @@ static size_t read_fast(struct node_result_reader *reader, uint32_t (*rows)[4],
 
 enum node_result_event node_result_read(struct node_result_reader *reader,
                                         uint32_t (*rows)[4], size_t rows_max,
-                                        size_t *count)
-{
+                                        size_t *count) {
     *count = 0;
     while (reader->next != reader->end) {
         size_t rows_read = 0;

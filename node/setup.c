@@ -4,8 +4,7 @@
 
 bool node_setup_read(struct node_setup_message *setup,
                      const struct cube_message *message, unsigned nodes,
-                     struct node_fault *fault)
-{
+                     struct node_fault *fault) {
     uint32_t protocol = NODE_PROTOCOL;
     if (message->size >= sizeof protocol) {
         memcpy(&protocol, message->data, sizeof protocol);

@@ -7,19 +7,16 @@ enum { WORDS = sizeof(struct incode_statistics) / sizeof(uint64_t) };
 static_assert(sizeof(struct incode_statistics) == WORDS * sizeof(uint64_t),
               "statistics are counters of 64 bits");
 
-static uint64_t higher(uint64_t a, uint64_t b)
-{
+static uint64_t higher(uint64_t a, uint64_t b) {
     return a > b ? a : b;
 }
 
-static uint32_t most(uint32_t a, uint32_t b)
-{
+static uint32_t most(uint32_t a, uint32_t b) {
     return a > b ? a : b;
 }
 
 static void add_statistics(struct incode_statistics *sum,
-                           const struct incode_statistics *more)
-{
+                           const struct incode_statistics *more) {
     uint64_t a[WORDS], b[WORDS];
     uint64_t afl_max = higher(sum->afl_max, more->afl_max);
     uint64_t high_water =
@@ -35,8 +32,7 @@ static void add_statistics(struct incode_statistics *sum,
 }
 
 void node_totals_add(struct node_finished_message *sum,
-                     const struct node_finished_message *more)
-{
+                     const struct node_finished_message *more) {
     sum->wall_us += more->wall_us;
     sum->busy_us += more->busy_us;
     sum->bytes_in += more->bytes_in;

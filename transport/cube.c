@@ -13,34 +13,29 @@ enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
 
 /* --- which way ----------------------------------------------------------- */
 
-static bool is_host(const struct cube *cube)
-{
+static bool is_host(const struct cube *cube) {
     return cube->config.self == CUBE_HOST;
 }
 
-static unsigned nodes(const struct cube *cube)
-{
+static unsigned nodes(const struct cube *cube) {
     return 1u << cube->config.dimension;
 }
 
 /* Whether each of the host's wires is used: not on a tree, which has its root
  * at the gateway. */
-static bool many_host_ports(const struct cube *cube)
-{
+static bool many_host_ports(const struct cube *cube) {
     return cube->config.host_ports > 1 && !cube->routes.tree;
 }
 
 /* The node by whose host port a node and the host reach each other.  Between
  * the two e-cube's dimensions are above those in which these nodes differ. */
-static unsigned host_port_of(const struct cube *cube, unsigned node)
-{
+static unsigned host_port_of(const struct cube *cube, unsigned node) {
     return many_host_ports(cube) ? node & (cube->config.host_ports - 1u)
                                  : cube->wiring.gateway;
 }
 
 /* The host's link to the host port of a node. */
-static unsigned link_of_host_port(const struct cube *cube, unsigned node)
-{
+static unsigned link_of_host_port(const struct cube *cube, unsigned node) {
     if (cube->config.host_ports > 1) {
         return node;
     }
@@ -48,8 +43,7 @@ static unsigned link_of_host_port(const struct cube *cube, unsigned node)
 }
 
 /* A host port is a node's last; 0: there is no way. */
-static uint32_t way_to(const struct cube *cube, unsigned dest)
-{
+static uint32_t way_to(const struct cube *cube, unsigned dest) {
     unsigned self = cube->config.self;
     if (is_host(cube)) {
         return (uint32_t)1 << link_of_host_port(cube, host_port_of(cube, dest));
@@ -69,8 +63,7 @@ static uint32_t way_to(const struct cube *cube, unsigned dest)
     return link == ROUTES_NONE ? 0 : (uint32_t)1 << link;
 }
 
-static uint32_t ways_to_all(const struct cube *cube, unsigned source)
-{
+static uint32_t ways_to_all(const struct cube *cube, unsigned source) {
     unsigned self = cube->config.self;
     unsigned root = source == CUBE_HOST ? host_port_of(cube, self) : source;
     uint32_t between = many_host_ports(cube) ? cube->config.host_ports - 1u : 0;
@@ -89,8 +82,7 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source)
 
 /* The one link on which messages of that source arrive here.  A message of that
  * source on any other link is dropped. */
-static unsigned way_from(const struct cube *cube, unsigned source)
-{
+static unsigned way_from(const struct cube *cube, unsigned source) {
     unsigned self = cube->config.self;
     if (is_host(cube)) {
         return link_of_host_port(cube, host_port_of(cube, source));
@@ -107,8 +99,7 @@ static unsigned way_from(const struct cube *cube, unsigned source)
 /* For a message that arrived on link d; 0: it has lost its way, or its source
  * is not behind that link. */
 static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
-                        unsigned dest)
-{
+                        unsigned dest) {
     bool source_known = source < nodes(cube) || source == CUBE_HOST;
     bool dest_known =
         dest < nodes(cube) || dest == CUBE_HOST || dest == CUBE_ALL;
@@ -124,13 +115,11 @@ static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
 
 /* --- memory -------------------------------------------------------------- */
 
-static size_t up64(size_t bytes)
-{
+static size_t up64(size_t bytes) {
     return (bytes + 63) / 64 * 64;
 }
 
-size_t cube_arena_bytes(const struct cube_config *config)
-{
+size_t cube_arena_bytes(const struct cube_config *config) {
     if (cube_config_fault(config) != NULL) {
         return 0;
     }
@@ -144,8 +133,7 @@ size_t cube_arena_bytes(const struct cube_config *config)
 }
 
 struct cube *cube_init(void *arena, size_t bytes,
-                       const struct cube_config *config)
-{
+                       const struct cube_config *config) {
     size_t needed = cube_arena_bytes(config);
     if (needed == 0 || bytes < needed) {
         return NULL;
@@ -176,15 +164,13 @@ struct cube *cube_init(void *arena, size_t bytes,
  * it, and was in our generation afterwards.  If not, it is of a generation that
  * he has told us in a state datagram, or has left for ours, which he tells us:
  * that comes.  Numbers are not compared, as generations may lie far apart. */
-static bool outdated(const struct cube *cube, unsigned d, uint16_t sequence)
-{
+static bool outdated(const struct cube *cube, unsigned d, uint16_t sequence) {
     const struct cube_neighbour *n = &cube->neighbours[d];
     return n->together && (int16_t)(sequence - n->since) < 0;
 }
 
 /* The oldest message of link d, and where it must still go. */
-static bool look_at(struct cube *cube, unsigned d)
-{
+static bool look_at(struct cube *cube, unsigned d) {
     struct cube_arrival *a = &cube->arrivals[d];
     while (!a->there && link_read(cube->links[d], &a->message)) {
         const uint8_t *head = a->message.data;
@@ -220,15 +206,13 @@ static bool look_at(struct cube *cube, unsigned d)
     return a->there;
 }
 
-static void done_with(struct cube *cube, unsigned d)
-{
+static void done_with(struct cube *cube, unsigned d) {
     cube->arrivals[d].there = false;
     link_release(cube->links[d]);
 }
 
 /* A message that is being read here stays until it was. */
-void cube_drop_all(struct cube *cube)
-{
+void cube_drop_all(struct cube *cube) {
     const uint32_t local = (uint32_t)1 << LOCAL;
     for (unsigned d = 0; d < cube->count; d++) {
         struct cube_arrival *a = &cube->arrivals[d];
@@ -248,8 +232,7 @@ void cube_drop_all(struct cube *cube)
 /* A link's last room for a message of any size goes to messages of others and
  * of this node in turn, so that neither starves: small ones, of a frame each,
  * would leave a large one none for ever. */
-static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
-{
+static bool may_pass_on(struct cube *cube, unsigned out, size_t size) {
     const struct link *link = cube->links[out];
     uint32_t bit = (uint32_t)1 << out;
     if (cube->tending) {
@@ -270,8 +253,7 @@ static bool may_pass_on(struct cube *cube, unsigned out, size_t size)
     return true;
 }
 
-static void pass_on(struct cube *cube, struct cube_arrival *a, unsigned out)
-{
+static void pass_on(struct cube *cube, struct cube_arrival *a, unsigned out) {
     uint8_t head[HEAD];
     const struct link_message *m = &a->message;
     memcpy(head, m->data, HEAD);
@@ -284,8 +266,7 @@ static void pass_on(struct cube *cube, struct cube_arrival *a, unsigned out)
 
 /* Passes on what link d has brought, up to a message that must wait: for room
  * ahead, or for this node to read it. */
-static int pass_on_from(struct cube *cube, unsigned d)
-{
+static int pass_on_from(struct cube *cube, unsigned d) {
     struct cube_arrival *a = &cube->arrivals[d];
     int passed = 0;
     unsigned most = LINK_WINDOW_MAX;
@@ -308,8 +289,7 @@ static int pass_on_from(struct cube *cube, unsigned d)
     return passed;
 }
 
-static int pass_on_all(struct cube *cube)
-{
+static int pass_on_all(struct cube *cube) {
     int count = 0;
     cube->turn = cube->turn + 1 >= cube->count ? 0 : cube->turn + 1;
     for (unsigned i = 0; i < cube->count; i++) {
@@ -319,8 +299,7 @@ static int pass_on_all(struct cube *cube)
     return count;
 }
 
-int cube_poll(struct cube *cube, uint64_t now_us)
-{
+int cube_poll(struct cube *cube, uint64_t now_us) {
     int count = 0;
     cube->again = false;
     for (unsigned d = 0; d < cube->count; d++) {
@@ -339,8 +318,7 @@ int cube_poll(struct cube *cube, uint64_t now_us)
     return count;
 }
 
-int cube_tend(struct cube *cube, uint64_t now_us)
-{
+int cube_tend(struct cube *cube, uint64_t now_us) {
     int count = 0;
     for (unsigned d = 0; d < cube->count; d++) {
         count += link_tend_receive(cube->links[d], now_us);
@@ -357,16 +335,14 @@ int cube_tend(struct cube *cube, uint64_t now_us)
 
 /* --- messages of this node ----------------------------------------------- */
 
-static uint32_t ways_out(const struct cube *cube, uint16_t dest)
-{
+static uint32_t ways_out(const struct cube *cube, uint16_t dest) {
     LINK_ASSERT(dest != cube->config.self);
     LINK_ASSERT(dest == CUBE_ALL || dest == CUBE_HOST || dest < nodes(cube));
     return dest == CUBE_ALL ? ways_to_all(cube, cube->config.self)
                             : way_to(cube, dest);
 }
 
-static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size)
-{
+static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size) {
     unsigned room = cube->wiring.generation != 0 ? LINK_WINDOW_MAX : 0;
     for (unsigned d = 0; d < cube->count; d++) {
         unsigned here = link_room(cube->links[d], size);
@@ -378,8 +354,7 @@ static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size)
 }
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     uint16_t self = cube->config.self;
     uint32_t ways = ways_out(cube, dest);
     uint8_t head[HEAD] = {(uint8_t)dest,
@@ -406,13 +381,12 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     return 0;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     return room_on(cube, ways_out(cube, dest), CUBE_MESSAGE_MAX);
 }
 
-bool cube_read_from(struct cube *cube, unsigned d, struct cube_message *message)
-{
+bool cube_read_from(struct cube *cube, unsigned d,
+                    struct cube_message *message) {
     LINK_ASSERT(cube->held == CUBE_LINKS_MAX && d < cube->count);
     pass_on_from(cube, d);
     const struct cube_arrival *a = &cube->arrivals[d];
@@ -428,8 +402,7 @@ bool cube_read_from(struct cube *cube, unsigned d, struct cube_message *message)
     return true;
 }
 
-bool cube_read(struct cube *cube, struct cube_message *message)
-{
+bool cube_read(struct cube *cube, struct cube_message *message) {
     for (unsigned i = 0; i < cube->count; i++) {
         unsigned d = cube->turn + i;
         if (cube_read_from(cube, d < cube->count ? d : d - cube->count,
@@ -440,14 +413,12 @@ bool cube_read(struct cube *cube, struct cube_message *message)
     return false;
 }
 
-void cube_put_back(struct cube *cube)
-{
+void cube_put_back(struct cube *cube) {
     LINK_ASSERT(cube->held < cube->count);
     cube->held = CUBE_LINKS_MAX;
 }
 
-void cube_release(struct cube *cube)
-{
+void cube_release(struct cube *cube) {
     unsigned d = cube->held;
     LINK_ASSERT(d < cube->count);
     struct cube_arrival *a = &cube->arrivals[d];
@@ -461,37 +432,31 @@ void cube_release(struct cube *cube)
 
 /* --- state --------------------------------------------------------------- */
 
-unsigned cube_links(const struct cube *cube)
-{
+unsigned cube_links(const struct cube *cube) {
     return cube->count;
 }
 
 const struct link_statistics *cube_link_statistics(const struct cube *cube,
-                                                   unsigned d)
-{
+                                                   unsigned d) {
     LINK_ASSERT(d < cube->count);
     return link_statistics(cube->links[d]);
 }
 
-enum link_state cube_link_state(const struct cube *cube, unsigned d)
-{
+enum link_state cube_link_state(const struct cube *cube, unsigned d) {
     LINK_ASSERT(d < cube->count);
     return link_state(cube->links[d]);
 }
 
-const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d)
-{
+const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d) {
     LINK_ASSERT(d < cube->count);
     return link_peer(cube->links[d]);
 }
 
-const struct cube_statistics *cube_statistics(const struct cube *cube)
-{
+const struct cube_statistics *cube_statistics(const struct cube *cube) {
     return &cube->statistics;
 }
 
-bool cube_idle(const struct cube *cube)
-{
+bool cube_idle(const struct cube *cube) {
     for (unsigned d = 0; d < cube->count; d++) {
         const struct cube_arrival *a = &cube->arrivals[d];
         bool under_way = a->there && (a->ways & ~((uint32_t)1 << LOCAL)) != 0;
@@ -503,15 +468,13 @@ bool cube_idle(const struct cube *cube)
     return true;
 }
 
-void cube_close(struct cube *cube, uint64_t deadline_us)
-{
+void cube_close(struct cube *cube, uint64_t deadline_us) {
     for (unsigned d = 0; d < cube->count; d++) {
         link_close(cube->links[d], deadline_us);
     }
 }
 
-uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us)
-{
+uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us) {
     uint64_t due = cube->again ? 0 : UINT64_MAX;
     for (unsigned d = 0; d < cube->count; d++) {
         uint64_t link = link_next_due_us(cube->links[d], now_us);

@@ -9,8 +9,7 @@ static_assert(CUBE_DIMENSION_MAX == 10 && CUBE_HOST_PORTS_MAX == 8,
               "the texts of cube_config_fault say so");
 
 struct link_end cube_peer_of(const struct cube_config *config, unsigned self,
-                             unsigned d)
-{
+                             unsigned d) {
     bool many = config->host_ports > 1;
     unsigned spare = config->spare_node;
     if (self == CUBE_HOST) {
@@ -25,8 +24,7 @@ struct link_end cube_peer_of(const struct cube_config *config, unsigned self,
 }
 
 struct link_config cube_link_config(const struct cube_config *config,
-                                    unsigned d)
-{
+                                    unsigned d) {
     bool host = config->self == CUBE_HOST;
     bool to_host = !host && d == config->dimension;
     struct link_end peer = cube_peer_of(config, config->self, d);
@@ -52,8 +50,7 @@ struct link_config cube_link_config(const struct cube_config *config,
     return c;
 }
 
-unsigned cube_links_of(const struct cube_config *config)
-{
+unsigned cube_links_of(const struct cube_config *config) {
     if (config->host_ports > 1) {
         return config->self == CUBE_HOST
                    ? config->host_ports
@@ -68,8 +65,7 @@ unsigned cube_links_of(const struct cube_config *config)
 }
 
 /* Who has host ports. */
-static const char *host_port_fault(const struct cube_config *config)
-{
+static const char *host_port_fault(const struct cube_config *config) {
     unsigned ports = config->host_ports, nodes = 1u << config->dimension;
     if ((ports & (ports - 1)) != 0 || ports > CUBE_HOST_PORTS_MAX) {
         return "host_ports is no power of two up to 8";
@@ -90,8 +86,7 @@ static const char *host_port_fault(const struct cube_config *config)
     return NULL;
 }
 
-const char *cube_config_fault(const struct cube_config *config)
-{
+const char *cube_config_fault(const struct cube_config *config) {
     if (config->dimension > CUBE_DIMENSION_MAX) {
         return "dimension is above 10";
     }
@@ -106,8 +101,7 @@ const char *cube_config_fault(const struct cube_config *config)
     return fault;
 }
 
-void cube_for_serial(struct cube_config *config, uint32_t baud)
-{
+void cube_for_serial(struct cube_config *config, uint32_t baud) {
     config->serial_baud = baud;
     if (baud != 0) {
         config->window = config->window >= 8 ? 14 : 7;

@@ -2,8 +2,7 @@
 #include "cube_internal.h"
 #include "text.h"
 
-static void say_end(struct cube_text *t, const char *before, unsigned node)
-{
+static void say_end(struct cube_text *t, const char *before, unsigned node) {
     cube_text_put(t, before);
     if (node == CUBE_HOST) {
         cube_text_put(t, "the host");
@@ -13,15 +12,13 @@ static void say_end(struct cube_text *t, const char *before, unsigned node)
     }
 }
 
-static void say_link(struct cube_text *t, const char *before, unsigned link)
-{
+static void say_link(struct cube_text *t, const char *before, unsigned link) {
     cube_text_put(t, before);
     cube_text_put(t, "link ");
     cube_text_number(t, link);
 }
 
-static void say_why(struct cube_text *t, unsigned refusal, unsigned dimension)
-{
+static void say_why(struct cube_text *t, unsigned refusal, unsigned dimension) {
     if (refusal == LINK_WRONG_VERSION) {
         cube_text_put(t, " has another protocol version, expected ");
         cube_text_number(t, LINK_VERSION);
@@ -35,8 +32,7 @@ static void say_why(struct cube_text *t, unsigned refusal, unsigned dimension)
 
 void cube_wrong_text(const struct cube_wrong *wrong,
                      const struct cube_config *config,
-                     char text[CUBE_FAULT_BYTES])
-{
+                     char text[CUBE_FAULT_BYTES]) {
     struct cube_text t = cube_text_in(text, CUBE_FAULT_BYTES);
     struct link_end peer = cube_peer_of(config, wrong->node, wrong->link);
     say_end(&t, "", wrong->node);
@@ -54,8 +50,7 @@ void cube_wrong_text(const struct cube_wrong *wrong,
     }
 }
 
-bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES])
-{
+bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES]) {
     text[0] = '\0';
     if (cube->wiring.wrong_count == 0) {
         return false;

@@ -20,8 +20,7 @@ enum { WORD = sizeof(word), RUN_MAX = 254 };
 
 #define EACH_BYTE(value) ((word)-1 / 255 * (value))
 
-static inline word load_word(const uint8_t *p)
-{
+static inline word load_word(const uint8_t *p) {
     word w;
     memcpy(&w, p, sizeof w);
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
@@ -31,8 +30,7 @@ static inline word load_word(const uint8_t *p)
 }
 
 /* 0x80 in each byte that is zero in w, and 0 elsewhere: no carry crosses. */
-static inline word zero_marks(word w)
-{
+static inline word zero_marks(word w) {
     word low = EACH_BYTE(0x7f);
     return ~(((w & low) + low) | w | low);
 }
@@ -84,23 +82,20 @@ static const uint32_t remainders[CHECKS][ROWS][16] = {
 };
 
 /* A check, four bytes on: crc is the last result, exclusive-or them. */
-static inline uint32_t after_word(unsigned check, uint32_t crc)
-{
+static inline uint32_t after_word(unsigned check, uint32_t crc) {
     const uint32_t(*t)[16] = remainders[check];
     return t[7][crc & 15] ^ t[6][crc >> 4 & 15] ^ t[5][crc >> 8 & 15] ^
            t[4][crc >> 12 & 15] ^ t[3][crc >> 16 & 15] ^ t[2][crc >> 20 & 15] ^
            t[1][crc >> 24 & 15] ^ t[0][crc >> 28];
 }
 
-static inline uint32_t after_byte(unsigned check, uint32_t crc)
-{
+static inline uint32_t after_byte(unsigned check, uint32_t crc) {
     const uint32_t(*t)[16] = remainders[check];
     return t[1][crc & 15] ^ t[0][crc >> 4 & 15] ^ crc >> 8;
 }
 
 static inline uint32_t by_table(unsigned check, uint32_t crc,
-                                const uint8_t *bytes, size_t size)
-{
+                                const uint8_t *bytes, size_t size) {
     const uint8_t *p = bytes;
     for (; size >= 4; size -= 4, p += 4) {
         crc = after_word(check, crc ^ bytes_get32(p));
@@ -111,15 +106,13 @@ static inline uint32_t by_table(unsigned check, uint32_t crc,
     return crc;
 }
 
-uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size)
-{
+uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size) {
     return ~by_table(CRC32C, ~crc, bytes, size);
 }
 
 #if defined(__SSE4_2__) && defined(__x86_64__)
 /* The processor's own: eight bytes an instruction. */
-uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size)
-{
+uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size) {
     const uint8_t *p = bytes;
     uint64_t c = ~crc;
     for (; size >= 8; size -= 8, p += 8) {
@@ -133,19 +126,16 @@ uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size)
     return ~(uint32_t)c;
 }
 #else
-uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size)
-{
+uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size) {
     return frame_crc32c_table(crc, bytes, size);
 }
 #endif
 
-uint16_t frame_crc16(const void *bytes, size_t size)
-{
+uint16_t frame_crc16(const void *bytes, size_t size) {
     return (uint16_t)~by_table(CRC16, 0, bytes, size);
 }
 
-size_t frame_find_zero(const uint8_t *bytes, size_t size)
-{
+size_t frame_find_zero(const uint8_t *bytes, size_t size) {
     size_t i = 0;
     for (; size - i >= WORD; i += WORD) {
         word marks = zero_marks(load_word(bytes + i));
@@ -167,15 +157,13 @@ struct writer {
     unsigned run;
 };
 
-static inline void end_run(struct writer *w, unsigned code)
-{
+static inline void end_run(struct writer *w, unsigned code) {
     *w->code = (uint8_t)code;
     w->code = w->out++;
     w->run = 0;
 }
 
-static void put_bytes(struct writer *w, const uint8_t *in, size_t size)
-{
+static void put_bytes(struct writer *w, const uint8_t *in, size_t size) {
     while (size > 0) {
         size--;
         if (*in != 0) {
@@ -193,8 +181,7 @@ static void put_bytes(struct writer *w, const uint8_t *in, size_t size)
 /* A zero keeps its place and becomes the code of the run after it, so words
  * are copied whole and their zeros overwritten.  Writes up to FRAME_SLACK bytes
  * past the end. */
-static void put_words(struct writer *w, const uint8_t *in, size_t size)
-{
+static void put_words(struct writer *w, const uint8_t *in, size_t size) {
     uint8_t *out = w->out, *code = w->code;
     unsigned run = w->run;
     while (size >= WORD) {
@@ -236,8 +223,7 @@ static void put_words(struct writer *w, const uint8_t *in, size_t size)
 }
 
 /* By words, as the checks read them. */
-static void pack_header(uint8_t *bytes, const struct frame_header *h)
-{
+static void pack_header(uint8_t *bytes, const struct frame_header *h) {
     bytes_put32(bytes, h->kind | (uint32_t)h->flags << 4 |
                            (uint32_t)h->credit << 8 | h->session << 16);
     bytes_put32(bytes + 4, h->session >> 16 | (uint32_t)h->sequence << 16);
@@ -246,8 +232,7 @@ static void pack_header(uint8_t *bytes, const struct frame_header *h)
     bytes_put16(bytes + 12, check);
 }
 
-static void unpack_header(struct frame_header *h, const uint8_t *bytes)
-{
+static void unpack_header(struct frame_header *h, const uint8_t *bytes) {
     h->kind = bytes[0] & 15;
     h->flags = bytes[0] >> 4;
     h->credit = bytes[1];
@@ -258,8 +243,7 @@ static void unpack_header(struct frame_header *h, const uint8_t *bytes)
 }
 
 size_t frame_encode(uint8_t *out, const struct frame_header *header,
-                    const void *payload)
-{
+                    const void *payload) {
     uint8_t head[FRAME_HEADER], tail[FRAME_TRAILER];
     struct writer w = {out + 1, out, 0};
     LINK_ASSERT(header->kind < 16 && header->flags < 16);
@@ -288,8 +272,7 @@ enum { BLOCK = 16 };
 /* memcpy in blocks, cheaper than a call for runs of at most 254 bytes; `spare`
  * bytes, at least `run`, may be read and written. */
 static inline void copy_run(uint8_t *out, const uint8_t *in, size_t run,
-                            size_t spare)
-{
+                            size_t spare) {
     size_t i = 0;
     for (; i < run && spare - i >= BLOCK; i += BLOCK) {
         memcpy(out + i, in + i, BLOCK);
@@ -300,8 +283,7 @@ static inline void copy_run(uint8_t *out, const uint8_t *in, size_t run,
 }
 
 /* Decodes exactly `size` bytes; 0, or -1 where the frame ends before. */
-static int take_bytes(struct frame_reader *r, uint8_t *out, size_t size)
-{
+static int take_bytes(struct frame_reader *r, uint8_t *out, size_t size) {
     while (size > 0) {
         if (r->run == 0) {
             if (r->in == r->end) {
@@ -331,8 +313,7 @@ static int take_bytes(struct frame_reader *r, uint8_t *out, size_t size)
 }
 
 enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
-                             size_t size, struct frame_header *header)
-{
+                             size_t size, struct frame_header *header) {
     uint8_t head[FRAME_HEADER];
     *reader = (struct frame_reader){in, in + size, 0, 0, 0};
     if (take_bytes(reader, head, sizeof head) != 0) {
@@ -348,8 +329,7 @@ enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
 }
 
 enum frame_result frame_take(struct frame_reader *reader,
-                             const struct frame_header *header, void *payload)
-{
+                             const struct frame_header *header, void *payload) {
     uint8_t tail[FRAME_TRAILER];
     if (take_bytes(reader, payload, header->size) != 0 ||
         take_bytes(reader, tail, sizeof tail) != 0) {
@@ -368,8 +348,7 @@ enum frame_result frame_take(struct frame_reader *reader,
 }
 
 bool frame_decode(const uint8_t *in, size_t size, struct frame_header *header,
-                  void *payload, size_t most)
-{
+                  void *payload, size_t most) {
     struct frame_reader reader;
     return frame_open(&reader, in, size, header) == FRAME_GOOD &&
            header->size <= most &&

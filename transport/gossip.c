@@ -8,20 +8,17 @@
  * between two looks. */
 enum { ABSENT_US_MAX = 255000000, ABSENT_STEP_US = 500000 };
 
-static bool is_host(const struct cube *cube)
-{
+static bool is_host(const struct cube *cube) {
     return cube->config.self == CUBE_HOST;
 }
 
-static void tell(struct cube *cube, unsigned d, uint64_t now_us, bool ask)
-{
+static void tell(struct cube *cube, unsigned d, uint64_t now_us, bool ask) {
     link_put_datagram(cube->links[d], cube->datagram, cube->datagram_size, ask);
     cube->neighbours[d].told_us = now_us;
 }
 
 /* After a change: nobody has heard of it yet. */
-static void spread(struct cube *cube)
-{
+static void spread(struct cube *cube) {
     cube->datagram_size = wiring_pack(&cube->wiring, cube->datagram);
     for (unsigned d = 0; d < cube->count; d++) {
         cube->neighbours[d].agreed = false;
@@ -29,8 +26,7 @@ static void spread(struct cube *cube)
     }
 }
 
-static void begin_generation(struct cube *cube)
-{
+static void begin_generation(struct cube *cube) {
     cube->stamp = wiring_stamp(&cube->wiring);
     for (unsigned d = 0; d < cube->count; d++) {
         cube->neighbours[d].together = false;
@@ -39,8 +35,7 @@ static void begin_generation(struct cube *cube)
     cube_drop_all(cube);
 }
 
-void cube_gossip_start(struct cube *cube)
-{
+void cube_gossip_start(struct cube *cube) {
     if (is_host(cube)) {
         cube->wiring.generation = 1;
         cube->wiring.host_epoch = cube->config.epoch;
@@ -51,8 +46,7 @@ void cube_gossip_start(struct cube *cube)
     spread(cube);
 }
 
-void cube_renew(struct cube *cube, const struct cube_wiring *next)
-{
+void cube_renew(struct cube *cube, const struct cube_wiring *next) {
     uint32_t present = cube->wiring.generation;
     LINK_ASSERT(
         is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
@@ -70,8 +64,7 @@ void cube_renew(struct cube *cube, const struct cube_wiring *next)
 
 /* The nodes still have the wiring of another host, or of an earlier start of
  * this one: ours must be the newer. */
-static void outdo(struct cube *cube, const struct cube_wiring *theirs)
-{
+static void outdo(struct cube *cube, const struct cube_wiring *theirs) {
     struct cube_wiring next = cube->wiring;
     next.generation = wiring_next(theirs->generation);
     next.dead_count = next.settled;
@@ -79,8 +72,7 @@ static void outdo(struct cube *cube, const struct cube_wiring *theirs)
     cube_renew(cube, &next);
 }
 
-static void hear(struct cube *cube, const struct cube_wiring *theirs)
-{
+static void hear(struct cube *cube, const struct cube_wiring *theirs) {
     bool together = wiring_together(&cube->wiring, theirs);
     if (is_host(cube) && !together) {
         if (!wiring_after(cube->wiring.generation, theirs->generation)) {
@@ -96,8 +88,7 @@ static void hear(struct cube *cube, const struct cube_wiring *theirs)
     }
 }
 
-void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence)
-{
+void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence) {
     struct cube_neighbour *n = &cube->neighbours[d];
     if (!n->together || (int16_t)(sequence - n->since) > 0) {
         n->since = sequence;
@@ -107,8 +98,7 @@ void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence)
 
 static void take_datagram(struct cube *cube, unsigned d,
                           const struct link_message *datagram, bool ask,
-                          uint64_t now_us)
-{
+                          uint64_t now_us) {
     struct cube_wiring theirs;
     if (!wiring_unpack(&theirs, datagram->data, datagram->size,
                        cube->config.dimension)) {
@@ -128,8 +118,7 @@ static void take_datagram(struct cube *cube, unsigned d,
 /* --- what this end finds itself ------------------------------------------ */
 
 /* Link d of this end as others know it. */
-static struct cube_dead name_of(const struct cube *cube, unsigned d)
-{
+static struct cube_dead name_of(const struct cube *cube, unsigned d) {
     const struct cube_config *c = &cube->config;
     struct cube_dead name = {c->self, (uint8_t)d};
     if (is_host(cube)) {
@@ -142,8 +131,7 @@ static struct cube_dead name_of(const struct cube *cube, unsigned d)
 /* A peer that was up once and is not heard of any more; or, where the host asks
  * for those too, one that never was.  Time in which this end itself stood still
  * counts little: others are not dead because it slept. */
-static bool look_for_dead(struct cube *cube, unsigned d, uint64_t passed_us)
-{
+static bool look_for_dead(struct cube *cube, unsigned d, uint64_t passed_us) {
     struct cube_neighbour *n = &cube->neighbours[d];
     enum link_state state = link_state(cube->links[d]);
     uint64_t frames = link_statistics(cube->links[d])->frames_received;
@@ -167,8 +155,7 @@ static bool look_for_dead(struct cube *cube, unsigned d, uint64_t passed_us)
                            cube->config.dimension);
 }
 
-static bool look_for_wrong(struct cube *cube, unsigned d)
-{
+static bool look_for_wrong(struct cube *cube, unsigned d) {
     const struct link_peer *peer = link_peer(cube->links[d]);
     struct cube_wrong wrong = {cube->config.self, peer->node, (uint8_t)d,
                                peer->port, (uint8_t)peer->refusal};
@@ -176,8 +163,7 @@ static bool look_for_wrong(struct cube *cube, unsigned d)
            wiring_add_wrong(&cube->wiring, wrong);
 }
 
-static void look(struct cube *cube, uint64_t now_us)
-{
+static void look(struct cube *cube, uint64_t now_us) {
     uint64_t passed_us = now_us - cube->looked_us;
     bool news = false;
     if (passed_us < CUBE_GOSSIP_US) {
@@ -193,29 +179,25 @@ static void look(struct cube *cube, uint64_t now_us)
     }
 }
 
-bool cube_link_is_dead(const struct cube *cube, unsigned d)
-{
+bool cube_link_is_dead(const struct cube *cube, unsigned d) {
     struct cube_dead name = name_of(cube, d);
     const struct cube_wiring *w = &cube->wiring;
     return wiring_is_dead(w, w->dead_count, name.node, name.dimension,
                           cube->config.dimension);
 }
 
-bool cube_reaches(const struct cube *cube, uint16_t node)
-{
+bool cube_reaches(const struct cube *cube, uint16_t node) {
     return routes_reach(&cube->routes, node);
 }
 
 /* --- each poll ----------------------------------------------------------- */
 
 /* Whether a neighbour who listens has not said the same yet. */
-static bool lags(const struct cube *cube, unsigned d)
-{
+static bool lags(const struct cube *cube, unsigned d) {
     return !cube->neighbours[d].agreed && link_state(cube->links[d]) == LINK_UP;
 }
 
-void cube_note_comings(struct cube *cube, uint64_t now_us)
-{
+void cube_note_comings(struct cube *cube, uint64_t now_us) {
     for (unsigned d = 0; d < cube->count; d++) {
         const struct link_statistics *s = link_statistics(cube->links[d]);
         struct cube_neighbour *n = &cube->neighbours[d];
@@ -227,8 +209,7 @@ void cube_note_comings(struct cube *cube, uint64_t now_us)
     }
 }
 
-void cube_gossip(struct cube *cube, uint64_t now_us)
-{
+void cube_gossip(struct cube *cube, uint64_t now_us) {
     struct link_message datagram;
     bool ask;
     cube->now_us = now_us;
@@ -247,8 +228,7 @@ void cube_gossip(struct cube *cube, uint64_t now_us)
     }
 }
 
-uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us)
-{
+uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us) {
     uint64_t due = UINT64_MAX;
     for (unsigned d = 0; d < cube->count; d++) {
         const struct cube_neighbour *n = &cube->neighbours[d];
@@ -261,7 +241,6 @@ uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us)
     return due;
 }
 
-const struct cube_wiring *cube_wiring(const struct cube *cube)
-{
+const struct cube_wiring *cube_wiring(const struct cube *cube) {
     return &cube->wiring;
 }

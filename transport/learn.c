@@ -9,8 +9,7 @@
 
 /* An acknowledgement of session 0, which is nobody's: whoever hears it greets.
  * The zero before it ends what noise, or the start before, has left. */
-static void make_question(struct learner *learner)
-{
+static void make_question(struct learner *learner) {
     static_assert(1 + FRAME_ENCODED(0) + FRAME_SLACK <= LEARN_ASK_BYTES,
                   "a question fits");
     struct frame_header header = {.kind = LINK_ACK};
@@ -20,8 +19,7 @@ static void make_question(struct learner *learner)
 }
 
 void learner_init(struct learner *learner, const struct link_pipe *pipes,
-                  unsigned links)
-{
+                  unsigned links) {
     LINK_ASSERT(links <= CUBE_LINKS_MAX);
     memset(learner, 0, sizeof *learner);
     memcpy(learner->pipes, pipes, links * sizeof *pipes);
@@ -31,15 +29,13 @@ void learner_init(struct learner *learner, const struct link_pipe *pipes,
 }
 
 void learner_init_ports(struct learner *learner, const struct link_pipe *pipes,
-                        unsigned ports, bool host)
-{
+                        unsigned ports, bool host) {
     learner_init(learner, pipes, ports + (host ? 1u : 0u));
     learner->ports = true;
     learner->host_link = host ? ports : CUBE_LINKS_MAX;
 }
 
-static void push(struct learner *learner, unsigned d)
-{
+static void push(struct learner *learner, unsigned d) {
     const struct link_pipe *pipe = &learner->pipes[d];
     unsigned left = learner->heard[d].ask_left;
     if (left == 0) {
@@ -53,8 +49,7 @@ static void push(struct learner *learner, unsigned d)
         (uint8_t)(taken < 0 ? 0 : left - (unsigned)taken);
 }
 
-void learner_ask(struct learner *learner, uint64_t now_us)
-{
+void learner_ask(struct learner *learner, uint64_t now_us) {
     bool due = learner->asks == 0 || now_us - learner->asked_us >= LEARN_ASK_US;
     if (due) {
         learner->asks++;
@@ -71,8 +66,7 @@ void learner_ask(struct learner *learner, uint64_t now_us)
 }
 
 /* Whether such a wire may be in a cube of that dimension. */
-static bool sensible(const struct learned *l, unsigned expected_link)
-{
+static bool sensible(const struct learned *l, unsigned expected_link) {
     if (l->dimension > CUBE_DIMENSION_MAX || l->self >= 1u << l->dimension) {
         return false;
     }
@@ -85,8 +79,7 @@ static bool sensible(const struct learned *l, unsigned expected_link)
 
 /* Whether this node has the links of that one: to its neighbours, and to the
  * host from node 0 and perhaps another. */
-static bool fits(const struct learner *learner, const struct learned *l)
-{
+static bool fits(const struct learner *learner, const struct learned *l) {
     bool host = learner->host_link < CUBE_LINKS_MAX;
     if (learner->ports) {
         return l->dimension <= learner->links - (host ? 1u : 0u) &&
@@ -97,8 +90,7 @@ static bool fits(const struct learner *learner, const struct learned *l)
 }
 
 /* What another greeting says of who was found already. */
-static void hear_more(struct learner *learner, const struct learned *more)
-{
+static void hear_more(struct learner *learner, const struct learned *more) {
     struct learned *known = &learner->known;
     if (more->self != known->self || more->dimension != known->dimension) {
         return;
@@ -111,8 +103,7 @@ static void hear_more(struct learner *learner, const struct learned *more)
 }
 
 static void take_hello(struct learner *learner, unsigned d,
-                       const uint8_t *hello)
-{
+                       const uint8_t *hello) {
     struct learned l;
     unsigned expected = hello[6];
     if (hello[0] != LINK_VERSION || hello[7] == 0) {
@@ -148,8 +139,7 @@ static void take_hello(struct learner *learner, unsigned d,
 }
 
 static void take_frame(struct learner *learner, unsigned d,
-                       const uint8_t *bytes, size_t size)
-{
+                       const uint8_t *bytes, size_t size) {
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
     if (!frame_decode(bytes, size, &header, hello, sizeof hello)) {
@@ -163,8 +153,7 @@ static void take_frame(struct learner *learner, unsigned d,
 }
 
 /* Whether no more is to be waited for. */
-static bool is_complete(const struct learner *learner)
-{
+static bool is_complete(const struct learner *learner) {
     const struct learned *known = &learner->known;
     bool host = learner->host_link < CUBE_LINKS_MAX;
     uint32_t own = (1u << known->dimension) - 1;
@@ -179,8 +168,7 @@ static bool is_complete(const struct learner *learner)
 }
 
 /* Reads what there is room for, and takes the frames that are whole. */
-static void hear(struct learner *learner, unsigned d)
-{
+static void hear(struct learner *learner, unsigned d) {
     const struct link_pipe *pipe = &learner->pipes[d];
     uint8_t *bytes = learner->heard[d].bytes;
     unsigned size = learner->heard[d].size, begin = 0;
@@ -208,8 +196,7 @@ static void hear(struct learner *learner, unsigned d)
     learner->heard[d].size = (uint8_t)size;
 }
 
-bool learner_poll(struct learner *learner, struct learned *learned)
-{
+bool learner_poll(struct learner *learner, struct learned *learned) {
     for (unsigned d = 0; d < learner->links && !is_complete(learner); d++) {
         hear(learner, d);
     }

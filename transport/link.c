@@ -11,27 +11,23 @@
 
 enum { TIMEOUT_FIRST_US = 200000 };
 
-static size_t up8(size_t bytes)
-{
+static size_t up8(size_t bytes) {
     return (bytes + 7) / 8 * 8;
 }
 
 /* A greeting, then `staging` frames; on the way in, one frame more that is
  * not whole yet. */
-static size_t buffer_bytes(const struct link_config *c)
-{
+static size_t buffer_bytes(const struct link_config *c) {
     return up8(c->staging * link_frame_bytes(c) + FRAME_SLACK +
                FRAME_ENCODED(LINK_HELLO_SIZE) + 2);
 }
 
-static size_t receive_bytes(const struct link_config *c)
-{
+static size_t receive_bytes(const struct link_config *c) {
     return (size_t)c->frame_payload *
            (c->window + link_fragments(c, c->message_max) - 1u);
 }
 
-size_t link_bytes(const struct link_config *config)
-{
+size_t link_bytes(const struct link_config *config) {
     struct link_config c = link_complete(config);
     if (link_config_fault(config) != NULL) {
         return 0;
@@ -43,16 +39,14 @@ size_t link_bytes(const struct link_config *config)
            2 * buffer_bytes(&c);
 }
 
-static void *carve(uint8_t **memory, size_t bytes)
-{
+static void *carve(uint8_t **memory, size_t bytes) {
     void *part = *memory;
     *memory += up8(bytes);
     return part;
 }
 
 struct link *link_init(void *memory, size_t bytes,
-                       const struct link_config *config)
-{
+                       const struct link_config *config) {
     struct link_config c = link_complete(config);
     size_t needed = link_bytes(config);
     if (needed == 0 || bytes < needed || (uintptr_t)memory % 8 != 0) {
@@ -84,20 +78,17 @@ struct link *link_init(void *memory, size_t bytes,
 
 /* --- messages ------------------------------------------------------------ */
 
-static unsigned frames_free(const struct link *link)
-{
+static unsigned frames_free(const struct link *link) {
     return link->closing || link->closed
                ? 0
                : link->config.window - link_used(link);
 }
 
-unsigned link_room(const struct link *link, size_t size)
-{
+unsigned link_room(const struct link *link, size_t size) {
     return frames_free(link) / link_fragments(&link->config, size);
 }
 
-unsigned link_room_behind(const struct link *link, size_t first, size_t size)
-{
+unsigned link_room_behind(const struct link *link, size_t first, size_t size) {
     unsigned left = frames_free(link), taken;
     taken = link_fragments(&link->config, first);
     LINK_ASSERT(taken <= left);
@@ -110,8 +101,7 @@ struct parts {
     size_t head_left, data_left;
 };
 
-static void cut(struct parts *parts, uint8_t *out, size_t size)
-{
+static void cut(struct parts *parts, uint8_t *out, size_t size) {
     size_t n = size < parts->head_left ? size : parts->head_left;
     if (n > 0) {
         memcpy(out, parts->head, n);
@@ -126,8 +116,7 @@ static void cut(struct parts *parts, uint8_t *out, size_t size)
 }
 
 int link_write(struct link *link, const void *head, size_t head_size,
-               const void *data, size_t size)
-{
+               const void *data, size_t size) {
     struct parts parts = {head, data, head_size, size};
     struct link_sender *s = &link->send;
     size_t left = head_size + size;
@@ -158,8 +147,7 @@ int link_write(struct link *link, const void *head, size_t head_size,
     return 0;
 }
 
-bool link_read(struct link *link, struct link_message *message)
-{
+bool link_read(struct link *link, struct link_message *message) {
     struct link_receiver *r = &link->receive;
     size_t stride = link->config.frame_payload;
     unsigned window = link->config.window, at = r->head, count = 1;
@@ -184,8 +172,7 @@ bool link_read(struct link *link, struct link_message *message)
     return true;
 }
 
-void link_release(struct link *link)
-{
+void link_release(struct link *link) {
     struct link_receiver *r = &link->receive;
     LINK_ASSERT(r->held > 0 && r->held <= r->complete);
     if (r->unreported == 0 &&
@@ -203,8 +190,7 @@ void link_release(struct link *link)
     }
 }
 
-unsigned link_forget_unsent(struct link *link)
-{
+unsigned link_forget_unsent(struct link *link) {
     struct link_sender *s = &link->send;
     unsigned offset = (uint16_t)(s->next - s->first), count = 0;
     bool inside = s->inside;
@@ -224,8 +210,7 @@ unsigned link_forget_unsent(struct link *link)
 }
 
 void link_put_datagram(struct link *link, const void *bytes, size_t size,
-                       bool ask)
-{
+                       bool ask) {
     LINK_ASSERT(size >= 1 && size <= LINK_DATAGRAM_MAX);
     link->datagrams.out = bytes;
     link->datagrams.out_size = (uint16_t)size;
@@ -234,8 +219,7 @@ void link_put_datagram(struct link *link, const void *bytes, size_t size,
 }
 
 bool link_take_datagram(struct link *link, struct link_message *datagram,
-                        bool *ask)
-{
+                        bool *ask) {
     struct link_datagrams *n = &link->datagrams;
     if (!n->heard) {
         return false;
@@ -251,8 +235,7 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
 /* --- joining session, sender and receiver -------------------------------- */
 
 /* What a frame's session means for the two windows. */
-static void enter(struct link *link, enum link_session session)
-{
+static void enter(struct link *link, enum link_session session) {
     if (session == LINK_FOREIGN || session == LINK_PRESENT) {
         return;
     }
@@ -272,8 +255,7 @@ static void enter(struct link *link, enum link_session session)
     link->send.backoff = 0;
 }
 
-static void on_frame(struct link *link, struct link_frame *frame)
-{
+static void on_frame(struct link *link, struct link_frame *frame) {
     const struct frame_header *header = &frame->header;
     if (link->tending && header->kind == LINK_BYE) {
         return;
@@ -304,8 +286,7 @@ static void on_frame(struct link *link, struct link_frame *frame)
 }
 
 /* Bytes that were under way are lost; the session may go on. */
-static void pipe_lost(struct link *link)
-{
+static void pipe_lost(struct link *link) {
     link->statistics.pipe_closed += link->pipe_up;
     link->pipe_up = false;
     link->up = link->bye_due = false;
@@ -313,8 +294,7 @@ static void pipe_lost(struct link *link)
     link_forget_staged(link);
 }
 
-static void pipe_works(struct link *link)
-{
+static void pipe_works(struct link *link) {
     if (!link->pipe_up) {
         link->pipe_up = true;
         link->hello_now = true;
@@ -322,8 +302,7 @@ static void pipe_works(struct link *link)
 }
 
 /* Takes the whole frames among the bytes at hand, at most `most`. */
-static int take_frames(struct link *link, int most)
-{
+static int take_frames(struct link *link, int most) {
     struct link_frame frame;
     int count = 0;
     while (count < most) {
@@ -339,8 +318,7 @@ static int take_frames(struct link *link, int most)
     return count;
 }
 
-int link_poll_receive(struct link *link, uint64_t now_us)
-{
+int link_poll_receive(struct link *link, uint64_t now_us) {
     int most = link->config.window + 2;
     link->now_us = now_us;
     if (link->closing && link->closed) {
@@ -362,8 +340,7 @@ int link_poll_receive(struct link *link, uint64_t now_us)
     return count;
 }
 
-int link_tend_receive(struct link *link, uint64_t now_us)
-{
+int link_tend_receive(struct link *link, uint64_t now_us) {
     link->tending = true;
     int count = link_poll_receive(link, now_us);
     link->tending = false;
@@ -371,8 +348,7 @@ int link_tend_receive(struct link *link, uint64_t now_us)
 }
 
 /* One frame more, the most urgent; false: nothing to say. */
-static bool stage_one(struct link *link)
-{
+static bool stage_one(struct link *link) {
     uint8_t hello[LINK_HELLO_SIZE];
     if (!link_hello_due(link)) {
         return link_stage_frame(link);
@@ -383,8 +359,7 @@ static bool stage_one(struct link *link)
 }
 
 /* Gives the pipe what is staged; false: it does not take all. */
-static bool flush(struct link *link)
-{
+static bool flush(struct link *link) {
     enum link_flush status = link_flush(link);
     if (status == LINK_FLUSH_CLOSED) {
         pipe_lost(link);
@@ -392,8 +367,7 @@ static bool flush(struct link *link)
     return status == LINK_FLUSH_DONE;
 }
 
-int link_poll_send(struct link *link, uint64_t now_us)
-{
+int link_poll_send(struct link *link, uint64_t now_us) {
     int count = 0, most = link->config.window + 2;
     link->now_us = now_us;
     if (link->closing && now_us >= link->deadline_us) {
@@ -418,28 +392,24 @@ int link_poll_send(struct link *link, uint64_t now_us)
     return count;
 }
 
-int link_poll(struct link *link, uint64_t now_us)
-{
+int link_poll(struct link *link, uint64_t now_us) {
     int count = link_poll_receive(link, now_us);
     return count + link_poll_send(link, now_us);
 }
 
 /* --- state --------------------------------------------------------------- */
 
-void link_close(struct link *link, uint64_t deadline_us)
-{
+void link_close(struct link *link, uint64_t deadline_us) {
     link->closing = true;
     link->deadline_us = deadline_us;
     link->bye_us = link->now_us - link->config.hello_us;
 }
 
-bool link_idle(const struct link *link)
-{
+bool link_idle(const struct link *link) {
     return link_used(link) == 0;
 }
 
-enum link_state link_state(const struct link *link)
-{
+enum link_state link_state(const struct link *link) {
     if (link->closed) {
         return link_has_parted(link) ? LINK_CLOSED : LINK_CLOSING;
     }
@@ -459,29 +429,24 @@ enum link_state link_state(const struct link *link)
                                                                    : LINK_UP;
 }
 
-const struct link_statistics *link_statistics(const struct link *link)
-{
+const struct link_statistics *link_statistics(const struct link *link) {
     return &link->statistics;
 }
 
-const struct link_peer *link_peer(const struct link *link)
-{
+const struct link_peer *link_peer(const struct link *link) {
     return &link->peer;
 }
 
-static uint64_t until(uint64_t start_us, uint64_t span_us, uint64_t now_us)
-{
+static uint64_t until(uint64_t start_us, uint64_t span_us, uint64_t now_us) {
     uint64_t passed = now_us - start_us;
     return passed < span_us ? span_us - passed : 0;
 }
 
-static uint64_t least(uint64_t a, uint64_t b)
-{
+static uint64_t least(uint64_t a, uint64_t b) {
     return a < b ? a : b;
 }
 
-uint64_t link_next_due_us(const struct link *link, uint64_t now_us)
-{
+uint64_t link_next_due_us(const struct link *link, uint64_t now_us) {
     const struct link_config *c = &link->config;
     const struct link_receiver *r = &link->receive;
     uint64_t due = c->keep_alive_us;

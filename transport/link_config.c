@@ -6,13 +6,11 @@
 
 enum { STAGING_MOST = 8, TIMEOUT_MIN_US = 100000, TIMEOUT_MAX_US = 1000000 };
 
-static uint32_t or_default(uint32_t value, uint32_t otherwise)
-{
+static uint32_t or_default(uint32_t value, uint32_t otherwise) {
     return value != 0 ? value : otherwise;
 }
 
-struct link_config link_complete(const struct link_config *config)
-{
+struct link_config link_complete(const struct link_config *config) {
     struct link_config c = *config;
     unsigned half = c.window / 2u > 4 ? c.window / 2u : 4;
     unsigned staging = c.window < half ? c.window : half;
@@ -33,8 +31,7 @@ struct link_config link_complete(const struct link_config *config)
  * either driver has given to the wire, and what the peer has encoded ahead. */
 enum { SERIAL_BYTES = 2400, SERIAL_BAUD_MIN = 300 };
 
-void link_for_serial(struct link_config *config, uint32_t baud)
-{
+void link_for_serial(struct link_config *config, uint32_t baud) {
     uint32_t rate = baud < SERIAL_BAUD_MIN ? SERIAL_BAUD_MIN : baud;
     uint32_t wait_us = (uint32_t)(UINT64_C(10000000) * SERIAL_BYTES / rate);
     config->frame_payload = 408;
@@ -48,8 +45,7 @@ void link_for_serial(struct link_config *config, uint32_t baud)
     config->ack_delay_us = 1000;
 }
 
-unsigned link_fragments(const struct link_config *c, size_t size)
-{
+unsigned link_fragments(const struct link_config *c, size_t size) {
     return size == 0
                ? 1
                : (unsigned)((size + c->frame_payload - 1u) / c->frame_payload);
@@ -61,8 +57,7 @@ static_assert(LINK_WINDOW_MAX == 64 && LINK_MESSAGE_MAX == 1616 &&
               "the texts of a fault say so");
 
 /* Of a config that is complete. */
-static const char *fault_of(const struct link_config *c)
-{
+static const char *fault_of(const struct link_config *c) {
     if (c->pipe.send == NULL || c->pipe.receive == NULL) {
         return "a pipe has no functions";
     }
@@ -92,8 +87,7 @@ static const char *fault_of(const struct link_config *c)
     return NULL;
 }
 
-const char *link_config_fault(const struct link_config *config)
-{
+const char *link_config_fault(const struct link_config *config) {
     struct link_config c = link_complete(config);
     return fault_of(&c);
 }

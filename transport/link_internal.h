@@ -139,54 +139,47 @@ struct link_config link_complete(const struct link_config *config);
 unsigned link_fragments(const struct link_config *config, size_t size);
 
 /* Of one encoded frame, of any kind. */
-static inline size_t link_frame_bytes(const struct link_config *config)
-{
+static inline size_t link_frame_bytes(const struct link_config *config) {
     return FRAME_ENCODED(config->frame_payload > LINK_DATAGRAM_MAX
                              ? config->frame_payload
                              : LINK_DATAGRAM_MAX);
 }
 
-static inline bool link_refuses(const struct link *link)
-{
+static inline bool link_refuses(const struct link *link) {
     return link->peer.refusal != LINK_FITS;
 }
 
 /* Whether the peer has said farewell, and its answer has left, for which it
  * waits: this end's own farewell may not have gone before. */
-static inline bool link_has_parted(const struct link *link)
-{
+static inline bool link_has_parted(const struct link *link) {
     return link->closed && !link->bye_due && link->out.end == 0;
 }
 
 /* Slots of the send window that hold frames. */
-static inline unsigned link_used(const struct link *link)
-{
+static inline unsigned link_used(const struct link *link) {
     return (uint16_t)(link->send.end - link->send.first);
 }
 
 /* Free slots of the receive window: what the peer may send. */
-static inline unsigned link_credit(const struct link *link)
-{
+static inline unsigned link_credit(const struct link *link) {
     LINK_ASSERT(link->receive.ready <= link->config.window);
     return (unsigned)link->config.window - link->receive.ready;
 }
 
 /* Of a slot that is counted on past the last, less than a window. */
-static inline unsigned link_wrapped(const struct link *link, unsigned slot)
-{
+static inline unsigned link_wrapped(const struct link *link, unsigned slot) {
     unsigned window = link->config.window;
     return slot >= window ? slot - window : slot;
 }
 
 /* The slot of frame `offset` after the first of the send window. */
-static inline unsigned link_sent_slot(const struct link *link, unsigned offset)
-{
+static inline unsigned link_sent_slot(const struct link *link,
+                                      unsigned offset) {
     return link_wrapped(link, link->send.head + offset);
 }
 
 /* The slot of frame `offset` after those that came in order, within credit. */
-static inline unsigned link_slot_of(const struct link *link, unsigned offset)
-{
+static inline unsigned link_slot_of(const struct link *link, unsigned offset) {
     return link_wrapped(link, (unsigned)link->receive.head +
                                   link->receive.ready + offset);
 }

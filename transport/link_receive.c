@@ -4,8 +4,7 @@
 
 #include "check.h"
 
-void link_receive_reset(struct link *link, uint16_t first)
-{
+void link_receive_reset(struct link *link, uint16_t first) {
     struct link_receiver *r = &link->receive;
     r->ready = r->complete;
     r->early = 0;
@@ -18,8 +17,7 @@ void link_receive_reset(struct link *link, uint16_t first)
     link->datagrams.heard = false; /* its sequence was another session's */
 }
 
-void link_forget_bytes(struct link *link)
-{
+void link_forget_bytes(struct link *link) {
     struct link_bytes_in *in = &link->in;
     in->begin = in->scanned = in->end = 0;
     in->skipping = false;
@@ -28,8 +26,7 @@ void link_forget_bytes(struct link *link)
 
 /* The frame in link_slot_of(0) joins those that are ready.  False: a message
  * longer than agreed, which can never be read. */
-static bool accept_next(struct link *link)
-{
+static bool accept_next(struct link *link) {
     struct link_receiver *r = &link->receive;
     struct link_receive_slot *slot = &r->slots[link_slot_of(link, 0)];
     unsigned before = (unsigned)r->ready - r->complete;
@@ -47,8 +44,7 @@ static bool accept_next(struct link *link)
 }
 
 /* False: as above. */
-static bool advance(struct link *link)
-{
+static bool advance(struct link *link) {
     struct link_receiver *r = &link->receive;
     bool fits = accept_next(link);
     while (fits && r->early > 0 && link_credit(link) > 0 &&
@@ -63,8 +59,7 @@ static bool advance(struct link *link)
 }
 
 /* False: as above. */
-static bool stored(struct link *link, unsigned offset)
-{
+static bool stored(struct link *link, unsigned offset) {
     struct link_receiver *r = &link->receive;
     if (r->unreported++ == 0) {
         r->unreported_us = link->now_us;
@@ -81,8 +76,7 @@ static bool stored(struct link *link, unsigned offset)
 /* A frame's place is known before its payload is decoded, so it is decoded
  * where it stays. */
 static enum frame_result take_data(struct link *link, struct link_frame *frame,
-                                   enum link_event *event)
-{
+                                   enum link_event *event) {
     const struct frame_header *header = &frame->header;
     struct link_receiver *r = &link->receive;
     struct link_statistics *s = &link->statistics;
@@ -116,8 +110,7 @@ static enum frame_result take_data(struct link *link, struct link_frame *frame,
     return result;
 }
 
-static void on_datagram(struct link *link, const struct link_frame *frame)
-{
+static void on_datagram(struct link *link, const struct link_frame *frame) {
     struct link_datagrams *n = &link->datagrams;
     memcpy(n->in, frame->payload, frame->header.size);
     n->in_size = frame->header.size;
@@ -126,8 +119,7 @@ static void on_datagram(struct link *link, const struct link_frame *frame)
     n->heard = link->up;
 }
 
-static bool size_fits(unsigned kind, unsigned size)
-{
+static bool size_fits(unsigned kind, unsigned size) {
     switch (kind) {
     case LINK_HELLO:
         return size == LINK_HELLO_SIZE;
@@ -143,8 +135,7 @@ static bool size_fits(unsigned kind, unsigned size)
 /* Frames without data: a few bytes of payload at most. */
 static enum frame_result take_control(struct link *link,
                                       struct link_frame *frame,
-                                      enum link_event *event)
-{
+                                      enum link_event *event) {
     const struct frame_header *header = &frame->header;
     if (!size_fits(header->kind, header->size)) {
         return FRAME_BAD_CODE;
@@ -170,16 +161,14 @@ static enum frame_result take_control(struct link *link,
     return FRAME_GOOD;
 }
 
-static void count_result(struct link *link, enum frame_result result)
-{
+static void count_result(struct link *link, enum frame_result result) {
     struct link_statistics *s = &link->statistics;
     s->bad_code += result == FRAME_BAD_CODE;
     s->bad_header += result == FRAME_BAD_HEADER;
     s->bad_crc += result == FRAME_BAD_CRC;
 }
 
-enum link_event link_take_frame(struct link *link, struct link_frame *frame)
-{
+enum link_event link_take_frame(struct link *link, struct link_frame *frame) {
     enum link_event event = LINK_NOTHING;
     frame->sack = 0;
     if (frame->header.kind != LINK_DATA) {
@@ -190,8 +179,7 @@ enum link_event link_take_frame(struct link *link, struct link_frame *frame)
     return event;
 }
 
-enum link_search link_find_frame(struct link *link, struct link_frame *frame)
-{
+enum link_search link_find_frame(struct link *link, struct link_frame *frame) {
     struct link_bytes_in *in = &link->in;
     size_t begin = 0, zero = 0;
     bool found = false;
@@ -217,8 +205,7 @@ enum link_search link_find_frame(struct link *link, struct link_frame *frame)
 
 /* Makes room at the end of the buffer; what is too long for a frame, or being
  * skipped already, goes. */
-static void make_room(struct link *link)
-{
+static void make_room(struct link *link) {
     struct link_bytes_in *in = &link->in;
     size_t frame_max = link_frame_bytes(&link->config);
     size_t left = in->end - in->begin;
@@ -240,8 +227,7 @@ static void make_room(struct link *link)
     in->scanned = in->end;
 }
 
-enum link_fill link_fill(struct link *link)
-{
+enum link_fill link_fill(struct link *link) {
     struct link_bytes_in *in = &link->in;
     const struct link_pipe *pipe = &link->config.pipe;
     make_room(link);

@@ -9,13 +9,11 @@ enum {
     MEASURED_MAX = 8 /* times timeout_max_us, of round trips that take longer */
 };
 
-static unsigned in_flight(const struct link *link)
-{
+static unsigned in_flight(const struct link *link) {
     return (uint16_t)(link->send.next - link->send.first);
 }
 
-uint32_t link_timeout_us(const struct link *link)
-{
+uint32_t link_timeout_us(const struct link *link) {
     const struct link_config *c = &link->config;
     uint32_t measured = link->statistics.timeout_us;
     uint64_t us = (uint64_t)measured << link->send.backoff;
@@ -26,8 +24,7 @@ uint32_t link_timeout_us(const struct link *link)
 /* --- what acknowledgements say ------------------------------------------- */
 
 /* Smoothed round trip and its variation (Jacobson, 1988; RFC 6298). */
-static void measure(struct link *link, uint32_t rtt)
-{
+static void measure(struct link *link, uint32_t rtt) {
     struct link_statistics *s = &link->statistics;
     uint32_t *variation = &link->send.variation_us;
     if (s->rtt_us == 0) {
@@ -58,8 +55,7 @@ struct news {
 };
 
 static void slot_arrived(struct link *link, struct link_send_slot *slot,
-                         struct news *news)
-{
+                         struct news *news) {
     uint32_t elapsed = (uint32_t)link->now_us - slot->sent_us;
     link->send.lost = (uint16_t)(link->send.lost - (slot->state == LINK_LOST));
     slot->state = LINK_ARRIVED;
@@ -80,8 +76,7 @@ static void slot_arrived(struct link *link, struct link_send_slot *slot,
 
 /* A pipe keeps its bytes in order: what was sent before a frame that arrived,
  * and is not here, is lost. */
-static void mark_lost(struct link *link, uint32_t order)
-{
+static void mark_lost(struct link *link, uint32_t order) {
     struct link_sender *s = &link->send;
     unsigned count = in_flight(link);
     for (unsigned i = 0; i < count; i++) {
@@ -93,8 +88,7 @@ static void mark_lost(struct link *link, uint32_t order)
     }
 }
 
-static void free_first(struct link *link, struct news *news)
-{
+static void free_first(struct link *link, struct news *news) {
     struct link_sender *s = &link->send;
     struct link_send_slot *slot = &s->slots[s->head];
     if (slot->state == LINK_ARRIVED) {
@@ -107,8 +101,7 @@ static void free_first(struct link *link, struct news *news)
 }
 
 static void mark_acknowledged(struct link *link, uint16_t ack, uint64_t sack,
-                              struct news *news)
-{
+                              struct news *news) {
     struct link_sender *s = &link->send;
     LINK_ASSERT(ack == s->first);
     for (unsigned i = 1; sack != 0 && i < in_flight(link); i++, sack >>= 1) {
@@ -121,8 +114,7 @@ static void mark_acknowledged(struct link *link, uint16_t ack, uint64_t sack,
 }
 
 void link_on_acknowledge(struct link *link, const struct frame_header *header,
-                         uint64_t sack)
-{
+                         uint64_t sack) {
     struct link_sender *s = &link->send;
     unsigned freed = (uint16_t)(header->acknowledge - s->first);
     uint16_t limit = (uint16_t)(header->acknowledge + header->credit);
@@ -152,8 +144,7 @@ void link_on_acknowledge(struct link *link, const struct frame_header *header,
     }
 }
 
-void link_send_reset(struct link *link, uint8_t credit)
-{
+void link_send_reset(struct link *link, uint8_t credit) {
     struct link_sender *s = &link->send;
     unsigned queued = link_used(link);
     for (unsigned i = 0; i < queued; i++) {
@@ -167,28 +158,24 @@ void link_send_reset(struct link *link, uint8_t credit)
     s->inside = false;
 }
 
-void link_send_resume(struct link *link)
-{
+void link_send_resume(struct link *link) {
     mark_lost(link, link->send.order);
 }
 
 /* --- frames -------------------------------------------------------------- */
 
-static bool may_send_next(const struct link *link)
-{
+static bool may_send_next(const struct link *link) {
     const struct link_sender *s = &link->send;
     return s->next != s->end && (int16_t)(s->limit - s->next) > 0;
 }
 
-bool link_may_send(const struct link *link)
-{
+bool link_may_send(const struct link *link) {
     return link->up && (link->send.lost > 0 || may_send_next(link));
 }
 
 /* Acknowledgements ride on data; alone they go when half a window can be
  * used again, or when they are old. */
-bool link_ack_due(const struct link *link)
-{
+bool link_ack_due(const struct link *link) {
     const struct link_receiver *r = &link->receive;
     unsigned window = link->config.window < link->peer_window
                           ? link->config.window
@@ -206,8 +193,7 @@ bool link_ack_due(const struct link *link)
 }
 
 static void stage(struct link *link, unsigned kind, unsigned flags,
-                  uint16_t sequence, const void *payload, size_t size)
-{
+                  uint16_t sequence, const void *payload, size_t size) {
     struct link_receiver *r = &link->receive;
     struct link_bytes_out *out = &link->out;
     struct frame_header header = {
@@ -239,8 +225,7 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
 }
 
 /* Of what came: bit i: frame next + 1 + i is here. */
-static uint64_t sack_of(const struct link *link)
-{
+static uint64_t sack_of(const struct link *link) {
     uint64_t bits = 0;
     unsigned credit = link_credit(link);
     if (link->receive.early == 0) {
@@ -254,8 +239,7 @@ static uint64_t sack_of(const struct link *link)
     return bits;
 }
 
-static void stage_ack(struct link *link, unsigned flags)
-{
+static void stage_ack(struct link *link, unsigned flags) {
     uint8_t bytes[LINK_SACK_SIZE];
     uint64_t sack = sack_of(link);
     for (unsigned i = 0; i < sizeof bytes; i++) {
@@ -267,8 +251,7 @@ static void stage_ack(struct link *link, unsigned flags)
     link->statistics.acks_sent++;
 }
 
-static void stage_slot(struct link *link, unsigned offset)
-{
+static void stage_slot(struct link *link, unsigned offset) {
     struct link_sender *s = &link->send;
     unsigned at = link_sent_slot(link, offset);
     struct link_send_slot *slot = &s->slots[at];
@@ -279,8 +262,7 @@ static void stage_slot(struct link *link, unsigned offset)
           s->payload + (size_t)at * link->config.frame_payload, slot->size);
 }
 
-static void stage_again(struct link *link)
-{
+static void stage_again(struct link *link) {
     struct link_sender *s = &link->send;
     unsigned offset = 0;
     while (s->slots[link_sent_slot(link, offset)].state != LINK_LOST) {
@@ -293,8 +275,7 @@ static void stage_again(struct link *link)
     stage_slot(link, offset);
 }
 
-static void stage_next(struct link *link)
-{
+static void stage_next(struct link *link) {
     struct link_sender *s = &link->send;
     unsigned offset = in_flight(link);
     if (offset == 0) {
@@ -306,14 +287,12 @@ static void stage_next(struct link *link)
     s->next++;
 }
 
-void link_stage_hello(struct link *link, const uint8_t hello[LINK_HELLO_SIZE])
-{
+void link_stage_hello(struct link *link, const uint8_t hello[LINK_HELLO_SIZE]) {
     stage(link, LINK_HELLO, 0, link->send.first, hello, LINK_HELLO_SIZE);
     link->statistics.hellos_sent++;
 }
 
-static void stage_datagram(struct link *link)
-{
+static void stage_datagram(struct link *link) {
     struct link_datagrams *n = &link->datagrams;
     stage(link, LINK_STATE, n->asks ? LINK_ASK : 0, link->send.next, n->out,
           n->out_size);
@@ -321,16 +300,14 @@ static void stage_datagram(struct link *link)
     link->statistics.datagrams_sent++;
 }
 
-static void stage_bye(struct link *link, unsigned flags)
-{
+static void stage_bye(struct link *link, unsigned flags) {
     stage(link, LINK_BYE, flags, link->send.next, NULL, 0);
     link->bye_us = link->now_us;
 }
 
 /* --- timers -------------------------------------------------------------- */
 
-static void timeout(struct link *link)
-{
+static void timeout(struct link *link) {
     struct link_sender *s = &link->send;
     unsigned count = in_flight(link);
     link->statistics.timeouts++;
@@ -344,8 +321,7 @@ static void timeout(struct link *link)
     }
 }
 
-void link_run_timer(struct link *link)
-{
+void link_run_timer(struct link *link) {
     struct link_sender *s = &link->send;
     bool waits = in_flight(link) > 0;
     bool starves = !waits && s->next != s->end && !may_send_next(link);
@@ -374,14 +350,12 @@ void link_run_timer(struct link *link)
 
 /* --- bytes --------------------------------------------------------------- */
 
-void link_forget_staged(struct link *link)
-{
+void link_forget_staged(struct link *link) {
     link->stalled = false;
     link->out.begin = link->out.end = 0;
 }
 
-enum link_flush link_flush(struct link *link)
-{
+enum link_flush link_flush(struct link *link) {
     struct link_bytes_out *out = &link->out;
     const struct link_pipe *pipe = &link->config.pipe;
     link->stalled = false;
@@ -404,15 +378,13 @@ enum link_flush link_flush(struct link *link)
     return LINK_FLUSH_DONE;
 }
 
-bool link_staging_room(const struct link *link)
-{
+bool link_staging_room(const struct link *link) {
     return link->buffer_bytes - link->out.end >=
            link_frame_bytes(&link->config) + FRAME_SLACK + 1;
 }
 
 /* Something to say without data. */
-static bool stage_control(struct link *link)
-{
+static bool stage_control(struct link *link) {
     uint64_t rest_us = link->now_us - link->sent_us;
     uint64_t bye_us = link->now_us - link->bye_us;
     if (link_ack_due(link) || rest_us >= link->config.keep_alive_us) {
@@ -427,8 +399,7 @@ static bool stage_control(struct link *link)
     return false;
 }
 
-bool link_stage_frame(struct link *link)
-{
+bool link_stage_frame(struct link *link) {
     if (link->bye_due) {
         stage_bye(link, 0);
         link->bye_due = false;

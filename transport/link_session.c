@@ -2,8 +2,7 @@
 
 #include "bytes.h"
 
-static void pack_hello(const struct link *link, uint8_t *hello)
-{
+static void pack_hello(const struct link *link, uint8_t *hello) {
     const struct link_config *c = &link->config;
     bool candidate = link->candidate.epoch != 0;
     hello[0] = LINK_VERSION;
@@ -23,16 +22,14 @@ static void pack_hello(const struct link *link, uint8_t *hello)
     hello[23] = 0;
 }
 
-static bool is_greeting(const uint8_t *bytes, size_t size)
-{
+static bool is_greeting(const uint8_t *bytes, size_t size) {
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
     return frame_decode(bytes, size, &header, hello, sizeof hello) &&
            header.kind == LINK_HELLO && header.size == sizeof hello;
 }
 
-bool link_greets(const uint8_t *bytes, size_t size)
-{
+bool link_greets(const uint8_t *bytes, size_t size) {
     size_t begin = 0, zero = 0;
     bool found = false;
     while (!found && begin < size) {
@@ -45,8 +42,7 @@ bool link_greets(const uint8_t *bytes, size_t size)
 
 /* The name of frames that go from one start of a node to one of another. */
 static uint32_t session(uint32_t from_epoch, unsigned from, uint32_t to_epoch,
-                        unsigned to)
-{
+                        unsigned to) {
     uint8_t bytes[12];
     bytes_put32(bytes, from_epoch);
     bytes_put32(bytes + 4, to_epoch);
@@ -55,20 +51,17 @@ static uint32_t session(uint32_t from_epoch, unsigned from, uint32_t to_epoch,
     return frame_crc32c(0, bytes, sizeof bytes);
 }
 
-static uint32_t session_from(const struct link *link, uint32_t peer_epoch)
-{
+static uint32_t session_from(const struct link *link, uint32_t peer_epoch) {
     const struct link_config *c = &link->config;
     return session(peer_epoch, c->peer_node, c->epoch, c->node);
 }
 
-static uint32_t session_to(const struct link *link, uint32_t peer_epoch)
-{
+static uint32_t session_to(const struct link *link, uint32_t peer_epoch) {
     const struct link_config *c = &link->config;
     return session(c->epoch, c->node, peer_epoch, c->peer_node);
 }
 
-static enum link_refusal fits(const struct link *link, const uint8_t *hello)
-{
+static enum link_refusal fits(const struct link *link, const uint8_t *hello) {
     const struct link_config *c = &link->config;
     unsigned window = bytes_get16(hello + 16);
     if (hello[0] != LINK_VERSION) {
@@ -92,15 +85,13 @@ static enum link_refusal fits(const struct link *link, const uint8_t *hello)
 /* Whether a greeting leaves the link in use: it was, and its end does not speak
  * of this one's epoch.  Another start of that end cannot know of whom the one
  * before kept to: he has time to come back. */
-static bool still_in_use(const struct link *link, uint32_t epoch, bool to_us)
-{
+static bool still_in_use(const struct link *link, uint32_t epoch, bool to_us) {
     bool reborn = epoch != link->told_by &&
                   link->now_us - link->told_us <= link->config.silence_us;
     return link->peer.refusal == LINK_IN_USE && (!to_us || reborn);
 }
 
-static void describe_peer(struct link *link, const uint8_t *hello)
-{
+static void describe_peer(struct link *link, const uint8_t *hello) {
     struct link_peer *peer = &link->peer;
     bool to_us = bytes_get32(hello + 12) == link->config.epoch;
     bool told = to_us && hello[22] != 0;
@@ -125,16 +116,14 @@ static void describe_peer(struct link *link, const uint8_t *hello)
 }
 
 /* Whether another epoch greets while the present peer is alive. */
-static bool intrudes(const struct link *link, uint32_t epoch)
-{
+static bool intrudes(const struct link *link, uint32_t epoch) {
     return link->config.keeps_peer && link->peer_epoch != 0 &&
            epoch != link->peer_epoch && !link->closed &&
            link->now_us - link->kept_us <= link->config.silence_us;
 }
 
 /* The peer is another start than before, if there was one. */
-static enum link_session start_session(struct link *link)
-{
+static enum link_session start_session(struct link *link) {
     struct link_candidate *c = &link->candidate;
     bool first = link->peer_epoch == 0;
     link->peer_epoch = c->epoch;
@@ -150,8 +139,7 @@ static enum link_session start_session(struct link *link)
     return first ? LINK_BEGUN : LINK_RESTARTED;
 }
 
-enum link_session link_accept_session(struct link *link, uint32_t session)
-{
+enum link_session link_accept_session(struct link *link, uint32_t session) {
     if (link_refuses(link)) {
         return LINK_FOREIGN;
     }
@@ -171,8 +159,7 @@ enum link_session link_accept_session(struct link *link, uint32_t session)
 
 enum link_session link_on_hello(struct link *link,
                                 const struct frame_header *header,
-                                const uint8_t hello[LINK_HELLO_SIZE])
-{
+                                const uint8_t hello[LINK_HELLO_SIZE]) {
     uint32_t epoch = bytes_get32(hello + 8), mine = bytes_get32(hello + 12);
     if (epoch == 0 || link->closing) {
         return LINK_FOREIGN;
@@ -206,15 +193,13 @@ enum link_session link_on_hello(struct link *link,
     return link_accept_session(link, session_from(link, epoch));
 }
 
-void link_greet(struct link *link)
-{
+void link_greet(struct link *link) {
     if (link->now_us - link->hello_us >= link->config.hello_us) {
         link->hello_now = true;
     }
 }
 
-bool link_hello_due(const struct link *link)
-{
+bool link_hello_due(const struct link *link) {
     bool waiting =
         !link->up || link->candidate.epoch != 0 || link_refuses(link);
     return link->hello_now ||
@@ -222,8 +207,7 @@ bool link_hello_due(const struct link *link)
             link->now_us - link->hello_us >= link->config.hello_us);
 }
 
-void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE])
-{
+void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE]) {
     struct link_candidate *c = &link->candidate;
     pack_hello(link, hello);
     link->hello_us = link->now_us;
@@ -234,14 +218,12 @@ void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE])
     }
 }
 
-void link_refuse_sizes(struct link *link)
-{
+void link_refuse_sizes(struct link *link) {
     link->peer.refusal = LINK_WRONG_SIZES;
     link->up = false;
 }
 
-void link_on_bye(struct link *link, const struct frame_header *header)
-{
+void link_on_bye(struct link *link, const struct frame_header *header) {
     link->bye_due = (header->flags & LINK_ASK) != 0;
     link->closed = true;
     link->up = false;

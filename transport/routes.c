@@ -6,8 +6,7 @@
 
 /* --- the table of altered parents ---------------------------------------- */
 
-static unsigned lowest_bit(unsigned bits)
-{
+static unsigned lowest_bit(unsigned bits) {
     return (unsigned)__builtin_ctz(bits);
 }
 
@@ -15,8 +14,7 @@ static unsigned lowest_bit(unsigned bits)
  * most; a dead node sets free the subtrees of its children, of 0 .. j - 1
  * links. The nodes with the most are one with dimension - 1, two with one less,
  * .. */
-static unsigned altered_max(unsigned dimension)
-{
+static unsigned altered_max(unsigned dimension) {
     unsigned nodes = 1u << dimension, left = CUBE_DEAD_MAX, sum = 1;
     for (unsigned i = 1; i <= dimension && left > 0; i++) {
         unsigned j = dimension - i;
@@ -27,13 +25,11 @@ static unsigned altered_max(unsigned dimension)
     return sum < nodes ? sum : nodes;
 }
 
-size_t routes_bytes(unsigned dimension)
-{
+size_t routes_bytes(unsigned dimension) {
     return altered_max(dimension) * sizeof(struct routes_altered);
 }
 
-void routes_init(struct routes *routes, void *memory, unsigned dimension)
-{
+void routes_init(struct routes *routes, void *memory, unsigned dimension) {
     memset(routes, 0, sizeof *routes);
     routes->altered = memory;
     routes->altered_max = altered_max(dimension);
@@ -41,8 +37,7 @@ void routes_init(struct routes *routes, void *memory, unsigned dimension)
 }
 
 /* The place of a node among the altered, or where it would be. */
-static unsigned place_of(const struct routes *routes, unsigned node)
-{
+static unsigned place_of(const struct routes *routes, unsigned node) {
     unsigned low = 0, high = routes->altered_count;
     while (low < high) {
         unsigned middle = (low + high) / 2;
@@ -55,14 +50,12 @@ static unsigned place_of(const struct routes *routes, unsigned node)
     return low;
 }
 
-static unsigned usual_parent(const struct routes *routes, unsigned node)
-{
+static unsigned usual_parent(const struct routes *routes, unsigned node) {
     unsigned relative = node ^ routes->wiring.gateway;
     return relative == 0 ? ROUTES_NONE : node ^ (relative & -relative);
 }
 
-static unsigned parent_of(const struct routes *routes, unsigned node)
-{
+static unsigned parent_of(const struct routes *routes, unsigned node) {
     unsigned place = place_of(routes, node);
     if (place < routes->altered_count && routes->altered[place].node == node) {
         return routes->altered[place].parent;
@@ -70,8 +63,7 @@ static unsigned parent_of(const struct routes *routes, unsigned node)
     return usual_parent(routes, node);
 }
 
-static void set_parent(struct routes *routes, unsigned node, unsigned parent)
-{
+static void set_parent(struct routes *routes, unsigned node, unsigned parent) {
     unsigned place = place_of(routes, node);
     struct routes_altered *at = &routes->altered[place];
     if (place == routes->altered_count || at->node != node) {
@@ -84,8 +76,7 @@ static void set_parent(struct routes *routes, unsigned node, unsigned parent)
 }
 
 /* The end of the way up: the gateway, or a node that hangs free. */
-static unsigned root_of(const struct routes *routes, unsigned node)
-{
+static unsigned root_of(const struct routes *routes, unsigned node) {
     unsigned parent = parent_of(routes, node);
     while (parent != ROUTES_NONE) {
         node = parent;
@@ -97,14 +88,12 @@ static unsigned root_of(const struct routes *routes, unsigned node)
 /* --- what is dead -------------------------------------------------------- */
 
 static bool link_is_dead(const struct routes *routes, unsigned node,
-                         unsigned link)
-{
+                         unsigned link) {
     const struct cube_wiring *w = &routes->wiring;
     return wiring_is_dead(w, w->dead_count, node, link, routes->dimension);
 }
 
-static bool node_is_dead(const struct routes *routes, unsigned node)
-{
+static bool node_is_dead(const struct routes *routes, unsigned node) {
     const struct cube_wiring *w = &routes->wiring;
     for (unsigned i = 0; i < w->dead_count; i++) {
         if (w->dead[i].dimension == CUBE_WHOLE_NODE &&
@@ -116,8 +105,7 @@ static bool node_is_dead(const struct routes *routes, unsigned node)
 }
 
 /* The lower end of the tree's link between two neighbours hangs free. */
-static void set_free(struct routes *routes, unsigned node, unsigned link)
-{
+static void set_free(struct routes *routes, unsigned node, unsigned link) {
     unsigned other = node ^ 1u << link;
     if (usual_parent(routes, node) == other) {
         set_parent(routes, node, ROUTES_NONE);
@@ -129,8 +117,7 @@ static void set_free(struct routes *routes, unsigned node, unsigned link)
 /* --- the tree ------------------------------------------------------------ */
 
 /* Ties the subtree of a node to `parent` by that node. */
-static void tie(struct routes *routes, unsigned node, unsigned parent)
-{
+static void tie(struct routes *routes, unsigned node, unsigned parent) {
     while (node != ROUTES_NONE) {
         unsigned next = parent_of(routes, node);
         set_parent(routes, node, parent);
@@ -140,8 +127,7 @@ static void tie(struct routes *routes, unsigned node, unsigned parent)
 }
 
 /* Ties the subtree that hangs free at `root`, where that is possible. */
-static bool try_to_tie(struct routes *routes, unsigned root)
-{
+static bool try_to_tie(struct routes *routes, unsigned root) {
     unsigned gateway = routes->wiring.gateway;
     unsigned nodes = 1u << lowest_bit(root ^ gateway);
     if (node_is_dead(routes, root)) {
@@ -165,8 +151,7 @@ static bool try_to_tie(struct routes *routes, unsigned root)
 }
 
 /* In ascending order, again and again until nothing more can be tied. */
-static void tie_all(struct routes *routes)
-{
+static void tie_all(struct routes *routes) {
     bool more = true;
     while (more) {
         more = false;
@@ -182,8 +167,7 @@ static void tie_all(struct routes *routes)
     }
 }
 
-void routes_find(struct routes *routes, const struct cube_wiring *wiring)
-{
+void routes_find(struct routes *routes, const struct cube_wiring *wiring) {
     struct cube_wiring *w = &routes->wiring;
     *w = *wiring;
     w->dead_count = 0;
@@ -212,13 +196,11 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring)
 
 /* --- ways ---------------------------------------------------------------- */
 
-bool routes_reach(const struct routes *routes, unsigned node)
-{
+bool routes_reach(const struct routes *routes, unsigned node) {
     return !routes->tree || root_of(routes, node) == routes->wiring.gateway;
 }
 
-unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest)
-{
+unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest) {
     LINK_ASSERT(self != dest);
     if (!routes->tree) {
         return lowest_bit(self ^ dest);
@@ -235,8 +217,7 @@ unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest)
     return lowest_bit(self ^ next);
 }
 
-static unsigned highest_bit(unsigned bits)
-{
+static unsigned highest_bit(unsigned bits) {
     return 31u - (unsigned)__builtin_clz(bits);
 }
 
@@ -244,8 +225,7 @@ static unsigned highest_bit(unsigned bits)
  * so the bit changed last is the highest bit in which the two numbers differ.
  * Off the e-cube path, the link from a node is the tree's link to that node. */
 unsigned routes_way_from(const struct routes *routes, unsigned self,
-                         unsigned source)
-{
+                         unsigned source) {
     LINK_ASSERT(self != source);
     return routes->tree ? routes_way(routes, self, source)
                         : highest_bit(self ^ source);
@@ -253,15 +233,13 @@ unsigned routes_way_from(const struct routes *routes, unsigned self,
 
 /* The binomial tree rooted at root: from a node whose relative address ends
  * at bit h, on along the dimensions above h.  Its paths are those of e-cube. */
-static uint32_t binomial(const struct routes *routes, unsigned relative)
-{
+static uint32_t binomial(const struct routes *routes, unsigned relative) {
     unsigned above = relative == 0 ? 0 : highest_bit(relative) + 1;
     return ((1u << routes->dimension) - 1) >> above << above;
 }
 
 uint32_t routes_to_all(const struct routes *routes, unsigned self,
-                       unsigned root)
-{
+                       unsigned root) {
     uint32_t ways = 0;
     if (!routes->tree) {
         return binomial(routes, self ^ root);

@@ -24,16 +24,14 @@ enum {
 /* The complement tells a changed size at once: bytes that never come are not
  * waited for.  The number, its low 32 bits, tells what is missing before it. */
 static void put_head(uint8_t head[SECURE_HEAD_BYTES], size_t size,
-                     uint64_t number)
-{
+                     uint64_t number) {
     bytes_put16(head, (unsigned)size);
     bytes_put16(head + 2, ~(unsigned)size);
     bytes_put32(head + 4, (uint32_t)number);
 }
 
 /* The size that a head states, or SIZE_MAX: none. */
-static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES])
-{
+static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES]) {
     size_t size = bytes_get16(head);
     bool sound = (size ^ bytes_get16(head + 2)) == 0xffff;
     return sound && size <= SECURE_RECORD_MAX ? size : SIZE_MAX;
@@ -41,15 +39,13 @@ static size_t head_size(const uint8_t head[SECURE_HEAD_BYTES])
 
 /* How many records are missing before it, if it is one to come. */
 static uint32_t head_ahead(const uint8_t head[SECURE_HEAD_BYTES],
-                           uint64_t expected)
-{
+                           uint64_t expected) {
     return bytes_get32(head + 4) - (uint32_t)expected;
 }
 
 /* --- proving ------------------------------------------------------------- */
 
-static void put_ends(uint8_t *greeting, const struct secure_ends *ends)
-{
+static void put_ends(uint8_t *greeting, const struct secure_ends *ends) {
     greeting[PORT] = ends->self.port;
     bytes_put16(greeting + NODE, ends->self.node);
     bytes_put16(greeting + PEER_NODE, ends->peer.node);
@@ -58,16 +54,14 @@ static void put_ends(uint8_t *greeting, const struct secure_ends *ends)
 
 /* That who sent a greeting knows the key, or repeats one who did. */
 static void make_tag(uint8_t tag[SECURE_TAG_BYTES],
-                     const struct secure_self *self, const uint8_t *greeting)
-{
+                     const struct secure_self *self, const uint8_t *greeting) {
     uint8_t whole[SECURE_KEY_BYTES];
     self->suite->hash(whole, self->key, greeting, TAG);
     memcpy(tag, whole, SECURE_TAG_BYTES);
 }
 
 /* In a time that says nothing of the bytes. */
-static bool is_same(const uint8_t *a, const uint8_t *b, size_t size)
-{
+static bool is_same(const uint8_t *a, const uint8_t *b, size_t size) {
     unsigned bits = 0;
     for (size_t i = 0; i < size; i++) {
         bits |= a[i] ^ b[i];
@@ -75,8 +69,7 @@ static bool is_same(const uint8_t *a, const uint8_t *b, size_t size)
     return bits == 0;
 }
 
-static void put_point(struct secure_shake *shake)
-{
+static void put_point(struct secure_shake *shake) {
     static const uint8_t base[SECURE_KEY_BYTES] = {9};
     shake->self.suite->x25519(shake->out + SECURE_GREETING_BYTES, shake->secret,
                               base);
@@ -87,8 +80,7 @@ static void put_point(struct secure_shake *shake)
  * stranger costs it hashes, and no multiplication. */
 void secure_shake_init(struct secure_shake *shake,
                        const struct secure_self *self,
-                       const struct secure_seed *seed)
-{
+                       const struct secure_seed *seed) {
     uint8_t *greeting = shake->out;
     memset(shake, 0, sizeof *shake);
     shake->self = *self;
@@ -105,8 +97,7 @@ void secure_shake_init(struct secure_shake *shake,
 }
 
 /* What is wrong with what has come of a greeting. */
-static enum secure_fault hear_greeting(struct secure_shake *shake)
-{
+static enum secure_fault hear_greeting(struct secure_shake *shake) {
     enum { VERSION = SECURE_MARK_BYTES - 1 };
     size_t have =
         shake->in_end < SECURE_MARK_BYTES ? shake->in_end : SECURE_MARK_BYTES;
@@ -130,8 +121,7 @@ static enum secure_fault hear_greeting(struct secure_shake *shake)
 /* Both greetings and points, the caller's first, and what the exchange gives
  * make a root of this connection alone, and that a key for each direction.
  * False: the peer's point leaves nothing secret. */
-static bool derive(struct secure_shake *shake)
-{
+static bool derive(struct secure_shake *shake) {
     enum { BOTH = 2 * SECURE_POINT_END };
     static const uint8_t nothing[SECURE_KEY_BYTES];
     static const uint8_t caller = 'c', listener = 'l';
@@ -153,8 +143,7 @@ static bool derive(struct secure_shake *shake)
 
 /* The peer's point is here: ours, if it is not sent yet, and the proof, an
  * empty record. */
-static enum secure_fault take_point(struct secure_shake *shake)
-{
+static enum secure_fault take_point(struct secure_shake *shake) {
     uint8_t *proof = shake->out + SECURE_POINT_END;
     if (!shake->self.caller) {
         put_point(shake);
@@ -170,8 +159,7 @@ static enum secure_fault take_point(struct secure_shake *shake)
     return SECURE_SOUND;
 }
 
-static enum secure_fault take_proof(struct secure_shake *shake)
-{
+static enum secure_fault take_proof(struct secure_shake *shake) {
     uint8_t *proof = shake->in + SECURE_POINT_END;
     shake->proven =
         head_size(proof) == 0 && head_ahead(proof, 0) == 0 &&
@@ -181,8 +169,7 @@ static enum secure_fault take_proof(struct secure_shake *shake)
 }
 
 static enum secure_fault send_opening(struct secure_shake *shake,
-                                      const struct link_pipe *pipe)
-{
+                                      const struct link_pipe *pipe) {
     if (shake->out_begin == shake->out_end) {
         return SECURE_SOUND;
     }
@@ -193,8 +180,7 @@ static enum secure_fault send_opening(struct secure_shake *shake,
 }
 
 static enum secure_fault receive_opening(struct secure_shake *shake,
-                                         const struct link_pipe *pipe)
-{
+                                         const struct link_pipe *pipe) {
     size_t want = shake->derived   ? SECURE_OPENING_BYTES
                   : shake->greeted ? SECURE_POINT_END
                                    : SECURE_GREETING_BYTES;
@@ -217,8 +203,7 @@ static enum secure_fault receive_opening(struct secure_shake *shake,
 }
 
 static enum secure_fault exchange(struct secure_shake *shake,
-                                  const struct link_pipe *pipe)
-{
+                                  const struct link_pipe *pipe) {
     /* Greeting, point and proof may have come together. */
     for (int i = 0; i < 3; i++) {
         enum secure_fault fault = send_opening(shake, pipe);
@@ -232,8 +217,7 @@ static enum secure_fault exchange(struct secure_shake *shake,
     return send_opening(shake, pipe);
 }
 
-int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe)
-{
+int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe) {
     if (shake->fault == SECURE_SOUND) {
         shake->fault = exchange(shake, pipe);
     }
@@ -244,8 +228,7 @@ int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe)
     return shake->proven && shake->out_begin == shake->out_end ? 1 : 0;
 }
 
-struct secure_ends secure_shake_peer(const struct secure_shake *shake)
-{
+struct secure_ends secure_shake_peer(const struct secure_shake *shake) {
     const uint8_t *greeting = shake->in;
     LINK_ASSERT(shake->proven);
     return (struct secure_ends){
@@ -253,8 +236,7 @@ struct secure_ends secure_shake_peer(const struct secure_shake *shake)
         .peer = {bytes_get16(greeting + PEER_NODE), greeting[PEER_PORT]}};
 }
 
-static bool fits(struct link_end a, struct link_end b)
-{
+static bool fits(struct link_end a, struct link_end b) {
     bool node = a.node == b.node || a.node == SECURE_NODE_UNKNOWN ||
                 b.node == SECURE_NODE_UNKNOWN;
     bool port = a.port == b.port || a.port == SECURE_PORT_UNKNOWN ||
@@ -262,22 +244,19 @@ static bool fits(struct link_end a, struct link_end b)
     return node && port;
 }
 
-bool secure_shake_misled(const struct secure_shake *shake)
-{
+bool secure_shake_misled(const struct secure_shake *shake) {
     const struct secure_ends *ours = &shake->self.ends;
     struct secure_ends theirs = secure_shake_peer(shake);
     return !fits(ours->self, theirs.peer) || !fits(ours->peer, theirs.self);
 }
 
-void secure_shake_end(struct secure_shake *shake)
-{
+void secure_shake_end(struct secure_shake *shake) {
     enum secure_fault fault = shake->fault;
     secure_wipe(shake, sizeof *shake);
     shake->fault = fault == SECURE_SOUND ? SECURE_GONE : fault;
 }
 
-bool secure_greets(const uint8_t *bytes, size_t size)
-{
+bool secure_greets(const uint8_t *bytes, size_t size) {
     return size >= sizeof mark && memcmp(bytes, mark, sizeof mark - 1) == 0;
 }
 
@@ -285,8 +264,7 @@ bool secure_greets(const uint8_t *bytes, size_t size)
 
 void secure_records_start(struct secure_records *records,
                           struct secure_shake *shake,
-                          const struct link_pipe *pipe)
-{
+                          const struct link_pipe *pipe) {
     LINK_ASSERT(shake->proven && shake->fault == SECURE_SOUND);
     memset(records, 0, sizeof *records);
     records->suite = shake->self.suite;
@@ -295,23 +273,20 @@ void secure_records_start(struct secure_records *records,
     secure_shake_end(shake);
 }
 
-void secure_records_end(struct secure_records *records)
-{
+void secure_records_end(struct secure_records *records) {
     secure_wipe(&records->keys, sizeof records->keys);
     secure_wipe(records->plain, sizeof records->plain);
     records->plain_begin = records->plain_end = 0;
     records->failed = true;
 }
 
-static int fail(struct secure_records *r)
-{
+static int fail(struct secure_records *r) {
     secure_records_end(r);
     return LINK_PIPE_CLOSED;
 }
 
 /* Sends what is sealed; false: the pipe is closed. */
-static bool flush(struct secure_records *r)
-{
+static bool flush(struct secure_records *r) {
     if (r->out_begin < r->out_end) {
         int sent = r->pipe.send(r->pipe.context, r->out + r->out_begin,
                                 r->out_end - r->out_begin);
@@ -325,8 +300,7 @@ static bool flush(struct secure_records *r)
 
 /* All that the pipe has room for: what is not taken, the link holds back until
  * the pipe has room again. */
-static int records_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int records_send(void *context, const uint8_t *bytes, size_t size) {
     struct secure_records *r = context;
     size_t done = 0;
     if (r->failed || !flush(r)) {
@@ -351,8 +325,7 @@ static int records_send(void *context, const uint8_t *bytes, size_t size)
 
 /* Where the next record begins in what has come, from `at` on; else where one
  * might whose head is not whole. */
-static size_t find_head(const struct secure_records *r, size_t at)
-{
+static size_t find_head(const struct secure_records *r, size_t at) {
     while (at + SECURE_HEAD_BYTES <= r->in_end &&
            (head_size(r->in + at) == SIZE_MAX ||
             head_ahead(r->in + at, r->keys.in_count) >= SECURE_AHEAD_MAX)) {
@@ -362,16 +335,14 @@ static size_t find_head(const struct secure_records *r, size_t at)
 }
 
 /* The first bytes of what has come are taken. */
-static void take(struct secure_records *r, size_t size)
-{
+static void take(struct secure_records *r, size_t size) {
     r->in_end -= size;
     r->seen = 0;
     memmove(r->in, r->in + size, r->in_end);
 }
 
 /* Leaves out at least so many, and all that begin no record. */
-static void skip(struct secure_records *r, size_t least)
-{
+static void skip(struct secure_records *r, size_t least) {
     size_t at = find_head(r, least);
     if (at > 0) {
         r->lost += at;
@@ -382,8 +353,7 @@ static void skip(struct secure_records *r, size_t least)
 /* Whether the record that is awaited was cut short, as another begins within
  * it: then that is the first.  By chance one in 2^37 bytes looks like a head.
  */
-static bool is_cut(struct secure_records *r)
-{
+static bool is_cut(struct secure_records *r) {
     size_t at = find_head(r, r->seen > 0 ? r->seen : 1);
     if (r->in_end < SECURE_HEAD_BYTES || at + SECURE_HEAD_BYTES > r->in_end) {
         r->seen = at;
@@ -396,8 +366,7 @@ static bool is_cut(struct secure_records *r)
 
 /* The record at the front of what has come: true if it is the peer's.  What is
  * missing before it ends the frame that it was in. */
-static bool open_record(struct secure_records *r, size_t size)
-{
+static bool open_record(struct secure_records *r, size_t size) {
     uint32_t ahead = head_ahead(r->in, r->keys.in_count);
     if (!r->suite->open(r->plain + 1, r->in + SECURE_HEAD_BYTES, size, r->in,
                         r->keys.in_count + ahead, r->keys.in)) {
@@ -420,8 +389,7 @@ static bool open_record(struct secure_records *r, size_t size)
  * bytes that are here; but a place that was lost is not looked for byte by
  * byte.
  */
-static size_t missing(const struct secure_records *r)
-{
+static size_t missing(const struct secure_records *r) {
     size_t whole = SECURE_HEAD_BYTES;
     if (r->in_end >= SECURE_HEAD_BYTES) {
         whole += head_size(r->in) + SECURE_TAG_BYTES;
@@ -434,8 +402,7 @@ static size_t missing(const struct secure_records *r)
 
 /* Takes the next good record, of what is here or can be read: 1, 0 it has not
  * come yet, or LINK_PIPE_CLOSED. */
-static int take_record(struct secure_records *r, bool reads)
-{
+static int take_record(struct secure_records *r, bool reads) {
     bool dry = !reads;
     while (r->lost <= SECURE_LOST_MAX) {
         skip(r, 0);
@@ -462,8 +429,7 @@ static int take_record(struct secure_records *r, bool reads)
     return LINK_PIPE_CLOSED;
 }
 
-static int records_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int records_receive(void *context, uint8_t *bytes, size_t size) {
     struct secure_records *r = context;
     size_t done = 0, have = 1;
     int status = 1;
@@ -483,7 +449,6 @@ static int records_receive(void *context, uint8_t *bytes, size_t size)
     return status < 0 ? fail(r) : (int)done;
 }
 
-struct link_pipe secure_records_pipe(struct secure_records *records)
-{
+struct link_pipe secure_records_pipe(struct secure_records *records) {
     return (struct link_pipe){records, records_send, records_receive};
 }

@@ -19,8 +19,7 @@ enum {
 
 static const uint8_t label[DEVICE] = {'i', 'n', 'c', 'o', 'd', 'e', 'd', 1};
 
-static void put64(uint8_t *bytes, uint64_t value)
-{
+static void put64(uint8_t *bytes, uint64_t value) {
     bytes_put32(bytes, (uint32_t)value);
     bytes_put32(bytes + 4, (uint32_t)(value >> 32));
 }
@@ -28,8 +27,7 @@ static void put64(uint8_t *bytes, uint64_t value)
 bool secure_seed_draw(struct secure_source *source,
                       const struct secure_suite *suite,
                       const uint8_t key[SECURE_KEY_BYTES],
-                      struct secure_seed *seed)
-{
+                      struct secure_seed *seed) {
     uint8_t drawn[DRAWN_BYTES] = {0}, made[SECURE_KEY_BYTES];
     bool random =
         source->random != NULL &&

@@ -2,8 +2,7 @@
 
 #include <string.h>
 
-void secure_wipe(void *memory, size_t size)
-{
+void secure_wipe(void *memory, size_t size) {
     memset(memory, 0, size);
     /* For all the compiler knows, this reads what the pointer leads to: so the
      * zeros stay, inlined and at link time too. */

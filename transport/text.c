@@ -3,23 +3,20 @@
 #include <stdbool.h>
 #include <string.h>
 
-struct cube_text cube_text_in(char *data, size_t bytes_max)
-{
+struct cube_text cube_text_in(char *data, size_t bytes_max) {
     struct cube_text text = {data, 0, bytes_max - 1};
     data[0] = '\0';
     return text;
 }
 
-void cube_text_put(struct cube_text *text, const char *words)
-{
+void cube_text_put(struct cube_text *text, const char *words) {
     while (*words != '\0' && text->size < text->size_max) {
         text->data[text->size++] = *words++;
     }
     text->data[text->size] = '\0';
 }
 
-void cube_text_number(struct cube_text *text, uint32_t number)
-{
+void cube_text_number(struct cube_text *text, uint32_t number) {
     char digits[11];
     unsigned at = sizeof digits - 1;
     digits[at] = '\0';
@@ -30,8 +27,7 @@ void cube_text_number(struct cube_text *text, uint32_t number)
     cube_text_put(text, digits + at);
 }
 
-static bool is_obeyed(uint32_t code)
-{
+static bool is_obeyed(uint32_t code) {
     return code < 0x20 || (code >= 0x7f && code < 0xa0) || code == 0x61c ||
            code == 0x200e || code == 0x200f ||
            (code >= 0x2028 && code <= 0x202e) ||
@@ -40,8 +36,7 @@ static bool is_obeyed(uint32_t code)
 
 /* UTF-8 as RFC 3629 has it: the shortest form, no surrogates, nothing past
  * U+10FFFF. */
-size_t cube_text_shown(const char *words)
-{
+size_t cube_text_shown(const char *words) {
     const uint8_t *at = (const uint8_t *)words;
     static const uint32_t least[] = {0, 0x80, 0x800, 0x10000};
     size_t more = at[0] < 0x80   ? 0
@@ -65,8 +60,7 @@ size_t cube_text_shown(const char *words)
     return valid && !is_obeyed(code) ? more + 1 : 0;
 }
 
-void cube_text_printable(struct cube_text *text, const char *words)
-{
+void cube_text_printable(struct cube_text *text, const char *words) {
     static const char digits[] = "0123456789abcdef";
     while (*words != '\0') {
         unsigned byte = (unsigned char)*words;

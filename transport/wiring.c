@@ -11,15 +11,13 @@ static_assert(WIRING_BYTES_MAX <= (int)LINK_DATAGRAM_MAX,
 
 /* --- bytes --------------------------------------------------------------- */
 
-static void put(uint8_t **at, uint32_t value, unsigned bytes)
-{
+static void put(uint8_t **at, uint32_t value, unsigned bytes) {
     for (unsigned i = 0; i < bytes; i++) {
         *(*at)++ = (uint8_t)(value >> 8 * i);
     }
 }
 
-static uint32_t get(const uint8_t **at, unsigned bytes)
-{
+static uint32_t get(const uint8_t **at, unsigned bytes) {
     uint32_t value = 0;
     for (unsigned i = 0; i < bytes; i++) {
         value |= (uint32_t) * (*at)++ << 8 * i;
@@ -27,8 +25,7 @@ static uint32_t get(const uint8_t **at, unsigned bytes)
     return value;
 }
 
-size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes)
-{
+size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes) {
     uint8_t *at = bytes;
     put(&at, wiring->generation, 4);
     put(&at, wiring->host_epoch, 4);
@@ -55,27 +52,23 @@ size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes)
 /* --- sets ---------------------------------------------------------------- */
 
 /* The order in which entries are kept. */
-static uint32_t rank_of_dead(const struct cube_dead *dead)
-{
+static uint32_t rank_of_dead(const struct cube_dead *dead) {
     return (uint32_t)dead->node << 8 | dead->dimension;
 }
 
-static uint64_t rank_of_wrong(const struct cube_wrong *w)
-{
+static uint64_t rank_of_wrong(const struct cube_wrong *w) {
     return (uint64_t)w->node << 40 | (uint64_t)w->link << 32 |
            (uint32_t)w->peer_node << 16 | (uint32_t)w->peer_link << 8 |
            w->refusal;
 }
 
-bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b)
-{
+bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b) {
     uint8_t of_a[WIRING_BYTES_MAX], of_b[WIRING_BYTES_MAX];
     size_t size = wiring_pack(a, of_a);
     return wiring_pack(b, of_b) == size && memcmp(of_a, of_b, size) == 0;
 }
 
-bool wiring_after(uint32_t b, uint32_t a)
-{
+bool wiring_after(uint32_t b, uint32_t a) {
     const uint32_t half = UINT32_C(1) << 31;
     uint32_t ahead = b - a;
     if (a == 0 || b == 0) {
@@ -84,33 +77,28 @@ bool wiring_after(uint32_t b, uint32_t a)
     return ahead == half ? b > a : ahead != 0 && ahead < half;
 }
 
-uint32_t wiring_next(uint32_t generation)
-{
+uint32_t wiring_next(uint32_t generation) {
     return generation == UINT32_MAX ? 1 : generation + 1;
 }
 
-bool wiring_together(const struct cube_wiring *a, const struct cube_wiring *b)
-{
+bool wiring_together(const struct cube_wiring *a, const struct cube_wiring *b) {
     return a->generation == b->generation && a->host_epoch == b->host_epoch;
 }
 
-uint16_t wiring_stamp(const struct cube_wiring *wiring)
-{
+uint16_t wiring_stamp(const struct cube_wiring *wiring) {
     uint8_t bytes[8];
     bytes_put32(bytes, wiring->generation);
     bytes_put32(bytes + 4, wiring->host_epoch);
     return frame_crc16(bytes, sizeof bytes);
 }
 
-bool wiring_newer(const struct cube_wiring *b, const struct cube_wiring *a)
-{
+bool wiring_newer(const struct cube_wiring *b, const struct cube_wiring *a) {
     return wiring_after(b->generation, a->generation) ||
            (b->generation == a->generation && b->host_epoch > a->host_epoch);
 }
 
 bool wiring_is_dead(const struct cube_wiring *wiring, unsigned count,
-                    unsigned node, unsigned link, unsigned dimension)
-{
+                    unsigned node, unsigned link, unsigned dimension) {
     unsigned other = link < dimension ? node ^ 1u << link : node;
     unsigned lower = node < other ? node : other;
     for (unsigned i = 0; i < count; i++) {
@@ -124,8 +112,7 @@ bool wiring_is_dead(const struct cube_wiring *wiring, unsigned count,
     return false;
 }
 
-static bool node_is_dead(const struct cube_wiring *wiring, unsigned node)
-{
+static bool node_is_dead(const struct cube_wiring *wiring, unsigned node) {
     for (unsigned i = 0; i < wiring->dead_count; i++) {
         const struct cube_dead *d = &wiring->dead[i];
         if (d->dimension == CUBE_WHOLE_NODE && d->node == node) {
@@ -136,8 +123,7 @@ static bool node_is_dead(const struct cube_wiring *wiring, unsigned node)
 }
 
 bool wiring_add_dead(struct cube_wiring *wiring, struct cube_dead dead,
-                     unsigned dimension)
-{
+                     unsigned dimension) {
     if (dead.dimension != CUBE_WHOLE_NODE && dead.dimension < dimension) {
         dead.node = (uint16_t)(dead.node & ~(1u << dead.dimension));
     }
@@ -164,8 +150,7 @@ bool wiring_add_dead(struct cube_wiring *wiring, struct cube_dead dead,
     return true;
 }
 
-bool wiring_add_wrong(struct cube_wiring *wiring, struct cube_wrong wrong)
-{
+bool wiring_add_wrong(struct cube_wiring *wiring, struct cube_wrong wrong) {
     unsigned at = 0, count = wiring->wrong_count;
     uint64_t rank = rank_of_wrong(&wrong);
     while (at < count && rank_of_wrong(&wiring->wrong[at]) < rank) {
@@ -184,8 +169,7 @@ bool wiring_add_wrong(struct cube_wiring *wiring, struct cube_wrong wrong)
 }
 
 bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
-                  unsigned dimension)
-{
+                  unsigned dimension) {
     bool changed = false;
     if (wiring_newer(mine, theirs)) {
         return false;
@@ -205,8 +189,7 @@ bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
 
 /* --- from afar ----------------------------------------------------------- */
 
-static bool sound(const struct cube_wiring *wiring, unsigned dimension)
-{
+static bool sound(const struct cube_wiring *wiring, unsigned dimension) {
     unsigned nodes = 1u << dimension;
     bool right = wiring->gateway < nodes;
     for (unsigned i = 0; i < wiring->dead_count; i++) {
@@ -225,8 +208,7 @@ static bool sound(const struct cube_wiring *wiring, unsigned dimension)
 }
 
 /* Whether what was found stands as if it had been added here. */
-static bool in_order(const struct cube_wiring *wiring, unsigned dimension)
-{
+static bool in_order(const struct cube_wiring *wiring, unsigned dimension) {
     struct cube_wiring again = *wiring;
     again.dead_count = again.settled;
     again.wrong_count = 0;
@@ -240,8 +222,7 @@ static bool in_order(const struct cube_wiring *wiring, unsigned dimension)
 }
 
 bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
-                   size_t size, unsigned dimension)
-{
+                   size_t size, unsigned dimension) {
     const uint8_t *at = bytes;
     memset(wiring, 0, sizeof *wiring);
     if (size < WIRING_HEAD) {
@@ -280,8 +261,7 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
 
 /* The gateway lives while its host's wire does. */
 static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
-                           unsigned dimension)
-{
+                           unsigned dimension) {
     bool all = dimension > 0 && node != wiring->gateway;
     for (unsigned d = 0; d < dimension; d++) {
         all &= wiring_is_dead(wiring, wiring->dead_count, node, d, dimension);
@@ -289,8 +269,7 @@ static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
     return all;
 }
 
-void wiring_settle(struct cube_wiring *wiring, unsigned dimension)
-{
+void wiring_settle(struct cube_wiring *wiring, unsigned dimension) {
     struct cube_wiring whole = *wiring, settled = *wiring;
     settled.dead_count = settled.settled = 0;
     for (unsigned i = 0; i < wiring->dead_count; i++) {

@@ -21,14 +21,12 @@ enum {
 /* --- what it says ----------------------------------------------------------
  */
 
-static void tell(struct cube_text *text, const char *what, size_t number)
-{
+static void tell(struct cube_text *text, const char *what, size_t number) {
     cube_text_put(text, what);
     cube_text_number(text, (uint32_t)number);
 }
 
-static void put_hex(struct cube_text *text, const uint8_t *bytes, size_t size)
-{
+static void put_hex(struct cube_text *text, const uint8_t *bytes, size_t size) {
     for (size_t i = 0; i < size; i++) {
         char pair[3] = {"0123456789abcdef"[bytes[i] >> 4],
                         "0123456789abcdef"[bytes[i] & 15], '\0'};
@@ -36,15 +34,13 @@ static void put_hex(struct cube_text *text, const uint8_t *bytes, size_t size)
     }
 }
 
-static void put_name(struct cube_text *text, const struct bare_node *bare)
-{
+static void put_name(struct cube_text *text, const struct bare_node *bare) {
     cube_text_put(text, "incode: ");
     cube_text_put(text, board_facts.name);
     cube_text_put(text, bare->loader ? ": loader" : ": program");
 }
 
-static void put_memory(struct cube_text *text)
-{
+static void put_memory(struct cube_text *text) {
     tell(text, "bytes: code ", bare_bytes(bare_code, bare_code_end));
     tell(text, ", stack ", BARE_STACK_BYTES);
     tell(text, ", tables ", bare_bytes(bare_tables, bare_tables_end));
@@ -53,8 +49,7 @@ static void put_memory(struct cube_text *text)
     cube_text_put(text, "\r\n");
 }
 
-static void put_start(struct cube_text *text, const struct bare_node *bare)
-{
+static void put_start(struct cube_text *text, const struct bare_node *bare) {
     cube_text_put(text, bare_reason_name(bare->reason.kind));
     if (board_facts.flash == NULL) {
         cube_text_put(text, "; no flash, a neighbour tells the epoch");
@@ -68,8 +63,7 @@ static void put_start(struct cube_text *text, const struct bare_node *bare)
     cube_text_put(text, "\r\n");
 }
 
-static void put_faults(struct cube_text *text, const struct bare_node *bare)
-{
+static void put_faults(struct cube_text *text, const struct bare_node *bare) {
     tell(text, "faults since power on: ", bare->reason.faults);
     if (bare->reason.faults > 0) {
         cube_text_put(text, "; the last: ");
@@ -79,8 +73,7 @@ static void put_faults(struct cube_text *text, const struct bare_node *bare)
 }
 
 /* Lines end in \n alone there. */
-static size_t tell_log(void *context, char *text, size_t size)
-{
+static size_t tell_log(void *context, char *text, size_t size) {
     const struct bare_node *bare = context;
     char room[SAID];
     struct cube_text words = cube_text_in(room, sizeof room);
@@ -98,20 +91,17 @@ static size_t tell_log(void *context, char *text, size_t size)
 
 /* --- what a node asks of its board ---------------------------------------- */
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return board_now_us();
 }
 
-static uint64_t busy_us(void *context)
-{
+static uint64_t busy_us(void *context) {
     const struct bare_node *bare = context;
     return board_now_us() - bare->idle_us;
 }
 
-static bool anything(void)
-{
+static bool anything(void) {
     for (unsigned i = 0; i <= board_facts.ports; i++) {
         if (bare_uart_ready(&bare_uart[i])) {
             return true;
@@ -120,8 +110,7 @@ static bool anything(void)
     return false;
 }
 
-void bare_node_idle(struct bare_node *bare, uint64_t wait_us)
-{
+void bare_node_idle(struct bare_node *bare, uint64_t wait_us) {
     uint64_t begun_us = board_now_us(), now = begun_us;
     board_feed();
     while (!anything() && now - begun_us < wait_us) {
@@ -136,35 +125,30 @@ void bare_node_idle(struct bare_node *bare, uint64_t wait_us)
     bare->idle_us += now - begun_us;
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     bare_node_idle(context, wait_us);
 }
 
-static void gauges(void *context, struct node_gauges *gauges)
-{
+static void gauges(void *context, struct node_gauges *gauges) {
     (void)context;
     gauges->stack_bytes = BARE_STACK_BYTES;
     gauges->stack_high_water = bare_stack_high_water();
     gauges->overruns = bare_uarts_overruns();
 }
 
-void bare_node_restart(enum bare_reason_kind reason)
-{
+void bare_node_restart(enum bare_reason_kind reason) {
     bare_uarts_flush(FLUSH_US);
     bare_reason_keep(reason, NULL);
     board_restart();
 }
 
-void bare_node_end(enum node_reset why)
-{
+void bare_node_end(enum node_reset why) {
     bare_node_restart(why == NODE_RESET_STAY    ? BARE_STAY
                       : why == NODE_RESET_AGAIN ? BARE_ASKED
                                                 : BARE_RUN_OVER);
 }
 
-static void tell_who(void *context, struct node_who *who)
-{
+static void tell_who(void *context, struct node_who *who) {
     const struct bare_node *bare = context;
     const struct bare_handover *from = &bare->handover;
     who->kind = bare->loader ? NODE_KIND_LOADER : NODE_KIND_PROGRAM;
@@ -176,8 +160,7 @@ static void tell_who(void *context, struct node_who *who)
     who->boot = bare->boot;
 }
 
-static uint32_t lost(void *context, unsigned d)
-{
+static uint32_t lost(void *context, unsigned d) {
     const struct bare_node *bare = context;
     bool host = d == bare->board.identity.dimension;
     return bare_uart[host ? 0 : d + 1].overruns;
@@ -190,8 +173,7 @@ static struct loader_budget kept __attribute__((section(".noinit.budget")));
 
 static_assert(sizeof kept <= BARE_BUDGET_BYTES, "as start.ld has it");
 
-void bare_node_begin(struct bare_node *bare, bool loader)
-{
+void bare_node_begin(struct bare_node *bare, bool loader) {
     memset(bare, 0, sizeof *bare);
     bare->loader = loader;
     bare->budget = &kept;
@@ -203,8 +185,7 @@ void bare_node_begin(struct bare_node *bare, bool loader)
     board_unlock(0);
 }
 
-void bare_node_may_start(struct bare_node *bare)
-{
+void bare_node_may_start(struct bare_node *bare) {
     if (!loader_budget_has(bare->budget, LOADER_STARTS)) {
         bare_console_begin();
         bare_console_put("incode: too many starts since the board was switched "
@@ -219,8 +200,7 @@ void bare_node_may_start(struct bare_node *bare)
 
 /* Its text is on the stack only now. */
 __attribute__((noinline)) void
-bare_node_tell_start(const struct bare_node *bare)
-{
+bare_node_tell_start(const struct bare_node *bare) {
     char room[SAID];
     struct cube_text text = cube_text_in(room, sizeof room);
     put_name(&text, bare);
@@ -235,8 +215,7 @@ bare_node_tell_start(const struct bare_node *bare)
     bare_console_end();
 }
 
-void bare_node_fill_in(struct bare_node *bare)
-{
+void bare_node_fill_in(struct bare_node *bare) {
     struct node_board *board = &bare->board;
     board->context = bare;
     board->now_us = now_us;
@@ -260,8 +239,7 @@ void bare_node_fill_in(struct bare_node *bare)
     (void)node_identity_epoch(&board->identity, &board->source);
 }
 
-void bare_node_learn(struct bare_node *bare)
-{
+void bare_node_learn(struct bare_node *bare) {
     struct node_board *board = &bare->board;
     struct node_identity *identity = &board->identity;
     struct link_pipe host = bare_shell_pipe(&bare->shell);
@@ -295,8 +273,7 @@ void bare_node_learn(struct bare_node *bare)
 /* --- what it is asked ------------------------------------------------------
  */
 
-static void answer_help(const struct bare_node *bare, struct cube_text *text)
-{
+static void answer_help(const struct bare_node *bare, struct cube_text *text) {
     (void)bare;
     cube_text_put(text, "who     board, version, image, number in its cube\r\n"
                         "links   its wires, and who is there\r\n"
@@ -305,8 +282,7 @@ static void answer_help(const struct bare_node *bare, struct cube_text *text)
                         "help    these; more by incode console\r\n");
 }
 
-static bool is_known(const uint8_t *bytes, size_t size)
-{
+static bool is_known(const uint8_t *bytes, size_t size) {
     uint8_t all = 0;
     for (size_t i = 0; i < size; i++) {
         all |= bytes[i];
@@ -315,8 +291,7 @@ static bool is_known(const uint8_t *bytes, size_t size)
 }
 
 /* What a loader has told, or has itself. */
-static void put_image(struct cube_text *text, const struct bare_node *bare)
-{
+static void put_image(struct cube_text *text, const struct bare_node *bare) {
     const struct bare_handover *from = &bare->handover;
     if (is_known(from->digest, sizeof from->digest)) {
         cube_text_put(text, ", image ");
@@ -335,8 +310,7 @@ static void put_image(struct cube_text *text, const struct bare_node *bare)
     }
 }
 
-static void answer_who(const struct bare_node *bare, struct cube_text *text)
-{
+static void answer_who(const struct bare_node *bare, struct cube_text *text) {
     put_name(text, bare);
     cube_text_put(text, ", version " NODE_VERSION);
     put_image(text, bare);
@@ -352,8 +326,7 @@ static void answer_who(const struct bare_node *bare, struct cube_text *text)
 }
 
 static void put_link(struct cube_text *text, const struct bare_node *bare,
-                     unsigned d, const struct node_link_state *state)
-{
+                     unsigned d, const struct node_link_state *state) {
     static const char *const names[] = {"closed",     "not heard", "up",
                                         "silent",     "closing",   "left",
                                         "wired wrong"};
@@ -375,8 +348,7 @@ static void put_link(struct cube_text *text, const struct bare_node *bare,
     cube_text_put(text, "\r\n");
 }
 
-static void answer_links(const struct bare_node *bare, struct cube_text *text)
-{
+static void answer_links(const struct bare_node *bare, struct cube_text *text) {
     struct node_link_state state[CUBE_LINKS_MAX];
     unsigned links = bare->links == NULL ? 0 : bare->links(state);
     for (unsigned d = 0; d < links; d++) {
@@ -388,23 +360,21 @@ static void answer_links(const struct bare_node *bare, struct cube_text *text)
     }
 }
 
-static void answer_memory(const struct bare_node *bare, struct cube_text *text)
-{
+static void answer_memory(const struct bare_node *bare,
+                          struct cube_text *text) {
     (void)bare;
     put_memory(text);
     tell(text, "of the stack at most ", bare_stack_high_water());
     cube_text_put(text, " in use so far\r\n");
 }
 
-static void answer_fault(const struct bare_node *bare, struct cube_text *text)
-{
+static void answer_fault(const struct bare_node *bare, struct cube_text *text) {
     cube_text_put(text, "started after ");
     put_start(text, bare);
     put_faults(text, bare);
 }
 
-static bool same(const char *a, const char *b)
-{
+static bool same(const char *a, const char *b) {
     while (*a != '\0' && (*a | 0x20) == *b) {
         a++;
         b++;
@@ -413,8 +383,7 @@ static bool same(const char *a, const char *b)
 }
 
 static __attribute__((noinline)) void answer(struct bare_node *bare,
-                                             const char *line)
-{
+                                             const char *line) {
     static const struct {
         const char *word;
         void (*answer)(const struct bare_node *bare, struct cube_text *text);
@@ -440,8 +409,7 @@ static __attribute__((noinline)) void answer(struct bare_node *bare,
     bare_shell_say(&bare->shell, room);
 }
 
-void bare_node_console(struct bare_node *bare)
-{
+void bare_node_console(struct bare_node *bare) {
     char line[BARE_SHELL_LINE + 1];
     loader_budget_pass(bare->budget, board_now_us());
     if (bare_uart[0].unused) {

@@ -5,8 +5,7 @@
 #include "reason.h"
 #include "sections.h"
 
-void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits)
-{
+void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits) {
     char all[19] = "0x";
     unsigned n = 2;
     for (unsigned i = 16; i-- > 0;) {
@@ -19,8 +18,7 @@ void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits)
     cube_text_put(text, all);
 }
 
-void bare_text_place(struct cube_text *text, uint64_t address, size_t below)
-{
+void bare_text_place(struct cube_text *text, uint64_t address, size_t below) {
     uint64_t lowest = (uintptr_t)bare_node_stack;
     uint64_t bytes = board_facts.data_bytes;
     if (address < lowest && lowest - address <= below) {
@@ -35,8 +33,8 @@ void bare_text_place(struct cube_text *text, uint64_t address, size_t below)
 }
 
 void bare_text_registers(struct cube_text *text,
-                         const struct bare_register *registers, unsigned count)
-{
+                         const struct bare_register *registers,
+                         unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         cube_text_put(text, " ");
         cube_text_put(text, registers[i].name);
@@ -48,8 +46,7 @@ void bare_text_registers(struct cube_text *text,
 static const char again[] = "; restarting\r\n";
 
 void bare_fault(const char *where, const struct bare_register *registers,
-                unsigned count, int hung)
-{
+                unsigned count, int hung) {
     char room[512];
     struct cube_text text = cube_text_in(room, sizeof room);
     (void)board_lock(); /* nothing else is sent meanwhile */

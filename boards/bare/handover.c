@@ -14,22 +14,19 @@ static struct bare_handover kept __attribute__((section(".noinit.handover")));
 static_assert(sizeof kept == BARE_HANDOVER_BYTES, "as start.ld has it");
 
 /* But for the magic number. */
-static uint32_t sum(void)
-{
+static uint32_t sum(void) {
     return frame_crc32c(0, &kept.boot,
                         offsetof(struct bare_handover, crc) -
                             offsetof(struct bare_handover, boot));
 }
 
-void bare_handover_give(const struct bare_handover *handover)
-{
+void bare_handover_give(const struct bare_handover *handover) {
     kept = *handover;
     kept.magic = GIVEN;
     kept.crc = sum();
 }
 
-bool bare_handover_take(struct bare_handover *handover)
-{
+bool bare_handover_take(struct bare_handover *handover) {
     if (kept.magic != GIVEN || kept.crc != sum()) {
         return false;
     }
@@ -39,8 +36,7 @@ bool bare_handover_take(struct bare_handover *handover)
     return true;
 }
 
-bool bare_handover_drop(void)
-{
+bool bare_handover_drop(void) {
     bool given =
         (kept.magic == GIVEN || kept.magic == TAKEN) && kept.crc == sum();
     memset(&kept, 0, sizeof kept);

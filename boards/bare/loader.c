@@ -19,8 +19,7 @@ static struct loader_rules rules;
 static struct loader_slots slots;
 static struct loader *loader;
 
-static unsigned links(struct node_link_state state[CUBE_LINKS_MAX])
-{
+static unsigned links(struct node_link_state state[CUBE_LINKS_MAX]) {
     return loader_links(loader, state);
 }
 
@@ -28,8 +27,7 @@ static unsigned links(struct node_link_state state[CUBE_LINKS_MAX])
  */
 
 /* What the image is told, and the host where the loader stays. */
-static void describe(unsigned slot)
-{
+static void describe(unsigned slot) {
     struct bare_handover *handover = &bare.handover;
     handover->boot = bare.boot;
     handover->reason = bare.reason.kind;
@@ -47,8 +45,7 @@ static void describe(unsigned slot)
 
 /* Returns where the flash takes no record of a start on trial, or gives another
  * code than it gave before. */
-static void start(unsigned slot)
-{
+static void start(unsigned slot) {
     struct loader_look look;
     const struct loader_flash *flash = rules.flash;
     /* NOLINTNEXTLINE(performance-no-int-to-ptr) */
@@ -69,8 +66,7 @@ static void start(unsigned slot)
 /* --- its start -------------------------------------------------------------
  */
 
-static void begin(void)
-{
+static void begin(void) {
     bare_node_begin(&bare, true);
     bare.reason = bare_reason_take();
     bool ended_badly =
@@ -94,8 +90,7 @@ static void begin(void)
     bare_node_tell_start(&bare);
 }
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     const char *why = NULL;
     begin();
     bare_node_learn(&bare);

@@ -15,15 +15,13 @@ struct loose {
 } __attribute__((packed, may_alias));
 enum { WORD = sizeof(word) };
 
-static int aligned_alike(const void *a, const void *b)
-{
+static int aligned_alike(const void *a, const void *b) {
     return (((uintptr_t)a ^ (uintptr_t)b) % WORD) == 0;
 }
 
 /* By words that are whole at `to`; those at `from` need not be, as processors
  * load them all the same, or the compiler puts them together. */
-static void forwards(uint8_t *to, const uint8_t *from, size_t size)
-{
+static void forwards(uint8_t *to, const uint8_t *from, size_t size) {
     for (; size > 0 && (uintptr_t)to % WORD != 0; size--) {
         *to++ = *from++;
     }
@@ -45,8 +43,7 @@ static void forwards(uint8_t *to, const uint8_t *from, size_t size)
     }
 }
 
-static void backwards(uint8_t *to, const uint8_t *from, size_t size)
-{
+static void backwards(uint8_t *to, const uint8_t *from, size_t size) {
     to += size;
     from += size;
     if (aligned_alike(to, from)) {
@@ -64,14 +61,12 @@ static void backwards(uint8_t *to, const uint8_t *from, size_t size)
     }
 }
 
-void *memcpy(void *to, const void *from, size_t size)
-{
+void *memcpy(void *to, const void *from, size_t size) {
     forwards(to, from, size);
     return to;
 }
 
-void *memmove(void *to, const void *from, size_t size)
-{
+void *memmove(void *to, const void *from, size_t size) {
     if ((uintptr_t)to - (uintptr_t)from < size) {
         backwards(to, from, size);
     } else {
@@ -80,8 +75,7 @@ void *memmove(void *to, const void *from, size_t size)
     return to;
 }
 
-void *memset(void *to, int value, size_t size)
-{
+void *memset(void *to, int value, size_t size) {
     uint8_t *p = to;
     word all = (word)-1 / 255 * (uint8_t)value;
     for (; size > 0 && (uintptr_t)p % WORD != 0; size--) {
@@ -102,8 +96,7 @@ void *memset(void *to, int value, size_t size)
     return to;
 }
 
-int memcmp(const void *a, const void *b, size_t size)
-{
+int memcmp(const void *a, const void *b, size_t size) {
     const uint8_t *p = a, *q = b;
     if (aligned_alike(a, b)) {
         for (; size >= WORD && (uintptr_t)p % WORD == 0 &&

@@ -13,15 +13,13 @@ static struct node *node;
 static struct loader_state up; /* what the flash is to say of this image, */
 static bool unconfirmed;       /* once a neighbour has been met */
 
-static unsigned links(struct node_link_state state[CUBE_LINKS_MAX])
-{
+static unsigned links(struct node_link_state state[CUBE_LINKS_MAX]) {
     return node_links(node, state);
 }
 
 /* Whoever has started it: a loader, which has looked at the reason and counted
  * the start, or the processor. */
-static void begin(void)
-{
+static void begin(void) {
     bare_node_begin(&bare, false);
     if (bare_handover_take(&bare.handover)) {
         bare.boot = bare.handover.boot;
@@ -42,8 +40,7 @@ static void begin(void)
 
 /* A neighbour has been met: the image is good enough to be told another, and
  * starts from now on whatever happens. */
-static void confirm(void)
-{
+static void confirm(void) {
     if (!loader_slots_confirm(board_facts.flash, &up)) {
         bare_fault("the flash takes no record of this image", NULL, 0, 0);
     }
@@ -52,8 +49,7 @@ static void confirm(void)
 
 /* Without neighbours, as it is before a board is wired: this start has not
  * failed. */
-static void wait_unwired(void)
-{
+static void wait_unwired(void) {
     static bool lived;
     if (!lived && bare.handover.magic != 0 &&
         board_now_us() >= LOADER_LIVED_US) {
@@ -62,8 +58,7 @@ static void wait_unwired(void)
     }
 }
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     const char *why = NULL;
     begin();
     bare.waits = wait_unwired;

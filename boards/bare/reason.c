@@ -14,13 +14,11 @@ static struct bare_reason kept __attribute__((section(".noinit.reason")));
 
 static_assert(sizeof kept <= BARE_REASON_BYTES, "more than start.ld has");
 
-static uint32_t sum(void)
-{
+static uint32_t sum(void) {
     return frame_crc32c(0, &kept, offsetof(struct bare_reason, crc));
 }
 
-struct bare_reason bare_reason_take(void)
-{
+struct bare_reason bare_reason_take(void) {
     if (kept.magic != MAGIC || kept.crc != sum() || kept.kind > BARE_BOOT) {
         memset(&kept, 0, sizeof kept);
         kept.magic = MAGIC;
@@ -32,15 +30,13 @@ struct bare_reason bare_reason_take(void)
     return reason;
 }
 
-struct bare_reason bare_reason_taken(enum bare_reason_kind kind)
-{
+struct bare_reason bare_reason_taken(enum bare_reason_kind kind) {
     struct bare_reason reason = kept;
     reason.kind = kind <= BARE_BOOT ? kind : BARE_OUTSIDE;
     return reason;
 }
 
-void bare_reason_keep(enum bare_reason_kind kind, const char *text)
-{
+void bare_reason_keep(enum bare_reason_kind kind, const char *text) {
     kept.kind = kind;
     if (text != NULL) {
         struct cube_text words = cube_text_in(kept.text, sizeof kept.text);
@@ -50,8 +46,7 @@ void bare_reason_keep(enum bare_reason_kind kind, const char *text)
     kept.crc = sum();
 }
 
-const char *bare_reason_name(enum bare_reason_kind kind)
-{
+const char *bare_reason_name(enum bare_reason_kind kind) {
     static const char *const names[] = {[BARE_POWER_ON] = "power on",
                                         [BARE_OUTSIDE] = "reset from outside",
                                         [BARE_RUN_OVER] = "the run is over",

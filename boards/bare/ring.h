@@ -29,24 +29,19 @@ struct bare_ring {
 
 /* In an array whose size is a power of two. */
 #define BARE_RING(array)                                                       \
-    {                                                                          \
-        array, sizeof(array) - 1, 0, 0                                         \
-    }
+    { array, sizeof(array) - 1, 0, 0 }
 
-static inline uint32_t bare_ring_held(const struct bare_ring *ring)
-{
+static inline uint32_t bare_ring_held(const struct bare_ring *ring) {
     return ring->put - ring->taken;
 }
 
-static inline uint32_t bare_ring_room(const struct bare_ring *ring)
-{
+static inline uint32_t bare_ring_room(const struct bare_ring *ring) {
     return ring->mask + 1 - bare_ring_held(ring);
 }
 
 /* A byte is there before the count says so: handler and program are of one
  * processor, so that it is the compiler alone that must keep the order. */
-BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte)
-{
+BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte) {
     uint32_t put = ring->put;
     if (put - ring->taken > ring->mask) {
         return false;
@@ -57,8 +52,7 @@ BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte)
     return true;
 }
 
-BARE_INLINE bool bare_ring_take(struct bare_ring *ring, uint8_t *byte)
-{
+BARE_INLINE bool bare_ring_take(struct bare_ring *ring, uint8_t *byte) {
     uint32_t taken = ring->taken;
     if (ring->put == taken) {
         return false;

@@ -19,8 +19,7 @@ extern uint8_t bare_tables[], bare_tables_end[]; /* .data and .bss */
 extern uint8_t bare_arena[], bare_arena_end[];
 
 /* From one of these to its end. */
-static inline size_t bare_bytes(const void *from, const void *to)
-{
+static inline size_t bare_bytes(const void *from, const void *to) {
     return (uintptr_t)to - (uintptr_t)from;
 }
 

@@ -5,8 +5,7 @@
 #include "bare.h"
 #include "console.h"
 
-void bare_shell_init(struct bare_shell *shell, struct link_pipe beneath)
-{
+void bare_shell_init(struct bare_shell *shell, struct link_pipe beneath) {
     memset(shell, 0, sizeof *shell);
     shell->beneath = beneath;
 }
@@ -14,27 +13,23 @@ void bare_shell_init(struct bare_shell *shell, struct link_pipe beneath)
 /* --- what comes ------------------------------------------------------------
  */
 
-static bool is_letter(uint8_t byte)
-{
+static bool is_letter(uint8_t byte) {
     uint8_t small = byte | 0x20;
     return small >= 'a' && small <= 'z';
 }
 
-static bool is_end(uint8_t byte)
-{
+static bool is_end(uint8_t byte) {
     return byte == '\r' || byte == '\n';
 }
 
 /* No line: the link has it. */
-static void let_go(struct bare_shell *s)
-{
+static void let_go(struct bare_shell *s) {
     memcpy(s->passed + s->passed_size, s->held, s->held_size);
     s->passed_size += s->held_size;
     s->held_size = 0;
 }
 
-static void end_line(struct bare_shell *s, unsigned size)
-{
+static void end_line(struct bare_shell *s, unsigned size) {
     if (s->lines - s->lines_taken < BARE_SHELL_LINES) {
         char *line = s->line[s->lines++ % BARE_SHELL_LINES];
         memcpy(line, s->held, size);
@@ -47,8 +42,7 @@ static void end_line(struct bare_shell *s, unsigned size)
 
 /* Whether what is held is still the beginning of a line.  An end alone may be a
  * frame's first byte: what follows tells, or that nothing does. */
-static bool may_be_line(const struct bare_shell *s)
-{
+static bool may_be_line(const struct bare_shell *s) {
     uint8_t last = s->held[s->held_size - 1];
     if (s->held_size == 1) {
         return is_letter(last) || is_end(last);
@@ -57,13 +51,11 @@ static bool may_be_line(const struct bare_shell *s)
                              : last >= ' ' && last <= '~';
 }
 
-static void rub_out(struct bare_shell *s)
-{
+static void rub_out(struct bare_shell *s) {
     s->held_size -= s->held_size > 2; /* two letters tell that it is a line */
 }
 
-static void hear(struct bare_shell *s, uint8_t byte)
-{
+static void hear(struct bare_shell *s, uint8_t byte) {
     enum { BACKSPACE = '\b', DELETE = 0x7f };
     if (s->at == BARE_SHELL_FRAME) {
         s->passed[s->passed_size++] = byte;
@@ -100,8 +92,7 @@ static void hear(struct bare_shell *s, uint8_t byte)
 }
 
 /* Reads some, where the link has taken what was read before: how many bytes. */
-static int read_some(struct bare_shell *s)
-{
+static int read_some(struct bare_shell *s) {
     uint8_t bytes[BARE_SHELL_BYTES];
     int got = s->beneath.receive(s->beneath.context, bytes, sizeof bytes);
     s->passed_size = s->passed_taken = 0;
@@ -114,8 +105,7 @@ static int read_some(struct bare_shell *s)
     return got;
 }
 
-static int receive(void *context, uint8_t *bytes, size_t size)
-{
+static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bare_shell *s = context;
     size_t given = 0;
     while (given < size) {
@@ -131,8 +121,7 @@ static int receive(void *context, uint8_t *bytes, size_t size)
     return (int)given;
 }
 
-void bare_shell_alone(struct bare_shell *shell)
-{
+void bare_shell_alone(struct bare_shell *shell) {
     while (read_some(shell) > 0) {
     }
     shell->passed_size = shell->passed_taken = 0;
@@ -142,8 +131,7 @@ void bare_shell_alone(struct bare_shell *shell)
 /* --- what goes -------------------------------------------------------------
  */
 
-static void say_on(struct bare_shell *s)
-{
+static void say_on(struct bare_shell *s) {
     size_t left = s->said_size - s->said_sent;
     if (left > 0 && !s->within) {
         int taken = s->beneath.send(
@@ -155,8 +143,7 @@ static void say_on(struct bare_shell *s)
     }
 }
 
-static int send(void *context, const uint8_t *bytes, size_t size)
-{
+static int send(void *context, const uint8_t *bytes, size_t size) {
     struct bare_shell *s = context;
     int taken = (int)size;
     say_on(s);
@@ -172,14 +159,12 @@ static int send(void *context, const uint8_t *bytes, size_t size)
     return taken;
 }
 
-struct link_pipe bare_shell_pipe(struct bare_shell *shell)
-{
+struct link_pipe bare_shell_pipe(struct bare_shell *shell) {
     return (struct link_pipe){shell, send, receive};
 }
 
 bool bare_shell_line(struct bare_shell *shell, char line[BARE_SHELL_LINE + 1],
-                     uint64_t now_us)
-{
+                     uint64_t now_us) {
     struct bare_shell *s = shell;
     bool silent = now_us - s->heard_us >= BARE_SHELL_SILENCE_US;
     if (silent && s->held_size == 1 && is_end(s->held[0])) {
@@ -199,8 +184,7 @@ bool bare_shell_line(struct bare_shell *shell, char line[BARE_SHELL_LINE + 1],
     return true;
 }
 
-void bare_shell_say(struct bare_shell *shell, const char *text)
-{
+void bare_shell_say(struct bare_shell *shell, const char *text) {
     struct bare_shell *s = shell;
     unsigned at = s->said_size;
     if (at + 3 > BARE_SHELL_TEXT) {

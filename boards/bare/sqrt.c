@@ -7,8 +7,7 @@ double sqrt(double x);
 
 enum { FRACTION = 52, BIAS = 1023, DIGITS = 54 /* 53, and one to round by */ };
 
-static double from_bits(uint64_t bits)
-{
+static double from_bits(uint64_t bits) {
     double x;
     memcpy(&x, &bits, sizeof x);
     return x;
@@ -16,8 +15,7 @@ static double from_bits(uint64_t bits)
 
 /* DIGITS digits of the root of m 2^DIGITS, m in [2^52, 2^54), rounded to one
  * less.  The rest is never half a digit: a square has twice the digits. */
-static uint64_t root(uint64_t m)
-{
+static uint64_t root(uint64_t m) {
     uint64_t digits = 0, rest = 0;
     for (int i = 0; i < DIGITS; i++) {
         rest = rest << 2 | (m >> (DIGITS - 2) & 3);
@@ -32,8 +30,7 @@ static uint64_t root(uint64_t m)
     return (digits + 1) >> 1;
 }
 
-double sqrt(double x)
-{
+double sqrt(double x) {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     int exponent = (int)(bits >> FRACTION & 2047);

@@ -8,8 +8,7 @@ enum { FLUSH_LOOK_US = 1000 };
 
 struct bare_uart bare_uart[BARE_UARTS_MAX];
 
-void bare_uarts_init(void)
-{
+void bare_uarts_init(void) {
     for (unsigned i = 0; i < BARE_UARTS_MAX; i++) {
         struct bare_uart *uart = &bare_uart[i];
         uart->receive = (struct bare_ring)BARE_RING(uart->received);
@@ -19,8 +18,7 @@ void bare_uarts_init(void)
     }
 }
 
-bool bare_uart_ready(const struct bare_uart *uart)
-{
+bool bare_uart_ready(const struct bare_uart *uart) {
     return !uart->unused &&
            (uart->ends != uart->ends_taken ||
             bare_ring_held(&uart->receive) >= BARE_RECEIVE_BYTES / 4 ||
@@ -28,8 +26,7 @@ bool bare_uart_ready(const struct bare_uart *uart)
              bare_ring_room(&uart->send) >= BARE_SEND_BYTES / 2));
 }
 
-static int send(void *context, const uint8_t *bytes, size_t size)
-{
+static int send(void *context, const uint8_t *bytes, size_t size) {
     struct bare_uart *uart = context;
     size_t taken = bare_ring_write(&uart->send, bytes, size);
     uart->starved = taken < size;
@@ -37,8 +34,7 @@ static int send(void *context, const uint8_t *bytes, size_t size)
     return (int)taken;
 }
 
-static int receive(void *context, uint8_t *bytes, size_t size)
-{
+static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bare_uart *uart = context;
     uint32_t ends = uart->ends;
     size_t held = bare_ring_held(&uart->receive);
@@ -48,18 +44,15 @@ static int receive(void *context, uint8_t *bytes, size_t size)
     return (int)bare_ring_read(&uart->receive, bytes, size);
 }
 
-struct link_pipe bare_uart_pipe(unsigned uart)
-{
+struct link_pipe bare_uart_pipe(unsigned uart) {
     return (struct link_pipe){&bare_uart[uart], send, receive};
 }
 
-void bare_uart_leave(unsigned uart)
-{
+void bare_uart_leave(unsigned uart) {
     bare_uart[uart].unused = true;
 }
 
-uint32_t bare_uarts_overruns(void)
-{
+uint32_t bare_uarts_overruns(void) {
     uint32_t sum = 0;
     for (unsigned i = 0; i < BARE_UARTS_MAX; i++) {
         sum += bare_uart[i].unused ? 0 : bare_uart[i].overruns;
@@ -67,8 +60,7 @@ uint32_t bare_uarts_overruns(void)
     return sum;
 }
 
-static bool all_sent(void)
-{
+static bool all_sent(void) {
     for (unsigned i = 0; i <= board_facts.ports; i++) {
         if (bare_ring_held(&bare_uart[i].send) > 0) {
             return false;
@@ -77,8 +69,7 @@ static bool all_sent(void)
     return true;
 }
 
-void bare_uarts_flush(uint64_t limit_us)
-{
+void bare_uarts_flush(uint64_t limit_us) {
     uint64_t until_us = board_now_us() + limit_us;
     while (!all_sent() && board_now_us() < until_us) {
         uint32_t before = board_lock();

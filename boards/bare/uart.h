@@ -42,16 +42,14 @@ extern struct bare_uart bare_uart[BARE_UARTS_MAX];
 void bare_uarts_init(void);
 
 /* For a board's handlers. */
-BARE_INLINE void bare_uart_put(struct bare_uart *uart, uint8_t byte)
-{
+BARE_INLINE void bare_uart_put(struct bare_uart *uart, uint8_t byte) {
     if (!bare_ring_put(&uart->receive, byte)) {
         uart->overruns++;
     }
     uart->ends += byte == 0;
 }
 
-static inline bool bare_uart_heard(const struct bare_uart *uart)
-{
+static inline bool bare_uart_heard(const struct bare_uart *uart) {
     return bare_ring_held(&uart->receive) > 0;
 }
 

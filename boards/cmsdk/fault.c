@@ -18,16 +18,14 @@ enum { NO_FRAME = 1 << 4 | 1 << 5 | 1 << 12 | 1 << 13 };
 enum { FRAME_LR = 5, FRAME_PC = 6, FRAME_XPSR = 7, FRAME_WORDS = 8 };
 
 /* What a UART has of its own is the end of a report, or of a farewell. */
-static void see_off(void)
-{
+static void see_off(void) {
     uint64_t begun_us = board_now_us();
     while (board_now_us() - begun_us <=
            HELD_BITS * 1000000u / board_facts.baud) {
     }
 }
 
-void board_restart(void)
-{
+void board_restart(void) {
     (void)board_lock();
     see_off();
     cortex_barrier();
@@ -37,16 +35,14 @@ void board_restart(void)
     }
 }
 
-static bool sound(const uint32_t *frame, uint32_t status)
-{
+static bool sound(const uint32_t *frame, uint32_t status) {
     return (status & NO_FRAME) == 0 && (uintptr_t)frame % 4 == 0 &&
            frame >= bare_node_stack &&
            frame + FRAME_WORDS <= bare_handler_stack_end;
 }
 
 static void tell_place(struct cube_text *text, uint32_t exception,
-                       uint32_t status, uint32_t address)
-{
+                       uint32_t status, uint32_t address) {
     bool known = (status & (MMAR_VALID | BFAR_VALID)) != 0;
     if (exception == NMI) {
         cube_text_put(text, "the program hung");
@@ -65,8 +61,7 @@ static void tell_place(struct cube_text *text, uint32_t exception,
 _Noreturn void cmsdk_fault(const uint32_t *frame, const uint32_t *saved,
                            uint32_t exc_return, uint32_t exception);
 _Noreturn void cmsdk_fault(const uint32_t *frame, const uint32_t *saved,
-                           uint32_t exc_return, uint32_t exception)
-{
+                           uint32_t exc_return, uint32_t exception) {
     static const uint32_t none[FRAME_WORDS];
     volatile uint32_t *scb = cmsdk_at(CORTEX_SCB);
     uint32_t status = scb[CFSR];

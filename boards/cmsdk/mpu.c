@@ -31,16 +31,14 @@ enum { FLASH = 0x1308002B }; /* 4 MB, not cached either */
  * 64 KB. */
 enum { IMAGES = 0x130B002B, LOADER = 0x060B001F };
 
-static void set(uint32_t number, struct region region)
-{
+static void set(uint32_t number, struct region region) {
     volatile uint32_t *mpu = cmsdk_at(CORTEX_MPU);
     mpu[RNR] = number;
     mpu[RBAR] = region.base;
     mpu[RASR] = region.attributes;
 }
 
-void cmsdk_mpu_start(void)
-{
+void cmsdk_mpu_start(void) {
     volatile uint32_t *mpu = cmsdk_at(CORTEX_MPU);
     bool loader = (uintptr_t)bare_code_room == board_facts.image_at;
     uint32_t n = 0;

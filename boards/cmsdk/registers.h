@@ -26,8 +26,7 @@ enum { CMSDK_HZ = 25000000 };
 #define CMSDK_HANDLER __attribute__((section(".text.handlers")))
 
 /* The register at an address. */
-static inline volatile uint32_t *cmsdk_at(uint32_t address)
-{
+static inline volatile uint32_t *cmsdk_at(uint32_t address) {
     /* NOLINTNEXTLINE(performance-no-int-to-ptr) */
     return (volatile uint32_t *)(uintptr_t)address;
 }

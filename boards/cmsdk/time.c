@@ -15,8 +15,7 @@ static struct {
 } seen;
 
 /* With interrupts away. */
-BARE_INLINE uint64_t look(void)
-{
+BARE_INLINE uint64_t look(void) {
     uint32_t now = *cmsdk_at(CMSDK_TIMER);
     seen.high += now < seen.last;
     seen.last = now;
@@ -25,21 +24,18 @@ BARE_INLINE uint64_t look(void)
 
 /* Each time that nothing else has woken the program. */
 CMSDK_HANDLER void cmsdk_tick(void);
-CMSDK_HANDLER void cmsdk_tick(void)
-{
+CMSDK_HANDLER void cmsdk_tick(void) {
     (void)look();
 }
 
-uint64_t board_now_us(void)
-{
+uint64_t board_now_us(void) {
     uint32_t before = board_lock();
     uint64_t now = look();
     board_unlock(before);
     return (now - seen.begun) / HZ_A_US;
 }
 
-static void tick_in(uint32_t us)
-{
+static void tick_in(uint32_t us) {
     volatile uint32_t *systick = cmsdk_at(CORTEX_SYSTICK);
     systick[1] = us * HZ_A_US - 1;
     systick[2] = 0;
@@ -49,15 +45,13 @@ static void tick_in(uint32_t us)
 /* A tick comes at the latest after TICK_US, always: an emulator may need it to
  * see that a byte has come.  The timer begins anew by itself, so a short wait
  * is not left there: ticks a microsecond apart would take all of the time. */
-void board_wait(uint64_t wait_us)
-{
+void board_wait(uint64_t wait_us) {
     tick_in(wait_us == 0 ? 1 : wait_us < TICK_US ? (uint32_t)wait_us : TICK_US);
     cortex_wait();
     tick_in(TICK_US);
 }
 
-void cmsdk_time_start(void)
-{
+void cmsdk_time_start(void) {
     seen.begun = seen.last = *cmsdk_at(CMSDK_TIMER);
     tick_in(TICK_US);
 }

@@ -21,8 +21,7 @@ static const uint8_t interrupt[BARE_UARTS_MAX] = {0, 2, 4, 18, 20};
 
 /* The mark is taken away before the bytes are, so that one which comes then
  * sets it again. */
-BARE_INLINE void receive(unsigned i)
-{
+BARE_INLINE void receive(unsigned i) {
     volatile uint32_t *uart = cmsdk_at(base[i]);
     uart[INT] = INT_RECEIVE;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[STATE] & RXFULL) != 0; n++) {
@@ -34,8 +33,7 @@ BARE_INLINE void receive(unsigned i)
     }
 }
 
-BARE_INLINE void send(unsigned i)
-{
+BARE_INLINE void send(unsigned i) {
     volatile uint32_t *uart = cmsdk_at(base[i]);
     uint8_t byte;
     uart[INT] = INT_SEND;
@@ -48,13 +46,11 @@ BARE_INLINE void send(unsigned i)
 
 #define HANDLERS(i)                                                            \
     CMSDK_HANDLER void cmsdk_uart##i##_receive(void);                          \
-    CMSDK_HANDLER void cmsdk_uart##i##_receive(void)                           \
-    {                                                                          \
+    CMSDK_HANDLER void cmsdk_uart##i##_receive(void) {                         \
         receive(i);                                                            \
     }                                                                          \
     CMSDK_HANDLER void cmsdk_uart##i##_send(void);                             \
-    CMSDK_HANDLER void cmsdk_uart##i##_send(void)                              \
-    {                                                                          \
+    CMSDK_HANDLER void cmsdk_uart##i##_send(void) {                            \
         send(i);                                                               \
     }
 
@@ -64,15 +60,13 @@ HANDLERS(2)
 HANDLERS(3)
 HANDLERS(4)
 
-void board_uart_send(unsigned i)
-{
+void board_uart_send(unsigned i) {
     uint32_t before = board_lock();
     send(i);
     board_unlock(before);
 }
 
-bool board_console_put(uint8_t byte)
-{
+bool board_console_put(uint8_t byte) {
     volatile uint32_t *uart = cmsdk_at(base[0]);
     uint64_t begun_us = board_now_us();
     while ((uart[STATE] & TXFULL) != 0) {
@@ -86,8 +80,7 @@ bool board_console_put(uint8_t byte)
 
 /* A byte that came before the interrupt was on would never call its handler:
  * it is taken by the first call of all. */
-void cmsdk_uarts_start(void)
-{
+void cmsdk_uarts_start(void) {
     cmsdk_at(CMSDK_PORT_0)[FUNCTION_SET] = SHIELD_0;
     cmsdk_at(CMSDK_PORT_1)[FUNCTION_SET] = XBEE | SHIELD_1;
     for (unsigned i = 0; i <= board_facts.ports; i++) {

@@ -8,8 +8,7 @@ enum { INTERRUPT_AND_RESET = 3 };
 
 #define UNLOCK UINT32_C(0x1ACCE551)
 
-void board_guard(uint32_t period_us)
-{
+void board_guard(uint32_t period_us) {
     volatile uint32_t *watchdog = cmsdk_at(CMSDK_WATCHDOG);
     watchdog[LOCK] = UNLOCK;
     watchdog[LOAD] = period_us * (CMSDK_HZ / 1000000);
@@ -17,8 +16,7 @@ void board_guard(uint32_t period_us)
     watchdog[LOCK] = 0;
 }
 
-void board_feed(void)
-{
+void board_feed(void) {
     volatile uint32_t *watchdog = cmsdk_at(CMSDK_WATCHDOG);
     watchdog[LOCK] = UNLOCK;
     watchdog[INTCLR] = 1;

@@ -9,8 +9,7 @@
 /* A value may be as long as a path: what is wrong with it comes after it. */
 enum { LINE_BYTES = 1024, PART_BYTES = 400 };
 
-static void put(struct cube_text *line, const char *before, const char *words)
-{
+static void put(struct cube_text *line, const char *before, const char *words) {
     char part[PART_BYTES];
     struct cube_text printable = cube_text_in(part, sizeof part);
     if (words != NULL) {
@@ -20,8 +19,7 @@ static void put(struct cube_text *line, const char *before, const char *words)
     }
 }
 
-void fault_print(const struct linux_fault *fault)
-{
+void fault_print(const struct linux_fault *fault) {
     char text[LINE_BYTES];
     struct cube_text line = cube_text_in(text, sizeof text - 1);
     put(&line, "incode-node: ", fault->where);

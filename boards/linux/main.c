@@ -42,34 +42,29 @@ struct linux_board {
     char **again; /* arguments of the next start; NULL: there is none */
 };
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return process_clock_us(CLOCK_MONOTONIC);
 }
 
-static uint64_t busy_us(void *context)
-{
+static uint64_t busy_us(void *context) {
     (void)context;
     return process_clock_us(CLOCK_PROCESS_CPUTIME_ID);
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     struct linux_board *board = context;
     linux_wires_idle(board->wire, board->links_count, wait_us, board->awake_us);
 }
 
-static uint32_t refused(void *context)
-{
+static uint32_t refused(void *context) {
     const struct linux_board *board = context;
     return linux_wires_refused(board->wire, board->links_count);
 }
 
 /* A node that a user started begins anew, with an epoch of its own; there is no
  * loader in which it would stay. */
-static void reset(void *context, int status)
-{
+static void reset(void *context, int status) {
     const struct linux_board *board = context;
     if (board->again != NULL) {
         char *environment[] = {(char[]){LINUX_AGAIN "=1"}, NULL};
@@ -80,8 +75,7 @@ static void reset(void *context, int status)
 
 /* That others can read it, the host says, once. */
 static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES],
-                     struct linux_fault *fault)
-{
+                     struct linux_fault *fault) {
     enum key_file_state state = key_file_read(path, key);
     int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
     struct key_file_text text = key_file_text(state);
@@ -96,8 +90,7 @@ static bool read_key(const char *path, uint8_t key[SECURE_KEY_BYTES],
 static bool open_wires(struct linux_board *linux_board,
                        const struct linux_options *options,
                        struct secure_source *source, struct tcp_wire *net,
-                       struct linux_fault *fault)
-{
+                       struct linux_fault *fault) {
     struct linux_guard guard = {.source = source};
     if (options->key != NULL) {
         if (!read_key(options->key, linux_board->key, fault)) {
@@ -123,8 +116,7 @@ static bool open_wires(struct linux_board *linux_board,
 /* What the one who starts a node does otherwise. */
 static void start_alone(struct linux_options *options,
                         struct linux_board *linux_board,
-                        struct secure_source *source, char **argv)
-{
+                        struct secure_source *source, char **argv) {
     struct node_identity identity = {.epoch = 0};
     linux_board->again = argv;
     if (options->epoch == 0 && node_identity_epoch(&identity, source)) {
@@ -140,8 +132,7 @@ static void start_alone(struct linux_options *options,
 }
 
 /* Once: a greeting may be a stranger's, and the next one right. */
-static void tell_of_greeting(const struct learner *learner, bool *told)
-{
+static void tell_of_greeting(const struct learner *learner, bool *told) {
     const char *what = node_identity_doubt(learner);
     if (what != NULL && !*told) {
         fault_print(&(struct linux_fault){
@@ -156,8 +147,7 @@ static void tell_of_greeting(const struct learner *learner, bool *told)
  * greet only if they are asked.  A socket does, and is not asked, as a question
  * is no greeting to who decides by the first bytes whether to let one in. */
 static void ask_terminals(const struct linux_board *board,
-                          struct learner *learner)
-{
+                          struct learner *learner) {
     for (unsigned i = 0; i < board->links_count; i++) {
         if (board->wire[i].kind != LINUX_TERMINAL) {
             learner->pipes[i].send = NULL;
@@ -166,8 +156,8 @@ static void ask_terminals(const struct linux_board *board,
 }
 
 /* Waits until a neighbour has said who this node is. */
-static void learn(const struct node_board *board, struct linux_options *options)
-{
+static void learn(const struct node_board *board,
+                  struct linux_options *options) {
     static struct learner learner;
     struct linux_board *links = board->context;
     struct node_identity identity = {.self = 0};
@@ -186,15 +176,13 @@ static void learn(const struct node_board *board, struct linux_options *options)
 
 /* For those who call from now on: which wires these are. */
 static void name_wires(struct linux_board *board,
-                       const struct linux_options *options)
-{
+                       const struct linux_options *options) {
     struct cube_config cube = {.self = (uint16_t)options->node,
                                .dimension = (uint8_t)options->dimension};
     linux_wires_name(board->wire, board->links_count, &cube);
 }
 
-static struct node_identity identity_of(const struct linux_options *options)
-{
+static struct node_identity identity_of(const struct linux_options *options) {
     struct node_identity id;
     memset(&id, 0, sizeof id);
     id.self = (uint16_t)options->node;
@@ -208,8 +196,7 @@ static struct node_identity identity_of(const struct linux_options *options)
     return id;
 }
 
-static void fill_in(struct node_board *board, struct linux_board *linux_board)
-{
+static void fill_in(struct node_board *board, struct linux_board *linux_board) {
     for (unsigned i = 0; i < linux_board->links_count; i++) {
         board->pipes[i] = linux_wire_pipe(&linux_board->wire[i]);
     }
@@ -224,8 +211,7 @@ static void fill_in(struct node_board *board, struct linux_board *linux_board)
 /* The arena, and at its end the wires' state; NULL, or what is wrong. */
 static const char *take_memory(struct node_board *board,
                                const struct linux_options *options,
-                               struct tcp_wire **net)
-{
+                               struct tcp_wire **net) {
     size_t wires = options->wires_count * sizeof **net;
     size_t memory = (size_t)options->memory, stack = (size_t)options->stack;
     size_t fixed = process_static_bytes() + stack;
@@ -248,16 +234,14 @@ static const char *take_memory(struct node_board *board,
     return NULL;
 }
 
-static int complain(struct linux_fault fault, int status)
-{
+static int complain(struct linux_fault fault, int status) {
     fault_print(&fault);
     return status;
 }
 
 /* 0, or the status to end with. */
 static int prepare(char **argv, struct linux_options *options,
-                   struct linux_board *linux_board, struct node_board *board)
-{
+                   struct linux_board *linux_board, struct node_board *board) {
     struct linux_fault fault = {0};
     struct tcp_wire *net = NULL;
     if (!linux_options_read(argv + 1, options, &fault)) {
@@ -292,8 +276,7 @@ static int prepare(char **argv, struct linux_options *options,
     return 0;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     static struct linux_options options = {
         .node = LINUX_UNNAMED, .stack = 65536, .memory = 4u << 20};
     static struct linux_board linux_board;

@@ -57,8 +57,7 @@ static const char help[] =
 static const char no_such[] = "no such argument";
 static const char see_help[] = "see incode-node --help";
 
-bool linux_options_answer(const char *argument)
-{
+bool linux_options_answer(const char *argument) {
     static const char version[] = "incode-node " NODE_VERSION "\n";
     if (strcmp(argument, "--help") == 0 || strcmp(argument, "-h") == 0 ||
         strcmp(argument, "help") == 0) {
@@ -72,8 +71,7 @@ bool linux_options_answer(const char *argument)
     return false;
 }
 
-static bool read_number(const char **text, uint64_t *value)
-{
+static bool read_number(const char **text, uint64_t *value) {
     const char *at = *text;
     *value = 0;
     while (*at >= '0' && *at <= '9' && *value < UINT64_MAX / 100) {
@@ -84,8 +82,7 @@ static bool read_number(const char **text, uint64_t *value)
     return good;
 }
 
-static const char *read_links(const char *text, struct linux_options *options)
-{
+static const char *read_links(const char *text, struct linux_options *options) {
     uint64_t fd;
     while (*text != '\0') {
         if (options->links_count == CUBE_LINKS_MAX ||
@@ -99,8 +96,7 @@ static const char *read_links(const char *text, struct linux_options *options)
     return NULL;
 }
 
-static const char *read_wire(const char *text, struct linux_options *options)
-{
+static const char *read_wire(const char *text, struct linux_options *options) {
     const char *at = text;
     uint64_t link;
     if (!read_number(&at, &link) || *at != '=') {
@@ -118,8 +114,7 @@ static const char *read_wire(const char *text, struct linux_options *options)
 }
 
 static const char *read_insecure(const char *text,
-                                 struct linux_options *options)
-{
+                                 struct linux_options *options) {
     uint64_t link;
     while (*text != '\0') {
         if (!read_number(&text, &link) || link >= CUBE_LINKS_MAX ||
@@ -133,16 +128,14 @@ static const char *read_insecure(const char *text,
 }
 
 /* Whether an argument stands alone: --insecure without links. */
-static bool is_alone(const char *name, const char *next)
-{
+static bool is_alone(const char *name, const char *next) {
     return strcmp(name, "--insecure") == 0 &&
            (next == NULL || strncmp(next, "--", 2) == 0);
 }
 
 /* An argument and its value; what is wrong with it, or NULL. */
 static const char *read_one(const char *name, const char *text,
-                            struct linux_options *options)
-{
+                            struct linux_options *options) {
     const struct {
         const char *name;
         uint64_t *value, most;
@@ -186,8 +179,7 @@ static const char *read_one(const char *name, const char *text,
 }
 
 /* Every link has a wire, and there are no others. */
-static bool wires_fit(const struct linux_options *options)
-{
+static bool wires_fit(const struct linux_options *options) {
     unsigned links = (unsigned)options->dimension +
                      (options->node == 0 || options->host_port != 0 ||
                               options->node < options->host_ports
@@ -212,8 +204,7 @@ static bool wires_fit(const struct linux_options *options)
 
 /* Whether every link that --insecure names goes over TCP, and one at least
  * where it names none. */
-static bool insecure_fits(const struct linux_options *options)
-{
+static bool insecure_fits(const struct linux_options *options) {
     uint32_t net = 0, named = options->insecure;
     for (unsigned i = 0; i < CUBE_LINKS_MAX; i++) {
         const char *wire = options->wire[i];
@@ -226,8 +217,7 @@ static bool insecure_fits(const struct linux_options *options)
 }
 
 bool linux_options_read(char **argv, struct linux_options *options,
-                        struct linux_fault *fault)
-{
+                        struct linux_fault *fault) {
     memset(fault, 0, sizeof *fault);
     if (argv[0] == NULL) {
         fault->where = "arguments";

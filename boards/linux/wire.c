@@ -13,8 +13,7 @@
 
 enum { LOOK_US = 500000 };
 
-void linux_wire_inherit(struct linux_wire *wire, int fd)
-{
+void linux_wire_inherit(struct linux_wire *wire, int fd) {
     memset(wire, 0, sizeof *wire);
     wire->kind = isatty(fd) == 1 ? LINUX_TERMINAL : LINUX_SOCKET;
     if (wire->kind == LINUX_TERMINAL) {
@@ -28,8 +27,7 @@ void linux_wire_inherit(struct linux_wire *wire, int fd)
 
 static bool open_socket(struct linux_wire *wire,
                         const struct tcp_wire_config *config,
-                        struct linux_fault *fault)
-{
+                        struct linux_fault *fault) {
     wire->kind = LINUX_NET;
     if (tcp_wire_open(wire->net, config) == 0) {
         return true;
@@ -48,8 +46,8 @@ static bool open_socket(struct linux_wire *wire,
 
 /* The user who must do without a key is told what that means. */
 static bool guard_net(const struct linux_guard *guard,
-                      struct tcp_wire_config *config, struct linux_fault *fault)
-{
+                      struct tcp_wire_config *config,
+                      struct linux_fault *fault) {
     config->insecure = guard->insecure;
     config->key = guard->insecure ? NULL : guard->key;
     config->suite = config->key == NULL ? NULL : &secure_sodium;
@@ -72,8 +70,8 @@ static bool guard_net(const struct linux_guard *guard,
 }
 
 static bool open_net(struct linux_wire *wire, const char *address, bool listens,
-                     const struct linux_guard *guard, struct linux_fault *fault)
-{
+                     const struct linux_guard *guard,
+                     struct linux_fault *fault) {
     struct tcp_wire_config config = {.listens = listens, .ends = &wire->ends};
     if (tcp_address_parse(&config.address, address) != 0) {
         fault->what = "not an address in numbers with a port";
@@ -85,8 +83,7 @@ static bool open_net(struct linux_wire *wire, const char *address, bool listens,
 }
 
 static bool open_path(struct linux_wire *wire, const char *path, bool listens,
-                      struct linux_fault *fault)
-{
+                      struct linux_fault *fault) {
     struct tcp_wire_config config = {.listens = listens};
     if (tcp_address_set_path(&config.address, path) != 0) {
         fault->what = "not a path of 1 to 107 bytes";
@@ -97,8 +94,7 @@ static bool open_path(struct linux_wire *wire, const char *path, bool listens,
 }
 
 /* A device that is not there, or vanished, is looked for from time to time. */
-static void recover(void *context)
-{
+static void recover(void *context) {
     struct linux_wire *wire = context;
     uint64_t now_us = process_clock_us(CLOCK_MONOTONIC);
     serial_close(wire->serial.fd);
@@ -117,8 +113,7 @@ static void recover(void *context)
 }
 
 /* From the end, as a device's name may have colons of its own. */
-static bool read_serial(struct linux_wire *wire, const char *text)
-{
+static bool read_serial(struct linux_wire *wire, const char *text) {
     static const char flow[] = ":rtscts";
     size_t size = strlen(text);
     wire->rts_cts =
@@ -140,8 +135,7 @@ static bool read_serial(struct linux_wire *wire, const char *text)
 }
 
 static bool open_serial(struct linux_wire *wire, const char *text,
-                        struct linux_fault *fault)
-{
+                        struct linux_fault *fault) {
     if (!read_serial(wire, text)) {
         fault->what = "not a device and its rate";
         fault->next = "write serial:/dev/ttyS0:115200 or "
@@ -163,16 +157,14 @@ static bool open_serial(struct linux_wire *wire, const char *text,
 }
 
 /* What is behind a word that the text begins with; NULL: it does not. */
-static const char *behind(const char *text, const char *word)
-{
+static const char *behind(const char *text, const char *word) {
     size_t size = strlen(word);
     return strncmp(text, word, size) == 0 ? text + size : NULL;
 }
 
 bool linux_wire_open(struct linux_wire *wire, const char *text,
                      const struct linux_guard *guard, struct tcp_wire *net,
-                     struct linux_fault *fault)
-{
+                     struct linux_fault *fault) {
     const char *at;
     memset(wire, 0, sizeof *wire);
     wire->net = net;
@@ -201,8 +193,7 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
 }
 
 void linux_wires_name(struct linux_wire *wires, unsigned count,
-                      const struct cube_config *cube)
-{
+                      const struct cube_config *cube) {
     for (unsigned d = 0; d < count; d++) {
         wires[d].ends.self = (struct link_end){cube->self, (uint8_t)d};
         wires[d].ends.peer = cube_peer_of(cube, cube->self, d);
@@ -213,8 +204,7 @@ static const struct linux_wire *ending;
 static unsigned ending_count;
 
 /* What is called here may be called in a handler. */
-static void end(int signal_number)
-{
+static void end(int signal_number) {
     for (unsigned i = 0; i < ending_count; i++) {
         if (ending[i].kind == LINUX_NET) {
             tcp_wire_close(ending[i].net);
@@ -223,8 +213,7 @@ static void end(int signal_number)
     (void)raise(signal_number);
 }
 
-void linux_wires_end_with(const struct linux_wire *wires, unsigned count)
-{
+void linux_wires_end_with(const struct linux_wire *wires, unsigned count) {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     struct sigaction action = {.sa_handler = end,
                                .sa_flags = (int)SA_RESETHAND};
@@ -235,16 +224,14 @@ void linux_wires_end_with(const struct linux_wire *wires, unsigned count)
     }
 }
 
-struct link_pipe linux_wire_pipe(struct linux_wire *wire)
-{
+struct link_pipe linux_wire_pipe(struct linux_wire *wire) {
     return wire->kind == LINUX_TERMINAL ? serial_link_pipe(&wire->serial)
            : wire->kind == LINUX_NET    ? tcp_wire_pipe(wire->net)
                                         : tcp_link_pipe(&wire->tcp);
 }
 
 /* Adds what to wait for: the number of entries. */
-static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds)
-{
+static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds) {
     if (wire->kind == LINUX_NET) {
         return tcp_wire_events(wire->net, fds);
     }
@@ -256,8 +243,7 @@ static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds)
 }
 
 static void hear(struct linux_wire *wire, const struct pollfd *fds,
-                 unsigned count)
-{
+                 unsigned count) {
     if (wire->kind == LINUX_NET) {
         tcp_wire_heard(wire->net, fds, count);
     } else if (wire->kind == LINUX_SOCKET && count > 0) {
@@ -267,8 +253,7 @@ static void hear(struct linux_wire *wire, const struct pollfd *fds,
 
 /* Once, and of another key at the end that calls: whoever calls the other may
  * be a stranger. */
-static void tell_of_key(struct linux_wire *wire)
-{
+static void tell_of_key(struct linux_wire *wire) {
     bool calls = wire->kind == LINUX_NET && !wire->net->config.listens;
     bool lacks_key = wire->kind == LINUX_NET && wire->net->lone_key &&
                      wire->net->config.key == NULL;
@@ -293,8 +278,7 @@ static void tell_of_key(struct linux_wire *wire)
     }
 }
 
-uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count)
-{
+uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count) {
     uint32_t refused = 0;
     for (unsigned i = 0; i < count; i++) {
         const struct tcp_wire *net = wires[i].net;
@@ -306,8 +290,7 @@ uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count)
 }
 
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
-                      uint64_t wait_us, uint64_t awake_us)
-{
+                      uint64_t wait_us, uint64_t awake_us) {
     struct pollfd fds[CUBE_LINKS_MAX * TCP_WIRE_FDS_MAX];
     unsigned first[CUBE_LINKS_MAX + 1], used = 0;
     for (unsigned i = 0; i < count; i++) {

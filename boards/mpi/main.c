@@ -41,8 +41,7 @@ struct mpi_board {
     uint64_t busy_us; /* before this cube */
 };
 
-static _Noreturn void give_up(unsigned node, const char *why)
-{
+static _Noreturn void give_up(unsigned node, const char *why) {
     (void)fprintf(stderr, "incode-node-mpi: node %u: %s\n", node, why);
     _exit(4);
 }
@@ -50,8 +49,7 @@ static _Noreturn void give_up(unsigned node, const char *why)
 /* what: in the host's order, a number that breaks its bound ("at most"). */
 static _Noreturn void refuse_order(unsigned node, const char *what,
                                    unsigned long long is, const char *bound,
-                                   unsigned long long limit)
-{
+                                   unsigned long long limit) {
     char why[160];
     (void)snprintf(why, sizeof why,
                    "the host's order: %s %llu, expected %s %llu; are all "
@@ -61,53 +59,45 @@ static _Noreturn void refuse_order(unsigned node, const char *what,
 }
 
 /* Open MPI ends all ranks when it has lost one. */
-static void stay_a_moment(int signal)
-{
+static void stay_a_moment(int signal) {
     struct timespec wait = {0, STAY_US * 1000L};
     (void)signal;
     (void)nanosleep(&wait, NULL);
     _exit(143);
 }
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return process_clock_us(CLOCK_MONOTONIC);
 }
 
-static uint64_t busy_us(void *context)
-{
+static uint64_t busy_us(void *context) {
     const struct mpi_board *b = context;
     return process_clock_us(CLOCK_PROCESS_CPUTIME_ID) - b->busy_us;
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     struct mpi_board *b = context;
     mpi_sleep(&b->place, b->pipes, b->links, &b->heard, wait_us);
 }
 
-static void reset(void *context, int status)
-{
+static void reset(void *context, int status) {
     (void)context;
     _exit(status);
 }
 
-static void listen_for_order(struct mpi_board *b)
-{
+static void listen_for_order(struct mpi_board *b) {
     MPI_Irecv(&b->next, sizeof b->next, MPI_BYTE, 0, MPI_TAG_ORDER,
               b->place.comm, &b->heard);
 }
 
-static bool heard(struct mpi_board *b)
-{
+static bool heard(struct mpi_board *b) {
     int flag = 0;
     MPI_Request_get_status(b->heard, &flag, MPI_STATUS_IGNORE);
     return flag != 0;
 }
 
-static struct mpi_order take_order(struct mpi_board *b)
-{
+static struct mpi_order take_order(struct mpi_board *b) {
     while (!heard(b)) {
         mpi_sleep(&b->place, NULL, 0, &b->heard, 1000000);
     }
@@ -119,8 +109,7 @@ static struct mpi_order take_order(struct mpi_board *b)
 
 /* The board's struct for this cube, with arena and pipes. */
 static void equip(struct mpi_board *b, const struct mpi_order *order,
-                  struct node_board *board)
-{
+                  struct node_board *board) {
     unsigned self = (unsigned)b->place.rank - 1;
     size_t fixed = process_static_bytes() + STACK_BYTES;
     memset(board, 0, sizeof *board);
@@ -162,8 +151,7 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
 }
 
 /* The node, until the host ends it, or drops the whole cube. */
-static void run(struct mpi_board *b, const struct node_board *board)
-{
+static void run(struct mpi_board *b, const struct node_board *board) {
     const char *why = NULL;
     struct node *node = node_start(board, &why);
     enum node_event event = NODE_BUSY;
@@ -190,8 +178,7 @@ static void run(struct mpi_board *b, const struct node_board *board)
 }
 
 /* One cube, from its beginning to its end. */
-static void take_part(struct mpi_board *b, const struct mpi_order *order)
-{
+static void take_part(struct mpi_board *b, const struct mpi_order *order) {
     static struct node_board board;
     bool mine = (unsigned)b->place.rank <= order->nodes;
     b->links = 0;
@@ -213,8 +200,7 @@ static void take_part(struct mpi_board *b, const struct mpi_order *order)
     }
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     static struct mpi_board board;
     struct sigaction action = {.sa_handler = stay_a_moment};
     prctl(PR_SET_PDEATHSIG, SIGKILL); /* gone with the launcher's daemon */

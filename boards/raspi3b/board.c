@@ -17,8 +17,7 @@ enum { AUX_PENDING = 1 << 29, PL011_PENDING = 1 << 25 };
 enum { SOURCE = 0x60 / 4, TICK_DUE = 1 << 1 }; /* behind RASPI3B_LOCAL */
 
 /* One device a call: another that waits calls it again. */
-RASPI3B_HANDLER void raspi3b_interrupt(void)
-{
+RASPI3B_HANDLER void raspi3b_interrupt(void) {
     volatile uint32_t *pending = raspi3b_at(RASPI3B_INTERRUPTS);
     if ((raspi3b_at(RASPI3B_LOCAL)[SOURCE] & TICK_DUE) != 0) {
         raspi3b_tick_off();
@@ -29,8 +28,7 @@ RASPI3B_HANDLER void raspi3b_interrupt(void)
     }
 }
 
-void board_start(void)
-{
+void board_start(void) {
     raspi3b_time_start();
     raspi3b_uarts_start();
 }
@@ -43,16 +41,14 @@ enum { HELD_BITS = 18 * 10 }; /* in a UART: 16 bytes, and that being sent */
 #define PASSWORD UINT32_C(0x5A000000)
 
 /* What a UART has of its own is the end of a report, or of a farewell. */
-static void see_off(void)
-{
+static void see_off(void) {
     uint64_t begun_us = board_now_us();
     while (board_now_us() - begun_us <=
            HELD_BITS * 1000000u / board_facts.baud) {
     }
 }
 
-void board_restart(void)
-{
+void board_restart(void) {
     volatile uint32_t *pm = raspi3b_at(RASPI3B_PM);
     (void)board_lock();
     see_off();

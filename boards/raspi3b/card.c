@@ -97,27 +97,23 @@ static struct {
 /* --- the controller --------------------------------------------------------
  */
 
-static uint32_t get(unsigned word)
-{
+static uint32_t get(unsigned word) {
     return raspi3b_at(RASPI3B_CARD)[word];
 }
 
-static void pass(uint64_t us)
-{
+static void pass(uint64_t us) {
     uint64_t begun_us = board_now_us();
     while (board_now_us() - begun_us <= us) {
     }
 }
 
-static void put(unsigned word, uint32_t value)
-{
+static void put(unsigned word, uint32_t value) {
     raspi3b_at(RASPI3B_CARD)[word] = value;
     pass(it.write_us);
 }
 
 /* Until one of these bits is set, or none of them. */
-static bool wait_for(unsigned word, uint32_t bits, bool set, uint64_t us)
-{
+static bool wait_for(unsigned word, uint32_t bits, bool set, uint64_t us) {
     uint64_t begun_us = board_now_us();
     while (((get(word) & bits) != 0) != set) {
         if (board_now_us() - begun_us > us) {
@@ -127,16 +123,14 @@ static bool wait_for(unsigned word, uint32_t bits, bool set, uint64_t us)
     return true;
 }
 
-static bool wait_for_event(uint32_t event, uint64_t us)
-{
+static bool wait_for_event(uint32_t event, uint64_t us) {
     bool came =
         wait_for(EVENTS, event | WRONG, true, us) && (get(EVENTS) & WRONG) == 0;
     put(EVENTS, came ? event : ALL_EVENTS);
     return came;
 }
 
-static bool set_clock(uint32_t divisor)
-{
+static bool set_clock(uint32_t divisor) {
     uint32_t clock =
         LONGEST_WAIT | CLOCK_INSIDE | (divisor & 0xFF) << 8 | divisor >> 8 << 6;
     put(CLOCK, LONGEST_WAIT);
@@ -149,16 +143,14 @@ static bool set_clock(uint32_t divisor)
 }
 
 /* What a command that failed has left. */
-static void clear_lines(void)
-{
+static void clear_lines(void) {
     put(CLOCK, get(CLOCK) | RESET_LINES);
     (void)wait_for(CLOCK, RESET_LINES, false, COMMAND_US);
     put(EVENTS, ALL_EVENTS);
 }
 
 /* *answer: of a short one. */
-static bool ask(uint32_t command, uint32_t argument, uint32_t *answer)
-{
+static bool ask(uint32_t command, uint32_t argument, uint32_t *answer) {
     uint32_t busy = BUSY_COMMAND;
     if ((command & SHORT_BUSY) == SHORT_BUSY || (command & WRITES) != 0) {
         busy |= BUSY_DATA;
@@ -182,15 +174,13 @@ static bool ask(uint32_t command, uint32_t argument, uint32_t *answer)
  */
 
 /* Its own command of that number. */
-static bool ask_own(uint32_t command, uint32_t argument, uint32_t *answer)
-{
+static bool ask_own(uint32_t command, uint32_t argument, uint32_t *answer) {
     return ask(commands.application, it.relative, answer) &&
            ask(command, argument, answer);
 }
 
 /* An old card knows nothing of the choice of voltages. */
-static bool wake(void)
-{
+static bool wake(void) {
     uint32_t answer = 0;
     uint64_t begun_us = board_now_us();
     bool young = ask(commands.choose, CHOICE, &answer);
@@ -208,8 +198,7 @@ static bool wake(void)
     return true;
 }
 
-static bool start(void)
-{
+static bool start(void) {
     uint32_t answer = 0;
     it.ready = false;
     it.relative = 0;
@@ -243,8 +232,7 @@ static bool start(void)
 }
 
 /* In words, the lowest byte first. */
-static void take(uint8_t *bytes)
-{
+static void take(uint8_t *bytes) {
     for (unsigned i = 0; i < BLOCK; i += 4) {
         uint32_t word = get(DATA);
         for (unsigned k = 0; k < 4; k++) {
@@ -253,8 +241,7 @@ static void take(uint8_t *bytes)
     }
 }
 
-static void give(const uint8_t *bytes)
-{
+static void give(const uint8_t *bytes) {
     for (unsigned i = 0; i < BLOCK; i += 4) {
         uint32_t word = 0;
         for (unsigned k = 0; k < 4; k++) {
@@ -265,8 +252,7 @@ static void give(const uint8_t *bytes)
 }
 
 /* One of both is NULL.  Of a write, the card has it when it is busy no more. */
-static bool move(uint32_t block, uint8_t *to, const uint8_t *from)
-{
+static bool move(uint32_t block, uint8_t *to, const uint8_t *from) {
     uint32_t answer = 0, command = to != NULL ? commands.read : commands.write;
     put(BLOCKS, 1u << 16 | BLOCK);
     if (!ask(command, it.large ? block : block * BLOCK, &answer)) {
@@ -288,8 +274,7 @@ static bool move(uint32_t block, uint8_t *to, const uint8_t *from)
 }
 
 /* A card that does not answer is started anew. */
-static bool try_to(uint32_t block, uint8_t *to, const uint8_t *from)
-{
+static bool try_to(uint32_t block, uint8_t *to, const uint8_t *from) {
     board_feed();
     for (unsigned i = 0; i < TRIES; i++) {
         if ((it.ready || start()) && move(block, to, from)) {
@@ -300,15 +285,13 @@ static bool try_to(uint32_t block, uint8_t *to, const uint8_t *from)
     return false;
 }
 
-static bool raspi3b_card_read(void *device, uint32_t block, uint8_t *bytes)
-{
+static bool raspi3b_card_read(void *device, uint32_t block, uint8_t *bytes) {
     (void)device;
     return try_to(block, bytes, NULL);
 }
 
 static bool raspi3b_card_write(void *device, uint32_t block,
-                               const uint8_t *bytes)
-{
+                               const uint8_t *bytes) {
     (void)device;
     return try_to(block, NULL, bytes);
 }

@@ -17,8 +17,7 @@ enum { FETCH = 0x21, ACCESS = 0x25 };
 enum { SYNCHRONOUS = 0, FAST = 2 };
 
 static void tell_place(struct cube_text *text,
-                       const struct raspi3b_frame *frame, unsigned vector)
-{
+                       const struct raspi3b_frame *frame, unsigned vector) {
     uint64_t class = frame->esr >> 26;
     if (vector % 4 == FAST) {
         cube_text_put(text, "the program hung");
@@ -34,8 +33,8 @@ static void tell_place(struct cube_text *text,
 
 _Noreturn void raspi3b_fault(const struct raspi3b_frame *frame,
                              unsigned vector);
-_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame, unsigned vector)
-{
+_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame,
+                             unsigned vector) {
     const uint64_t *x = frame->x;
     uint64_t sp = vector < 4 ? frame->sp_program : frame->sp_handler;
     struct bare_register registers[] = {

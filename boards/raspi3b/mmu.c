@@ -38,8 +38,7 @@ static uint64_t level2[ENTRIES] __attribute__((aligned(4096)));
 static uint64_t data_end[ENTRIES] __attribute__((aligned(4096)));
 
 /* Before the MMU is on. */
-void raspi3b_tables(void)
-{
+void raspi3b_tables(void) {
     const uint64_t data = CACHED | SHARED | USED | NEVER_RUN;
     const uint64_t device = DEVICE | USED | NEVER_RUN;
     bool image = (uintptr_t)bare_code == board_facts.image_at;

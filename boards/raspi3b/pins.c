@@ -6,23 +6,20 @@
 enum { PUD = 0x94 / 4, PUDCLK = 0x98 / 4 }; /* words behind RASPI3B_GPIO */
 enum { PULL_UP = 2, SETTLE_US = 10 };
 
-static void settle(void)
-{
+static void settle(void) {
     uint64_t until_us = board_now_us() + SETTLE_US;
     while (board_now_us() < until_us) {
     }
 }
 
 /* Three bits each, ten pins a word. */
-void raspi3b_pin(unsigned number, uint32_t function)
-{
+void raspi3b_pin(unsigned number, uint32_t function) {
     volatile uint32_t *select = &raspi3b_at(RASPI3B_GPIO)[number / 10];
     unsigned at = number % 10 * 3;
     *select = (*select & ~(UINT32_C(7) << at)) | function << at;
 }
 
-void raspi3b_pull_up(uint64_t pins)
-{
+void raspi3b_pull_up(uint64_t pins) {
     volatile uint32_t *gpio = raspi3b_at(RASPI3B_GPIO);
     gpio[PUD] = PULL_UP;
     settle();

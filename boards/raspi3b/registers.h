@@ -24,8 +24,7 @@
 /* What interrupts' handlers consist of: tests/firmware counts it. */
 #define RASPI3B_HANDLER __attribute__((section(".text.handlers")))
 
-static inline volatile uint32_t *raspi3b_at(uint32_t address)
-{
+static inline volatile uint32_t *raspi3b_at(uint32_t address) {
     /* NOLINTNEXTLINE(performance-no-int-to-ptr): that is where it is */
     return (volatile uint32_t *)(uintptr_t)address;
 }

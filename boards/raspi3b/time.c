@@ -14,26 +14,22 @@ static struct {
     uint32_t guard_us;
 } time;
 
-static uint64_t counts(uint64_t us)
-{
+static uint64_t counts(uint64_t us) {
     return us * raspi3b_hz() / US;
 }
 
-uint64_t board_now_us(void)
-{
+uint64_t board_now_us(void) {
     uint64_t hz = raspi3b_hz(), now = raspi3b_count() - time.begun;
     return now / hz * US + now % hz * US / hz;
 }
 
-void board_wait(uint64_t wait_us)
-{
+void board_wait(uint64_t wait_us) {
     raspi3b_tick_at(raspi3b_count() +
                     counts(wait_us < TICK_US ? wait_us : TICK_US));
     raspi3b_sleep();
 }
 
-void board_guard(uint32_t period_us)
-{
+void board_guard(uint32_t period_us) {
     time.guard_us = period_us;
     if (period_us == 0) {
         raspi3b_guard_off();
@@ -41,8 +37,7 @@ void board_guard(uint32_t period_us)
     board_feed();
 }
 
-void board_feed(void)
-{
+void board_feed(void) {
     if (time.guard_us != 0) {
         raspi3b_guard_at(raspi3b_count() + counts(time.guard_us));
     }
@@ -50,8 +45,7 @@ void board_feed(void)
 
 /* Timers may still be due from before a restart, which an emulator sees only
  * where they are set anew. */
-void raspi3b_time_start(void)
-{
+void raspi3b_time_start(void) {
     raspi3b_tick_at(UINT64_MAX);
     raspi3b_guard_at(UINT64_MAX);
     raspi3b_tick_off();

@@ -51,8 +51,7 @@ enum { CORE_HZ = 250000000 }; /* enable_uart=1 in config.txt holds it there */
 
 /* Bytes that come leave the interrupt when they are taken; it is never cleared,
  * as that would hide those that are left. */
-RASPI3B_HANDLER void raspi3b_pl011_receive(void)
-{
+RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[FR] & FR_NOTHING_CAME) == 0;
          n++) {
@@ -64,8 +63,7 @@ RASPI3B_HANDLER void raspi3b_pl011_receive(void)
 
 /* The interrupt comes when no more than 2 bytes are left; as long as there are
  * others to send, 4 are put at least, so that it comes again. */
-RASPI3B_HANDLER void raspi3b_pl011_send(void)
-{
+RASPI3B_HANDLER void raspi3b_pl011_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     uint8_t byte;
     uart[ICR] = INT_SEND;
@@ -76,8 +74,7 @@ RASPI3B_HANDLER void raspi3b_pl011_send(void)
     }
 }
 
-RASPI3B_HANDLER void raspi3b_mini_receive(void)
-{
+RASPI3B_HANDLER void raspi3b_mini_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint32_t state = LSR_CAME;
     for (int n = 0; n < BARE_BYTES_A_CALL && (state & LSR_CAME) != 0; n++) {
@@ -89,8 +86,7 @@ RASPI3B_HANDLER void raspi3b_mini_receive(void)
 
 /* Its interrupt comes as long as it has nothing to send: so it is asked for
  * while there is. */
-RASPI3B_HANDLER void raspi3b_mini_send(void)
-{
+RASPI3B_HANDLER void raspi3b_mini_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint8_t byte;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[LSR] & LSR_ROOM) != 0 &&
@@ -103,8 +99,7 @@ RASPI3B_HANDLER void raspi3b_mini_send(void)
 }
 
 /* One way a call: what can go calls again when nothing more comes. */
-RASPI3B_HANDLER void raspi3b_pl011(void)
-{
+RASPI3B_HANDLER void raspi3b_pl011(void) {
     if ((raspi3b_at(RASPI3B_PL011)[FR] & FR_NOTHING_CAME) == 0) {
         raspi3b_pl011_receive();
     } else {
@@ -113,8 +108,7 @@ RASPI3B_HANDLER void raspi3b_pl011(void)
 }
 
 /* The overrun's mark goes with the first look at the state. */
-RASPI3B_HANDLER void raspi3b_mini(void)
-{
+RASPI3B_HANDLER void raspi3b_mini(void) {
     uint32_t state = raspi3b_at(RASPI3B_AUX)[LSR];
     bare_uart[1].overruns += (state & LSR_OVERRUN) != 0;
     if ((state & LSR_CAME) != 0) {
@@ -124,8 +118,7 @@ RASPI3B_HANDLER void raspi3b_mini(void)
     }
 }
 
-void board_uart_send(unsigned uart)
-{
+void board_uart_send(unsigned uart) {
     uint32_t before = board_lock();
     if (uart == 0) {
         raspi3b_pl011_send();
@@ -135,8 +128,7 @@ void board_uart_send(unsigned uart)
     board_unlock(before);
 }
 
-bool board_console_put(uint8_t byte)
-{
+bool board_console_put(uint8_t byte) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     uint64_t begun_us = board_now_us();
     while ((uart[FR] & FR_NO_ROOM) != 0) {
@@ -149,8 +141,7 @@ bool board_console_put(uint8_t byte)
 }
 
 /* Inputs that lead nowhere are held high, as a silent wire is. */
-static void pins(void)
-{
+static void pins(void) {
     raspi3b_pin(14, RASPI3B_FUNCTION_0);
     raspi3b_pin(15, RASPI3B_FUNCTION_0);
     raspi3b_pin(32, RASPI3B_FUNCTION_5);
@@ -160,8 +151,7 @@ static void pins(void)
 
 /* What has called for an interrupt and is gone with the change of the buffers
  * would call for ever; what came behind it is taken, as it may not call. */
-static void pl011_start(void)
-{
+static void pl011_start(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     /* In 64ths, as the UART divides. */
     uint32_t divisor = (4 * PL011_HZ + board_facts.baud / 2) / board_facts.baud;
@@ -178,8 +168,7 @@ static void pl011_start(void)
     uart[CR] = ON_BOTH_WAYS;
 }
 
-static void mini_start(void)
-{
+static void mini_start(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uart[ENABLES] |= 1;
     uart[CNTL] = 0;
@@ -193,8 +182,7 @@ static void mini_start(void)
 
 enum { ENABLE_1 = 4, ENABLE_2 = 5 }; /* words behind RASPI3B_INTERRUPTS */
 
-void raspi3b_uarts_start(void)
-{
+void raspi3b_uarts_start(void) {
     pins();
     pl011_start();
     mini_start();

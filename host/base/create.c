@@ -10,13 +10,11 @@
 
 enum { SAFE = O_NOFOLLOW | O_CLOEXEC, PRIVATE = 0700, OTHERS = 0077 };
 
-int host_create(const char *path, mode_t mode)
-{
+int host_create(const char *path, mode_t mode) {
     return open(path, O_WRONLY | O_CREAT | O_EXCL | SAFE, mode);
 }
 
-FILE *host_create_over(const char *path)
-{
+FILE *host_create_over(const char *path) {
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | SAFE, 0666);
     FILE *file = fd < 0 ? NULL : fdopen(fd, "w");
     if (fd >= 0 && file == NULL) {
@@ -26,8 +24,7 @@ FILE *host_create_over(const char *path)
 }
 
 /* Why not to use the folder; NULL: it is this user's alone. */
-static const char *fault_of(int folder)
-{
+static const char *fault_of(int folder) {
     struct stat about;
     if (fstat(folder, &about) != 0) {
         return "cannot be examined; give another place";
@@ -40,8 +37,7 @@ static const char *fault_of(int folder)
                : NULL;
 }
 
-int host_folder_open(const char *path, struct host_error *error)
-{
+int host_folder_open(const char *path, struct host_error *error) {
     const int flags = O_RDONLY | O_DIRECTORY | SAFE;
     int folder =
         mkdir(path, PRIVATE) != 0 && errno != EEXIST ? -1 : open(path, flags);
@@ -60,8 +56,7 @@ int host_folder_open(const char *path, struct host_error *error)
     return folder;
 }
 
-int host_folder_open_all(const char *path, struct host_error *error)
-{
+int host_folder_open_all(const char *path, struct host_error *error) {
     char above[PATH_MAX];
     size_t length = strlen(path);
     if (length >= sizeof above) {
@@ -77,15 +72,13 @@ int host_folder_open_all(const char *path, struct host_error *error)
     return host_folder_open(path, error);
 }
 
-static bool is_own_file(int fd)
-{
+static bool is_own_file(int fd) {
     struct stat about;
     return fstat(fd, &about) == 0 && S_ISREG(about.st_mode) &&
            about.st_uid == geteuid() && about.st_nlink == 1;
 }
 
-int host_folder_file(int folder, const char *name, int flags)
-{
+int host_folder_file(int folder, const char *name, int flags) {
     /* Opening a pipe must not wait for a program at its other end. */
     int fd = openat(folder, name, flags | SAFE | O_NONBLOCK, 0600);
     if (fd >= 0 && !is_own_file(fd)) {

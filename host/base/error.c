@@ -5,8 +5,7 @@
 
 #include "text.h"
 
-int host_fail(struct host_error *error, int code, const char *format, ...)
-{
+int host_fail(struct host_error *error, int code, const char *format, ...) {
     if (error->code != 0) {
         return error->code;
     }
@@ -21,8 +20,7 @@ int host_fail(struct host_error *error, int code, const char *format, ...)
     return code;
 }
 
-int host_fail_memory(struct host_error *error, const char *what)
-{
+int host_fail_memory(struct host_error *error, const char *what) {
     return host_fail(error, HOST_BROKEN,
                      "host: no memory for %s; free some memory or take a "
                      "machine with more",

@@ -10,8 +10,7 @@
 static const size_t huge = (size_t)2 << 20;
 
 /* Address space, aligned to huge pages where it is large enough. */
-static void *reserve(size_t bytes)
-{
+static void *reserve(size_t bytes) {
     size_t extra = bytes >= 2 * huge ? huge : 0;
     char *space = mmap(NULL, bytes + extra, PROT_READ | PROT_WRITE,
                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
@@ -32,8 +31,7 @@ static void *reserve(size_t bytes)
     return space + skip;
 }
 
-void *host_map(size_t bytes)
-{
+void *host_map(size_t bytes) {
     bytes = bytes == 0 ? 1 : bytes;
     void *array = reserve(bytes);
     if (array != NULL) {
@@ -42,8 +40,7 @@ void *host_map(size_t bytes)
     return array;
 }
 
-void *host_remap(void *old, size_t old_bytes, size_t bytes)
-{
+void *host_remap(void *old, size_t old_bytes, size_t bytes) {
     if (old == NULL) {
         return host_map(bytes);
     }
@@ -72,8 +69,7 @@ void *host_remap(void *old, size_t old_bytes, size_t bytes)
     return array;
 }
 
-void host_unmap(void *array, size_t bytes)
-{
+void host_unmap(void *array, size_t bytes) {
     if (array != NULL) {
         (void)munmap(array, bytes == 0 ? 1 : bytes);
     }
@@ -81,8 +77,8 @@ void host_unmap(void *array, size_t bytes)
 
 /* The number behind `name` on a line of a file that begins with it, or of the
  * first line where it is ""; `without` where there is none. */
-static uint64_t number_in(const char *path, const char *name, uint64_t without)
-{
+static uint64_t number_in(const char *path, const char *name,
+                          uint64_t without) {
     char line[256], *end;
     uint64_t value = without;
     size_t n = strlen(name);
@@ -100,14 +96,12 @@ static uint64_t number_in(const char *path, const char *name, uint64_t without)
     return value;
 }
 
-static uint64_t status_bytes(const char *name)
-{
+static uint64_t status_bytes(const char *name) {
     uint64_t kib = number_in("/proc/self/status", name, 0);
     return kib * 1024;
 }
 
-uint64_t host_memory_peak(void)
-{
+uint64_t host_memory_peak(void) {
     uint64_t bytes = status_bytes("VmHWM:");
     struct rusage usage;
     if (bytes == 0 && getrusage(RUSAGE_SELF, &usage) == 0) {
@@ -118,14 +112,12 @@ uint64_t host_memory_peak(void)
 
 /* --- what is left --------------------------------------------------------- */
 
-static uint64_t least(uint64_t a, uint64_t b)
-{
+static uint64_t least(uint64_t a, uint64_t b) {
     return a < b ? a : b;
 }
 
 /* What a limit leaves, of which some is in use that can be had back. */
-static uint64_t left_of(uint64_t limit, uint64_t used, uint64_t reclaimable)
-{
+static uint64_t left_of(uint64_t limit, uint64_t used, uint64_t reclaimable) {
     used -= least(used, reclaimable);
     return limit - least(limit, used);
 }
@@ -135,8 +127,8 @@ struct controller {
     const char *folder, *limit, *used, *reclaimable;
 };
 
-static uint64_t left_in_group(const char *directory, const struct controller *c)
-{
+static uint64_t left_in_group(const char *directory,
+                              const struct controller *c) {
     char name[4096 + 64];
     (void)snprintf(name, sizeof name, "%s/%s", directory, c->limit);
     uint64_t limit = number_in(name, "", UINT64_MAX); /* may be "max" */
@@ -152,8 +144,7 @@ static uint64_t left_in_group(const char *directory, const struct controller *c)
 /* In the group `path` and all above it.  A container may see none but the
  * uppermost, which is its own. */
 static uint64_t left_above(const char *mount, const char *path,
-                           const struct controller *c)
-{
+                           const struct controller *c) {
     char directory[4096];
     uint64_t left = UINT64_MAX;
     size_t root = strlen(mount) + strlen(c->folder);
@@ -170,8 +161,7 @@ static uint64_t left_above(const char *mount, const char *path,
     return left;
 }
 
-uint64_t host_memory_in_groups(const char *list, const char *mount)
-{
+uint64_t host_memory_in_groups(const char *list, const char *mount) {
     static const struct controller first = {"/memory", "memory.limit_in_bytes",
                                             "memory.usage_in_bytes",
                                             "total_inactive_file "},
@@ -201,15 +191,13 @@ uint64_t host_memory_in_groups(const char *list, const char *mount)
 }
 
 /* used: the line of this process's status that the limit is of. */
-static uint64_t left_by(const struct rlimit *limit, const char *used)
-{
+static uint64_t left_by(const struct rlimit *limit, const char *used) {
     return limit->rlim_cur == RLIM_INFINITY
                ? UINT64_MAX
                : left_of(limit->rlim_cur, status_bytes(used), 0);
 }
 
-uint64_t host_memory_available(void)
-{
+uint64_t host_memory_available(void) {
     uint64_t kib = number_in("/proc/meminfo", "MemAvailable:", UINT64_MAX);
     uint64_t left = kib == UINT64_MAX ? kib : kib * 1024;
     struct rlimit limit;

@@ -12,8 +12,7 @@ enum { PART_BYTES = 16 };
 
 /* A number or a range up to `end`, which is a comma or the text's end. */
 static bool add_part(struct host_node_set *set, const char *text,
-                     const char *end, unsigned nodes)
-{
+                     const char *end, unsigned nodes) {
     char part[PART_BYTES], *dash;
     uint64_t first, last;
     if (end == text || end - text >= PART_BYTES) {
@@ -39,8 +38,7 @@ static bool add_part(struct host_node_set *set, const char *text,
 }
 
 int host_node_set_parse(struct host_node_set *set, const char *text,
-                        unsigned nodes, struct host_error *error)
-{
+                        unsigned nodes, struct host_error *error) {
     const char *at = text, *end;
     memset(set, 0, sizeof *set);
     if (strcmp(text, "all") == 0) {
@@ -61,16 +59,14 @@ int host_node_set_parse(struct host_node_set *set, const char *text,
     return 0;
 }
 
-void host_node_set_all(struct host_node_set *set, unsigned nodes)
-{
+void host_node_set_all(struct host_node_set *set, unsigned nodes) {
     memset(set, 0, sizeof *set);
     for (unsigned node = 0; node < nodes; node++) {
         host_node_set_add(set, node);
     }
 }
 
-unsigned host_node_set_count(const struct host_node_set *set)
-{
+unsigned host_node_set_count(const struct host_node_set *set) {
     unsigned count = 0;
     for (size_t i = 0; i < sizeof set->bits; i++) {
         count += (unsigned)__builtin_popcount(set->bits[i]);
@@ -79,8 +75,7 @@ unsigned host_node_set_count(const struct host_node_set *set)
 }
 
 void host_node_set_print(const struct host_node_set *set, char *text,
-                         size_t size)
-{
+                         size_t size) {
     size_t used = 0;
     unsigned left = host_node_set_count(set);
     snprintf(text, size, "%s", "");
@@ -106,8 +101,7 @@ void host_node_set_print(const struct host_node_set *set, char *text,
 }
 
 void host_node_set_name(const struct host_node_set *set, char *text,
-                        size_t size)
-{
+                        size_t size) {
     int used =
         snprintf(text, size, "node%s ", host_text_s(host_node_set_count(set)));
     assert((size_t)used < size);

@@ -23,19 +23,16 @@ struct host_node_set {
 };
 
 static inline bool host_node_set_has(const struct host_node_set *set,
-                                     unsigned node)
-{
+                                     unsigned node) {
     return (set->bits[node / 8] >> node % 8 & 1) != 0;
 }
 
-static inline void host_node_set_add(struct host_node_set *set, unsigned node)
-{
+static inline void host_node_set_add(struct host_node_set *set, unsigned node) {
     set->bits[node / 8] |= (uint8_t)(1u << node % 8);
 }
 
 static inline void host_node_set_remove(struct host_node_set *set,
-                                        unsigned node)
-{
+                                        unsigned node) {
     set->bits[node / 8] &= (uint8_t) ~(1u << node % 8);
 }
 

@@ -26,8 +26,7 @@ struct table {
 };
 
 static void fill(struct table *t, const struct argp_option *options,
-                 unsigned flags)
-{
+                 unsigned flags) {
     /* Those that argp answers, and ends the program. */
     static const char *const answered[] = {"help", "usage", "version"};
     size_t n = 0, letters = 0;
@@ -65,8 +64,7 @@ static void fill(struct table *t, const struct argp_option *options,
 
 /* The options that begin with `word`, as a list; how many there are. */
 static unsigned begin_with(const struct table *t, const char *word,
-                           char list[NAMES_MAX])
-{
+                           char list[NAMES_MAX]) {
     unsigned count = 0;
     size_t used = 0;
     list[0] = '\0';
@@ -79,14 +77,12 @@ static unsigned begin_with(const struct table *t, const char *word,
     return count;
 }
 
-static const char *name_of(const void *table, unsigned i)
-{
+static const char *name_of(const void *table, unsigned i) {
     return ((const struct table *)table)->name[i].name;
 }
 
 static int refuse_long(const struct table *t, const char *command,
-                       const char *word, bool known, struct host_error *error)
-{
+                       const char *word, bool known, struct host_error *error) {
     char list[NAMES_MAX], name[NAMES_MAX];
     snprintf(name, sizeof name, "%.*s", (int)strcspn(word + 2, "="), word + 2);
     const char *nearest = host_text_nearest(name, name_of, t);
@@ -111,8 +107,8 @@ static int refuse_long(const struct table *t, const char *command,
 
 /* Somebody may have written -nodes. */
 static int refuse_letter(const struct table *t, const char *command,
-                         const char *word, int letter, struct host_error *error)
-{
+                         const char *word, int letter,
+                         struct host_error *error) {
     const char *nearest =
         strlen(word) < 4 ? NULL : host_text_nearest(word + 1, name_of, t);
     return nearest == NULL
@@ -125,8 +121,8 @@ static int refuse_letter(const struct table *t, const char *command,
 }
 
 /* Where getopt has found none that it knows. */
-static int refuse(const struct table *t, char **argv, struct host_error *error)
-{
+static int refuse(const struct table *t, char **argv,
+                  struct host_error *error) {
     const char *word = argv[optind - 1], *next = argv[optind];
     if (optopt == 0 || optopt >= KEY_LONG || optopt == KEY_ANSWER) {
         return refuse_long(t, argv[0], word, optopt != 0, error);
@@ -141,8 +137,7 @@ static int refuse(const struct table *t, char **argv, struct host_error *error)
 
 /* The path of README.md as make install has put it; false: this program is not
  * installed. */
-static bool find_readme(char path[PATH_MAX])
-{
+static bool find_readme(char path[PATH_MAX]) {
     static const char readme[] = "/../share/doc/incode/README.md";
     ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - sizeof readme);
     if (n <= 0) {
@@ -160,8 +155,7 @@ static bool find_readme(char path[PATH_MAX])
 static char *(*filter_of_table)(int key, const char *text, void *input);
 
 /* A filter of argp's help text: gives the path of README.md. */
-static char *name_readme(int key, const char *text, void *input)
-{
+static char *name_readme(int key, const char *text, void *input) {
     static const char name[] = "README.md";
     char *mine = filter_of_table == NULL ? (char *)text
                                          : filter_of_table(key, text, input);
@@ -180,8 +174,7 @@ static char *name_readme(int key, const char *text, void *input)
 
 /* Ends the program, as --help does, unless argp is not to. */
 static void answer_help(const struct argp *argp, char *command, unsigned flags,
-                        void *input)
-{
+                        void *input) {
     static char help[] = "--help";
     char *words[] = {command, help, NULL};
     if ((flags & ARGP_NO_HELP) == 0) {
@@ -191,8 +184,7 @@ static void answer_help(const struct argp *argp, char *command, unsigned flags,
 
 /* What getopt, which argp works with, would say of itself. */
 static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
-                 void *input, struct host_error *error)
-{
+                 void *input, struct host_error *error) {
     struct table table;
     int found;
     fill(&table, argp->options, flags);
@@ -221,8 +213,7 @@ static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
 }
 
 int host_options_parse(const struct argp *argp, int argc, char **argv,
-                       unsigned flags, void *input, struct host_error *error)
-{
+                       unsigned flags, void *input, struct host_error *error) {
     struct argp named = *argp;
     filter_of_table = argp->help_filter;
     named.help_filter = name_readme;
@@ -237,8 +228,7 @@ int host_options_parse(const struct argp *argp, int argc, char **argv,
 
 int host_option_number(const char *option, const char *value, uint64_t least,
                        uint64_t most, uint64_t *number,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     if (host_parse_number(value, least, most, number) == 0) {
         return 0;
     }
@@ -254,8 +244,7 @@ int host_option_number(const char *option, const char *value, uint64_t least,
 }
 
 int host_option_argument(int key, const char *name, const char *value,
-                         const char **argument, struct host_error *error)
-{
+                         const char **argument, struct host_error *error) {
     if (key == ARGP_KEY_END) {
         return *argument != NULL
                    ? 0

@@ -7,8 +7,7 @@ enum { THREADS_MAX = 16 };
 
 static unsigned threads_most = THREADS_MAX;
 
-unsigned host_threads(void)
-{
+unsigned host_threads(void) {
     cpu_set_t set;
     if (threads_most == 1 || sched_getaffinity(0, sizeof set, &set) != 0) {
         return 1;
@@ -17,21 +16,18 @@ unsigned host_threads(void)
     return count < 1 ? 1 : count > threads_most ? threads_most : count;
 }
 
-void host_threads_limit(unsigned most)
-{
+void host_threads_limit(unsigned most) {
     threads_most = most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most;
 }
 
-static void *trampoline(void *argument)
-{
+static void *trampoline(void *argument) {
     struct host_fork *fork = argument;
     fork->function(fork->argument);
     return NULL;
 }
 
 void host_fork_start(struct host_fork *fork, void (*function)(void *),
-                     void *argument)
-{
+                     void *argument) {
     sigset_t all, before;
     fork->function = function;
     fork->argument = argument;
@@ -45,8 +41,7 @@ void host_fork_start(struct host_fork *fork, void (*function)(void *),
     }
 }
 
-void host_fork_join(struct host_fork *fork)
-{
+void host_fork_join(struct host_fork *fork) {
     if (fork->running) {
         (void)pthread_join(fork->thread, NULL);
         fork->running = false;
@@ -59,15 +54,13 @@ struct part {
     unsigned number;
 };
 
-static void run_part(void *argument)
-{
+static void run_part(void *argument) {
     struct part *part = argument;
     part->function(part->context, part->number);
 }
 
 void host_fork_all(unsigned parts, void (*function)(void *, unsigned),
-                   void *context)
-{
+                   void *context) {
     struct host_fork fork[THREADS_MAX];
     struct part part[THREADS_MAX];
     for (unsigned i = 0; i + 1 < parts; i++) {

@@ -7,22 +7,19 @@
 
 enum { ALLOWED_MAX = 80 };
 
-static bool is_digit(char c)
-{
+static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
 /* 10 * *number + digit; false: it is too large. */
-static bool append(uint64_t *number, unsigned digit)
-{
+static bool append(uint64_t *number, unsigned digit) {
     uint64_t tens;
     return !__builtin_mul_overflow(*number, (uint64_t)10, &tens) &&
            !__builtin_add_overflow(tens, (uint64_t)digit, number);
 }
 
 /* Digits, moving *text past them; false: none, or too large a number. */
-static bool read_digits(const char **text, uint64_t *number)
-{
+static bool read_digits(const char **text, uint64_t *number) {
     const char *at = *text;
     bool good = is_digit(*at);
     while (good && is_digit(*at)) {
@@ -33,8 +30,7 @@ static bool read_digits(const char **text, uint64_t *number)
 }
 
 /* The fraction and exponent of a whole number, as ".5e3". */
-static bool read_exponent(const char *text, uint64_t *number)
-{
+static bool read_exponent(const char *text, uint64_t *number) {
     uint64_t exponent = 0, places = 0;
     if (*text == '.') {
         const char *point = text++;
@@ -60,8 +56,7 @@ static bool read_exponent(const char *text, uint64_t *number)
 }
 
 /* "k" or "M" behind a count: thousands, or millions. */
-static bool read_thousands(const char *text, uint64_t *value)
-{
+static bool read_thousands(const char *text, uint64_t *value) {
     uint64_t by = strcasecmp(text, "k") == 0   ? 1000
                   : strcasecmp(text, "m") == 0 ? 1000000
                                                : 0;
@@ -69,8 +64,7 @@ static bool read_thousands(const char *text, uint64_t *value)
 }
 
 int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
-                      uint64_t *number)
-{
+                      uint64_t *number) {
     uint64_t value = 0;
     if (!read_digits(&text, &value) ||
         (*text != '\0' && !read_thousands(text, &value) &&
@@ -82,8 +76,7 @@ int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
     return 0;
 }
 
-int host_parse_bytes(const char *text, uint64_t *bytes)
-{
+int host_parse_bytes(const char *text, uint64_t *bytes) {
     static const char units[] = "KMG";
     uint64_t value = 0;
     unsigned shift = 0;
@@ -109,8 +102,7 @@ int host_parse_bytes(const char *text, uint64_t *bytes)
 
 int host_parse_nodes(const char *option, const char *text, unsigned most,
                      const char *more, unsigned *nodes,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     char allowed[ALLOWED_MAX] = "1";
     uint64_t n = 0;
     bool number = host_parse_number(text, 0, UINT64_MAX, &n) == 0;

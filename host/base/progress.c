@@ -37,8 +37,7 @@ static struct {
 } line;
 
 /* All at once, so that no other process writes in between. */
-static void put(const char *text, size_t bytes)
-{
+static void put(const char *text, size_t bytes) {
     for (size_t done = 0; done < bytes;) {
         ssize_t n = write(STDERR_FILENO, text + done, bytes - done);
         if (n < 0 && errno != EINTR) {
@@ -49,8 +48,7 @@ static void put(const char *text, size_t bytes)
 }
 
 /* Columns to write in: the last one stays free, where some terminals wrap. */
-static unsigned columns(void)
-{
+static unsigned columns(void) {
     struct winsize size;
     bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col;
     unsigned all = known ? size.ws_col : WIDTH;
@@ -58,8 +56,7 @@ static unsigned columns(void)
 }
 
 /* What takes so many rows away is there before they are. */
-static void show(const char *text, size_t bytes, unsigned rows)
-{
+static void show(const char *text, size_t bytes, unsigned rows) {
     if (rows > 1) {
         snprintf(line.gone, sizeof line.gone, "\033[%uA\r\033[J", rows - 1);
     } else {
@@ -70,8 +67,7 @@ static void show(const char *text, size_t bytes, unsigned rows)
 }
 
 /* Over what stands there, which flickers less than taking it away. */
-static void draw_rows(void)
-{
+static void draw_rows(void) {
     char text[ROWS_MAX * (TEXT + 8)];
     int n = 0, width = (int)columns();
     if (line.shown && line.rows > 1) {
@@ -84,8 +80,7 @@ static void draw_rows(void)
     show(text, (size_t)n, line.rows);
 }
 
-static void draw(void)
-{
+static void draw(void) {
     char text[TEXT + 16];
     if (line.rows > 0) {
         draw_rows();
@@ -100,21 +95,18 @@ static void draw(void)
     show(text, (size_t)n, 1);
 }
 
-void host_progress_begin(bool wanted)
-{
+void host_progress_begin(bool wanted) {
     line.terminal = isatty(STDERR_FILENO) != 0;
     line.wanted = wanted && line.terminal;
 }
 
-void host_progress_begin_anywhere(void)
-{
+void host_progress_begin_anywhere(void) {
     host_progress_begin(true);
     line.wanted = true;
     line.next_us = host_now_us() + LINE_US;
 }
 
-void host_progress_phase(const char *what, const char *unit)
-{
+void host_progress_phase(const char *what, const char *unit) {
     line.what = what;
     line.unit = unit;
     line.added = 0;
@@ -132,8 +124,7 @@ struct tails {
     char text[TAILS][TEXT / 2];
 };
 
-static struct tails tails_of(double part, double amount, double seconds)
-{
+static struct tails tails_of(double part, double amount, double seconds) {
     struct tails t = {0};
     char left[40] = "", rate[40] = "", count[40] = "";
     if (part > 0.0) {
@@ -157,8 +148,7 @@ static const char hashes[] = "########################################";
 
 /* As much as fits: the phase and the percentage before all, then the time that
  * is left, a bar, the rate and the amount. */
-static void compose(double part, bool has_total, struct tails tails)
-{
+static void compose(double part, bool has_total, struct tails tails) {
     char head[TEXT / 4];
     unsigned width = columns(), tail = 0;
     int n = snprintf(head, sizeof head, "%.32s", line.what);
@@ -185,8 +175,7 @@ static void compose(double part, bool has_total, struct tails tails)
     }
 }
 
-void host_progress_show(uint64_t done, uint64_t total, uint64_t amount)
-{
+void host_progress_show(uint64_t done, uint64_t total, uint64_t amount) {
     if (!line.wanted || line.what == NULL) {
         return;
     }
@@ -202,14 +191,12 @@ void host_progress_show(uint64_t done, uint64_t total, uint64_t amount)
     draw();
 }
 
-void host_progress_add(uint64_t amount)
-{
+void host_progress_add(uint64_t amount) {
     line.added += amount;
     host_progress_show(0, 0, line.added);
 }
 
-unsigned host_progress_rows_max(void)
-{
+unsigned host_progress_rows_max(void) {
     struct winsize size;
     if (!line.wanted || !line.terminal) {
         return 0;
@@ -219,8 +206,7 @@ unsigned host_progress_rows_max(void)
     return all <= 2 ? 1 : all - 2 < ROWS_MAX ? all - 2 : ROWS_MAX;
 }
 
-void host_progress_rows(unsigned rows)
-{
+void host_progress_rows(unsigned rows) {
     host_progress_erase();
     line.rows = rows < ROWS_MAX ? rows : ROWS_MAX;
     memset(line.row, 0, sizeof line.row);
@@ -228,8 +214,7 @@ void host_progress_rows(unsigned rows)
 }
 
 void host_progress_row(unsigned row, const char *head, double part,
-                       const char *tail)
-{
+                       const char *tail) {
     char bar[BAR_MAX + 16] = "";
     unsigned width = columns();
     if (row >= line.rows) {
@@ -246,8 +231,7 @@ void host_progress_row(unsigned row, const char *head, double part,
              tail);
 }
 
-void host_progress_draw(void)
-{
+void host_progress_draw(void) {
     uint64_t now = host_now_us();
     if (line.wanted && line.terminal && line.rows > 0 && now >= line.next_us) {
         line.next_us = now + EVERY_US;
@@ -255,16 +239,14 @@ void host_progress_draw(void)
     }
 }
 
-void host_progress_erase(void)
-{
+void host_progress_erase(void) {
     if (line.shown) {
         line.shown = 0;
         put(line.gone, strlen(line.gone));
     }
 }
 
-void host_progress_end(void)
-{
+void host_progress_end(void) {
     host_progress_erase();
     line.wanted = false;
     line.rows = 0;
@@ -272,13 +254,11 @@ void host_progress_end(void)
 
 static void (*show_note)(const char *text);
 
-void host_note_to(void (*take)(const char *text))
-{
+void host_note_to(void (*take)(const char *text)) {
     show_note = take;
 }
 
-void host_note(const char *format, ...)
-{
+void host_note(const char *format, ...) {
     char raw[TEXT_MAX], text[TEXT_MAX + 16] = "incode: ";
     size_t head = strlen(text);
     bool again = line.shown != 0;

@@ -6,8 +6,7 @@
 
 #include "transport/text.h"
 
-void host_text_printable(char *out, size_t size, const char *text)
-{
+void host_text_printable(char *out, size_t size, const char *text) {
     struct cube_text printable = cube_text_in(out, size);
     cube_text_printable(&printable, text);
 }
@@ -15,8 +14,7 @@ void host_text_printable(char *out, size_t size, const char *text)
 /* --- for a shell ---------------------------------------------------------- */
 
 /* What no shell reads as anything but itself; zsh reads = at the start. */
-static bool is_plain(const char *text)
-{
+static bool is_plain(const char *text) {
     static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                 "abcdefghijklmnopqrstuvwxyz"
                                 "0123456789_@%+:,./-=";
@@ -30,8 +28,7 @@ struct quoting {
     bool open;         /* within '..' */
 };
 
-static void put(struct quoting *q, const char *words, size_t bytes)
-{
+static void put(struct quoting *q, const char *words, size_t bytes) {
     if (q->used + bytes < q->size) {
         memcpy(q->out + q->used, words, bytes);
         q->used += bytes;
@@ -40,8 +37,7 @@ static void put(struct quoting *q, const char *words, size_t bytes)
     }
 }
 
-static void set_open(struct quoting *q, bool open)
-{
+static void set_open(struct quoting *q, bool open) {
     if (q->open != open) {
         put(q, "'", 1);
         q->open = open;
@@ -51,8 +47,7 @@ static void set_open(struct quoting *q, bool open)
 /* The bytes of one character, of which a terminal would obey some.  `$'..'` is
  * younger than most shells: printf makes them. */
 static void put_character(struct quoting *q, const char *at, size_t bytes,
-                          bool shown)
-{
+                          bool shown) {
     char octal[sizeof "\"$(printf '\\377')\""];
     if (*at == '\'') {
         set_open(q, false);
@@ -71,8 +66,7 @@ static void put_character(struct quoting *q, const char *at, size_t bytes,
     }
 }
 
-int host_text_quote(char *out, size_t size, const char *text)
-{
+int host_text_quote(char *out, size_t size, const char *text) {
     struct quoting q = {out, size, 0, false};
     bool plain = is_plain(text);
     if (plain || *text == '\0') {
@@ -94,14 +88,12 @@ int host_text_quote(char *out, size_t size, const char *text)
 
 enum { WORD_MAX = 40 };
 
-static unsigned least(unsigned a, unsigned b)
-{
+static unsigned least(unsigned a, unsigned b) {
     return a < b ? a : b;
 }
 
 /* Row i: from the first i letters of a to the first k of b, for every k. */
-static unsigned distance(const char *a, const char *b)
-{
+static unsigned distance(const char *a, const char *b) {
     unsigned row[3][WORD_MAX + 1];
     size_t n = strnlen(a, WORD_MAX), m = strnlen(b, WORD_MAX);
     for (unsigned k = 0; k <= m; k++) {
@@ -126,8 +118,7 @@ static unsigned distance(const char *a, const char *b)
 const char *host_text_nearest(const char *word,
                               const char *(*name)(const void *context,
                                                   unsigned i),
-                              const void *context)
-{
+                              const void *context) {
     const char *nearest = NULL;
     unsigned best = (unsigned)(strlen(word) + 2) / 3 + 1;
     for (unsigned i = 0; name(context, i) != NULL; i++) {
@@ -143,8 +134,7 @@ const char *host_text_nearest(const char *word,
 /* --- for a terminal --------------------------------------------------------
  */
 
-void host_say(FILE *stream, const char *format, ...)
-{
+void host_say(FILE *stream, const char *format, ...) {
     char raw[HOST_SAY_BYTES], line[HOST_SAY_BYTES];
     size_t size = strlen(format);
     bool ends = size > 0 && format[size - 1] == '\n';

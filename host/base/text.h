@@ -32,8 +32,7 @@ void host_say(FILE *stream, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
 
 /* What a noun of so many has at its end: "s", or nothing for one. */
-static inline const char *host_text_s(uint64_t count)
-{
+static inline const char *host_text_s(uint64_t count) {
     return count == 1 ? "" : "s";
 }
 

@@ -78,15 +78,13 @@ static const struct argp_option options[] = {
     {0}};
 
 static void parse_whole(struct arguments *a, const char *name,
-                        const char *value, unsigned most, unsigned *number)
-{
+                        const char *value, unsigned most, unsigned *number) {
     uint64_t n = 0;
     (void)host_option_number(name, value, 1, most, &n, a->error);
     *number = (unsigned)n;
 }
 
-static void parse_argument(struct arguments *a, const char *value)
-{
+static void parse_argument(struct arguments *a, const char *value) {
     if (a->what == NULL) {
         a->what = value;
     } else if (a->peers.names == HOST_BENCH_NAMES_MAX) {
@@ -99,8 +97,7 @@ static void parse_argument(struct arguments *a, const char *value)
 }
 
 /* False: it is not one of its options. */
-static bool parse_paper(int key, const char *value, struct arguments *a)
-{
+static bool parse_paper(int key, const char *value, struct arguments *a) {
     struct host_paper_options *paper = &a->paper;
     switch (key) {
     case 'n':
@@ -141,8 +138,7 @@ static bool parse_paper(int key, const char *value, struct arguments *a)
     }
 }
 
-static error_t parse_bench(int key, char *value, struct argp_state *state)
-{
+static error_t parse_bench(int key, char *value, struct argp_state *state) {
     struct arguments *a = state->input;
     if (parse_paper(key, value, a)) {
         return 0;
@@ -201,8 +197,7 @@ static const struct argp bench = {
     NULL};
 
 /* An option that the benchmark has not, or NULL. */
-static const char *other_option(const struct arguments *a)
-{
+static const char *other_option(const struct arguments *a) {
     bool paper = strcmp(a->what, "paper") == 0;
     bool runs = paper || strcmp(a->what, "scaling") == 0;
     bool rows = runs || strcmp(a->what, "boards") == 0;
@@ -215,8 +210,7 @@ static const char *other_option(const struct arguments *a)
 }
 
 /* Options and arguments that the benchmark has not. */
-static int check(const struct arguments *a, struct host_error *error)
-{
+static int check(const struct arguments *a, struct host_error *error) {
     static const char *const all[] = {"paper", "links", "boards", "scaling",
                                       "peers"};
     bool known = false, peers = strcmp(a->what, "peers") == 0;
@@ -242,8 +236,7 @@ static int check(const struct arguments *a, struct host_error *error)
                            a->peers.name[0], a->what);
 }
 
-int host_bench(int argc, char **argv, struct host_error *error)
-{
+int host_bench(int argc, char **argv, struct host_error *error) {
     struct arguments a = {.peers = {.rounds = 3, .limit_s = 60},
                           .error = error};
     if (host_options_parse(&bench, argc, argv, 0, &a, error) != 0) {

@@ -39,8 +39,7 @@ struct bench {
 
 /* A program of its name, which is found before it and becomes it. */
 static int stand_in(const struct bench *b, const struct host_bare *bare,
-                    const char *program, struct host_error *error)
-{
+                    const char *program, struct host_error *error) {
     char path[160];
     (void)snprintf(path, sizeof path, "%s/%s", b->folder, bare->program);
     int fd = host_create(path, 0700);
@@ -58,16 +57,14 @@ static int stand_in(const struct bench *b, const struct host_bare *bare,
     return error->code;
 }
 
-static void take_away(const struct bench *b, const char *name)
-{
+static void take_away(const struct bench *b, const char *name) {
     char path[PATH_MAX];
     (void)snprintf(path, sizeof path, "%s/%s", b->folder, name);
     (void)remove(path);
 }
 
 /* A run that failed leaves counts there. */
-static void take_all_away(const struct bench *b)
-{
+static void take_all_away(const struct bench *b) {
     struct dirent *entry;
     DIR *folder = opendir(b->folder);
     while (folder != NULL && (entry = readdir(folder)) != NULL) {
@@ -82,8 +79,7 @@ static void take_all_away(const struct bench *b)
 }
 
 /* Programs are found in the folder first, or as they were. */
-static void find_first(const struct bench *b, const char *before)
-{
+static void find_first(const struct bench *b, const char *before) {
     char path[8192];
     (void)snprintf(path, sizeof path, "%s:%s", b->folder, before);
     (void)setenv("PATH", b->folder[0] == '\0' ? before : path, 1);
@@ -92,13 +88,11 @@ static void find_first(const struct bench *b, const char *before)
 /* --- a run
  * -------------------------------------------------------------------- */
 
-static double sum_of(json_t *nodes, const char *name)
-{
+static double sum_of(json_t *nodes, const char *name) {
     double sum = 0;
     size_t i;
     json_t *node;
-    json_array_foreach(nodes, i, node)
-    {
+    json_array_foreach(nodes, i, node) {
         sum += json_number_value(json_object_get(node, name));
     }
     return sum;
@@ -106,8 +100,7 @@ static double sum_of(json_t *nodes, const char *name)
 
 /* What the statistics of the run say of the row. */
 static int read_stats(const struct bench *b, struct host_boards_row *row,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     json_t *root = json_load_file(b->stats, 0, NULL);
     json_t *nodes = json_object_get(root, "per_node");
     double tetrahedra = json_number_value(json_object_get(root, "tetrahedra"));
@@ -128,8 +121,7 @@ static int read_stats(const struct bench *b, struct host_boards_row *row,
 }
 
 /* A run on that board, with the right result. */
-static int run(struct bench *b, const char *board, struct host_error *error)
-{
+static int run(struct bench *b, const char *board, struct host_error *error) {
     char nodes[NODES_WORD];
     const char *words[] = {
         "/proc/self/exe", "run",     b->set.path, "-q",     "--format", "npy",
@@ -162,8 +154,7 @@ static int run(struct bench *b, const char *board, struct host_error *error)
 
 /* A row, with the emulator counting. */
 static int measure(struct bench *b, const struct host_board *board,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct host_boards_row *row = &b->row[b->rows];
     struct host_emulator emulator;
     const char *path = getenv("PATH");
@@ -195,8 +186,7 @@ static int measure(struct bench *b, const struct host_board *board,
 /* --- what is printed
  * ------------------------------------------------------------ */
 
-static void print_head(void)
-{
+static void print_head(void) {
     printf("Instructions a tetrahedron, of the nodes while they do not wait "
            "(%d of a board,\n%d uniform points); where all go that are "
            "executed, in percent; bytes a\ntetrahedron that nodes take from, "
@@ -208,8 +198,7 @@ static void print_head(void)
     printf(" %6s %6s\n", "in", "out");
 }
 
-static void print_row(const struct host_boards_row *row)
-{
+static void print_row(const struct host_boards_row *row) {
     printf("%-11s %7.0f", row->board, row->instructions);
     for (unsigned i = 0; i < HOST_ROOMS; i++) {
         printf(" %*.1f", (int)strlen(host_room_names[i]) + 1,
@@ -219,8 +208,7 @@ static void print_row(const struct host_boards_row *row)
     fflush(stdout);
 }
 
-static int write_csv(const struct bench *b, struct host_error *error)
-{
+static int write_csv(const struct bench *b, struct host_error *error) {
     const char *path = b->options->csv;
     FILE *file = host_create_over(path);
     if (file != NULL) {
@@ -247,8 +235,7 @@ static int write_csv(const struct bench *b, struct host_error *error)
     return error->code;
 }
 
-static int bench_all(struct bench *b, struct host_error *error)
-{
+static int bench_all(struct bench *b, struct host_error *error) {
     const struct host_board *board;
     if (run(b, "linux", error) != 0) {
         return error->code;
@@ -272,8 +259,7 @@ static int bench_all(struct bench *b, struct host_error *error)
 }
 
 int host_bench_boards(const struct host_bench_boards_options *options,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     static struct bench b;
     const char *tmp = getenv("TMPDIR");
     memset(&b, 0, sizeof b);

@@ -46,8 +46,7 @@ struct functions {
 };
 
 /* Behind the last "/firmware/BOARD/"; NULL: it is none of the firmware's. */
-static const char *in_board(const char *path)
-{
+static const char *in_board(const char *path) {
     static const char firmware[] = "/firmware/";
     const char *found = NULL;
     for (const char *at = path; (at = strstr(at, firmware)) != NULL; at++) {
@@ -57,8 +56,7 @@ static const char *in_board(const char *path)
     return found == NULL ? NULL : found + 1;
 }
 
-static bool room_of(const char *path, enum host_room *room)
-{
+static bool room_of(const char *path, enum host_room *room) {
     const char *object = in_board(path);
     for (size_t i = 0; object != NULL && i < sizeof rooms / sizeof rooms[0];
          i++) {
@@ -71,14 +69,12 @@ static bool room_of(const char *path, enum host_room *room)
     return strstr(path, "libgcc.a(") != NULL;
 }
 
-static int by_address(const void *a, const void *b)
-{
+static int by_address(const void *a, const void *b) {
     const struct function *f = a, *g = b;
     return (f->from > g->from) - (f->from < g->from);
 }
 
-static bool keep(struct functions *functions, struct function function)
-{
+static bool keep(struct functions *functions, struct function function) {
     enum { STEP = 1024 };
     if (functions->count % STEP == 0) {
         struct function *more =
@@ -94,8 +90,7 @@ static bool keep(struct functions *functions, struct function function)
 
 /* " .text.NAME  0xADDRESS  0xBYTES  OBJECT", the name on a line of its own
  * where it is long. */
-static bool read_map(FILE *file, struct functions *functions)
-{
+static bool read_map(FILE *file, struct functions *functions) {
     char line[4096], object[4096];
     bool laid_out = false, code = false;
     struct function function;
@@ -123,8 +118,7 @@ static bool read_map(FILE *file, struct functions *functions)
 
 /* What lies in no function is the board's. */
 static enum host_room room_at(const struct functions *functions,
-                              uint64_t address)
-{
+                              uint64_t address) {
     size_t low = 0, high = functions->count;
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
@@ -140,8 +134,7 @@ static enum host_room room_at(const struct functions *functions,
 }
 
 static void add(FILE *file, const struct functions *functions,
-                double counted[HOST_ROOMS])
-{
+                double counted[HOST_ROOMS]) {
     uint64_t block[3]; /* address, instructions, times: struct count */
     while (fread(block, sizeof block, 1, file) == 1 && block[1] != 0) {
         if (block[0] >= functions->all[0].from) { /* else it is the loader's */
@@ -152,8 +145,7 @@ static void add(FILE *file, const struct functions *functions,
 }
 
 static int add_folder(const char *folder, const struct functions *functions,
-                      double counted[HOST_ROOMS], struct host_error *error)
-{
+                      double counted[HOST_ROOMS], struct host_error *error) {
     char path[8192];
     struct dirent *entry;
     DIR *open_folder = opendir(folder);
@@ -181,8 +173,7 @@ static int add_folder(const char *folder, const struct functions *functions,
 }
 
 int host_boards_count(const char *map, const char *folder,
-                      double counted[HOST_ROOMS], struct host_error *error)
-{
+                      double counted[HOST_ROOMS], struct host_error *error) {
     struct functions functions = {NULL, 0};
     FILE *file = fopen(map, "re");
     bool good = file != NULL && read_map(file, &functions);

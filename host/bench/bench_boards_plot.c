@@ -13,8 +13,7 @@ static const char *const colors[HOST_ROOMS] = {"#4477aa", "#aaccee", "#228833",
                                                "#ccbb44", "#66ccee", "#bbbbbb",
                                                "#ee6677", "#aa3377", "#777777"};
 
-double host_boards_share(const struct host_boards_row *row, unsigned room)
-{
+double host_boards_share(const struct host_boards_row *row, unsigned room) {
     double all = 0;
     for (unsigned i = 0; i < HOST_ROOMS; i++) {
         all += row->counted[i];
@@ -23,8 +22,7 @@ double host_boards_share(const struct host_boards_row *row, unsigned room)
 }
 
 static void draw_row(FILE *file, const struct host_boards_row *row, double most,
-                     int y)
-{
+                     int y) {
     double x = LEFT, length = BAR * row->instructions / most;
     fprintf(file, "<text x=\"%d\" y=\"%d\" text-anchor=\"end\">%s</text>\n",
             LEFT - 8, y + HIGH - 8, row->board);
@@ -40,8 +38,7 @@ static void draw_row(FILE *file, const struct host_boards_row *row, double most,
             y + HIGH - 8, row->instructions);
 }
 
-static void draw_key(FILE *file, int y)
-{
+static void draw_key(FILE *file, int y) {
     for (unsigned i = 0; i < HOST_ROOMS; i++) {
         int x = LEFT + (int)i * KEY_STEP;
         fprintf(file,
@@ -53,8 +50,7 @@ static void draw_key(FILE *file, int y)
 }
 
 int host_boards_plot(const char *path, const struct host_boards_row *rows,
-                     unsigned count, struct host_error *error)
-{
+                     unsigned count, struct host_error *error) {
     double most = 1;
     int y = TOP;
     for (unsigned i = 0; i < count; i++) {

@@ -20,8 +20,7 @@ static const struct {
 };
 
 /* Where this program was made; "build" where it is installed. */
-static void build_folder(char folder[PATH_MAX])
-{
+static void build_folder(char folder[PATH_MAX]) {
     char archive[PATH_MAX + 32];
     ssize_t n = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     folder[n > 0 ? n : 0] = '\0';
@@ -36,8 +35,7 @@ static void build_folder(char folder[PATH_MAX])
 }
 
 /* Bit i: peer i is wanted. */
-static int parse(const char *wanted, unsigned *set, struct host_error *error)
-{
+static int parse(const char *wanted, unsigned *set, struct host_error *error) {
     *set = 0;
     for (const char *at = wanted; *at != '\0';) {
         size_t n = strcspn(at, ",");
@@ -58,8 +56,8 @@ static int parse(const char *wanted, unsigned *set, struct host_error *error)
     return 0;
 }
 
-static int make(const char *folder, const char *path, struct host_error *error)
-{
+static int make(const char *folder, const char *path,
+                struct host_error *error) {
     char program[] = "make", silent[] = "-s", build[PATH_MAX + 16];
     char target[PATH_MAX + 32];
     char *const words[] = {program, silent, build, target, NULL};
@@ -77,8 +75,7 @@ static int make(const char *folder, const char *path, struct host_error *error)
                            path, trial.said, path);
 }
 
-static int need_source(const char *bench, struct host_error *error)
-{
+static int need_source(const char *bench, struct host_error *error) {
     return access("Makefile", R_OK) == 0 &&
                    access("tests/bench/peer.hpp", R_OK) == 0
                ? 0
@@ -88,8 +85,8 @@ static int need_source(const char *bench, struct host_error *error)
                            bench);
 }
 
-int host_bench_made(const char *name, char path[4096], struct host_error *error)
-{
+int host_bench_made(const char *name, char path[4096],
+                    struct host_error *error) {
     char folder[PATH_MAX];
     if (need_source("boards", error) != 0) {
         return error->code;
@@ -100,8 +97,7 @@ int host_bench_made(const char *name, char path[4096], struct host_error *error)
 }
 
 int host_bench_build(struct host_bench_builds *builds, const char *wanted,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     char folder[PATH_MAX];
     unsigned set;
     memset(builds, 0, sizeof *builds);

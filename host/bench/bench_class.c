@@ -109,13 +109,11 @@ static const char *const ways[HOST_WAYS][7] = {
                          "1M"},
 };
 
-const struct host_bench_class *host_bench_class_row(unsigned i)
-{
+const struct host_bench_class *host_bench_class_row(unsigned i) {
     return i < CLASSES ? &classes[i] : NULL;
 }
 
-const struct host_bench_class *host_bench_class_named(const char *name)
-{
+const struct host_bench_class *host_bench_class_named(const char *name) {
     for (unsigned i = 0; i < CLASSES; i++) {
         if (strcmp(name, classes[i].name) == 0) {
             return &classes[i];
@@ -124,8 +122,7 @@ const struct host_bench_class *host_bench_class_named(const char *name)
     return NULL;
 }
 
-const char *host_bench_class_names(void)
-{
+const char *host_bench_class_names(void) {
     static char names[256];
     size_t used = 0;
     for (unsigned i = 0; i < CLASSES; i++) {
@@ -135,14 +132,12 @@ const char *host_bench_class_names(void)
     return names;
 }
 
-const char *const *host_bench_way_options(enum host_bench_way way)
-{
+const char *const *host_bench_way_options(enum host_bench_way way) {
     return ways[way];
 }
 
 double host_bench_goal(const struct host_bench_class *c, const char *name,
-                       bool *named)
-{
+                       bool *named) {
     *named = false;
     for (unsigned i = 0; i < sizeof goals / sizeof goals[0]; i++) {
         if (strcmp(name, goals[i].name) == 0) {

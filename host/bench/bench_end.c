@@ -29,23 +29,20 @@ struct bench {
     uint8_t answer[HOST_BENCH_SMALL];
 };
 
-uint64_t host_bench_used_us(void)
-{
+uint64_t host_bench_used_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-static bool say(struct bench *b, uint8_t what, uint64_t value, size_t size)
-{
+static bool say(struct bench *b, uint8_t what, uint64_t value, size_t size) {
     uint8_t bytes[HOST_BENCH_MESSAGE] = {what};
     memcpy(bytes + 8, &value, sizeof value);
     return link_write(b->link, bytes, size, NULL, 0) == 0;
 }
 
 /* False: no room for the answer yet. */
-static bool take(struct bench *b, const struct link_message *m, unsigned role)
-{
+static bool take(struct bench *b, const struct link_message *m, unsigned role) {
     uint64_t value;
     uint8_t what = m->data[0];
     memcpy(&value, m->data + 8, sizeof value);
@@ -67,8 +64,7 @@ static bool take(struct bench *b, const struct link_message *m, unsigned role)
 }
 
 /* One look at the link: how many messages came. */
-static unsigned turn(struct bench *b, unsigned role)
-{
+static unsigned turn(struct bench *b, unsigned role) {
     struct link_message message;
     unsigned got = 0;
     uint64_t now = host_now_us();
@@ -88,14 +84,12 @@ static unsigned turn(struct bench *b, unsigned role)
     return got;
 }
 
-static bool patient(const struct bench *b)
-{
+static bool patient(const struct bench *b) {
     return host_now_us() - b->heard_us < PATIENCE_US;
 }
 
 /* Microseconds from question to answer; < 0: there is none. */
-static double ask(struct bench *b, uint8_t what, size_t size)
-{
+static double ask(struct bench *b, uint8_t what, size_t size) {
     uint64_t begin = host_now_us();
     while (!say(b, what, 0, size)) {
         (void)turn(b, 0);
@@ -108,8 +102,7 @@ static double ask(struct bench *b, uint8_t what, size_t size)
     return (double)(host_now_us() - begin);
 }
 
-static double mean_round_trip(struct bench *b, size_t size)
-{
+static double mean_round_trip(struct bench *b, size_t size) {
     double sum = 0;
     uint64_t begin = host_now_us();
     for (unsigned i = 1; i <= PINGS; i++) {
@@ -123,8 +116,7 @@ static double mean_round_trip(struct bench *b, size_t size)
 }
 
 /* `count` messages each way at once: microseconds. */
-static double stream(struct bench *b, uint32_t count)
-{
+static double stream(struct bench *b, uint32_t count) {
     uint64_t begin = host_now_us();
     while (!say(b, STREAM, count, HOST_BENCH_SMALL)) {
         (void)turn(b, 0);
@@ -140,16 +132,14 @@ static double stream(struct bench *b, uint32_t count)
     return (double)(host_now_us() - begin);
 }
 
-static uint64_t used_by_both(struct bench *b)
-{
+static uint64_t used_by_both(struct bench *b) {
     uint64_t other;
     (void)ask(b, USED, HOST_BENCH_SMALL);
     memcpy(&other, b->answer + 8, sizeof other);
     return other + host_bench_used_us();
 }
 
-static int measure(struct bench *b, struct host_bench_row *row)
-{
+static int measure(struct bench *b, struct host_bench_row *row) {
     row->round_trip_us =
         ask(b, ECHO, HOST_BENCH_SMALL) < 0 ? -1 : 0; /* shakes hands */
     if (row->round_trip_us < 0) {
@@ -171,8 +161,7 @@ static int measure(struct bench *b, struct host_bench_row *row)
 }
 
 /* Until the farewell has arrived, as far as that can be told. */
-static void linger(struct bench *b)
-{
+static void linger(struct bench *b) {
     uint64_t begin = host_now_us();
     while (host_now_us() - begin < LINGER_US) {
         (void)link_poll(b->link, host_now_us());
@@ -181,8 +170,7 @@ static void linger(struct bench *b)
 }
 
 int host_bench_end(struct host_bench_end *end, unsigned role,
-                   struct host_bench_row *row)
-{
+                   struct host_bench_row *row) {
     struct bench b = {.end = end, .heard_us = host_now_us()};
     struct link_config config = end->settings;
     int status = -1;
@@ -208,8 +196,7 @@ int host_bench_end(struct host_bench_end *end, unsigned role,
     return status;
 }
 
-struct link_config host_bench_serial(uint32_t baud)
-{
+struct link_config host_bench_serial(uint32_t baud) {
     struct link_config config = {.window = 14, .message_max = 1608};
     link_for_serial(&config, baud == 0 ? FAST_BAUD : baud);
     return config;

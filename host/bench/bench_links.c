@@ -39,21 +39,18 @@ struct wire {
     struct tcp_wire net;
 };
 
-static uint64_t now_ns(void)
-{
+static uint64_t now_ns(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000000 + (uint64_t)now.tv_nsec;
 }
 
-static int slow_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int slow_send(void *context, const uint8_t *bytes, size_t size) {
     const struct slow_end *s = context;
     return s->beneath.send(s->beneath.context, bytes, size);
 }
 
-static int slow_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int slow_receive(void *context, uint8_t *bytes, size_t size) {
     struct slow_end *s = context;
     int got = s->beneath.receive(s->beneath.context, s->bytes + s->held,
                                  sizeof s->bytes - s->held);
@@ -82,22 +79,19 @@ static int slow_receive(void *context, uint8_t *bytes, size_t size)
     return (int)here;
 }
 
-static void sleep_on(struct pollfd *fds, nfds_t count, uint64_t wait_us)
-{
+static void sleep_on(struct pollfd *fds, nfds_t count, uint64_t wait_us) {
     struct timespec wait = {(time_t)(wait_us / 1000000),
                             (long)(wait_us % 1000000) * 1000};
     (void)ppoll(fds, count, &wait, NULL);
 }
 
-static void idle_tcp(void *context, uint64_t wait_us)
-{
+static void idle_tcp(void *context, uint64_t wait_us) {
     struct wire *w = context;
     struct pollfd fd = {w->tcp.fd, tcp_events(&w->tcp), 0};
     sleep_on(&fd, 1, wait_us);
 }
 
-static void idle_line(void *context, uint64_t wait_us)
-{
+static void idle_line(void *context, uint64_t wait_us) {
     struct wire *w = context;
     struct pollfd fd = {w->line.fd, serial_events(&w->line), 0};
     uint64_t line_us = serial_wait_us(&w->line);
@@ -110,8 +104,7 @@ static void idle_line(void *context, uint64_t wait_us)
     sleep_on(&fd, 1, wait_us);
 }
 
-static void idle_net(void *context, uint64_t wait_us)
-{
+static void idle_net(void *context, uint64_t wait_us) {
     struct wire *w = context;
     struct pollfd fds[TCP_WIRE_FDS_MAX];
     sleep_on(fds, tcp_wire_events(&w->net, fds), wait_us);
@@ -127,8 +120,7 @@ struct driver {
 };
 
 static int open_tcp(struct wire *wire, struct host_bench_end *end, int fd,
-                    unsigned role, uint32_t baud)
-{
+                    unsigned role, uint32_t baud) {
     (void)role, (void)baud;
     tcp_pipe_init(&wire->tcp, fd);
     end->pipe = tcp_link_pipe(&wire->tcp);
@@ -138,8 +130,7 @@ static int open_tcp(struct wire *wire, struct host_bench_end *end, int fd,
 }
 
 static int open_line(struct wire *wire, struct host_bench_end *end, int fd,
-                     unsigned role, uint32_t baud)
-{
+                     unsigned role, uint32_t baud) {
     (void)role;
     serial_pipe_init(&wire->line, fd, baud);
     wire->slow.beneath = serial_link_pipe(&wire->line);
@@ -156,8 +147,7 @@ static int open_line(struct wire *wire, struct host_bench_end *end, int fd,
  * part. */
 static struct tcp_address meeting;
 
-static int choose_meeting(int fds[2])
-{
+static int choose_meeting(int fds[2]) {
     struct sockaddr_in free_port = {.sin_family = AF_INET,
                                     .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t size = sizeof free_port;
@@ -176,8 +166,7 @@ static int choose_meeting(int fds[2])
 }
 
 static int open_net(struct wire *wire, struct host_bench_end *end, int fd,
-                    unsigned role, uint32_t baud)
-{
+                    unsigned role, uint32_t baud) {
     static const uint8_t key[SECURE_KEY_BYTES] = "for measuring only";
     struct tcp_wire_config config = {
         .listens = role == 1, .suite = &secure_sodium, .key = key};
@@ -193,8 +182,7 @@ static int open_net(struct wire *wire, struct host_bench_end *end, int fd,
 }
 
 static int run_end(const struct driver *driver, int fd, unsigned role,
-                   struct host_bench_row *row)
-{
+                   struct host_bench_row *row) {
     static struct wire wire;
     struct host_bench_end end;
     memset(&wire, 0, sizeof wire);
@@ -213,8 +201,7 @@ static int run_end(const struct driver *driver, int fd, unsigned role,
 
 /* Two processes, and the driver between them. */
 static int run_driver(const struct driver *driver, struct host_bench_row *row,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     int fds[2];
     if (driver->make(fds) != 0) {
         return host_fail(error, HOST_CUBE,
@@ -247,8 +234,7 @@ static int run_driver(const struct driver *driver, struct host_bench_row *row,
 /* --- mpi: a program of its own -------------------------------------------- */
 
 /* False: there is no mpirun, or it does not start two ranks. */
-static bool run_mpi(struct host_bench_row *row)
-{
+static bool run_mpi(struct host_bench_row *row) {
     char path[4096], command[4400];
     struct host_error ignored = {0};
     if (host_cluster_program(NULL, "incode-mpi", path, sizeof path, &ignored) !=
@@ -273,8 +259,7 @@ static bool run_mpi(struct host_bench_row *row)
 }
 
 static void print_row(const char *name, double line_bytes_per_s,
-                      const struct host_bench_row *row)
-{
+                      const struct host_bench_row *row) {
     printf("%-30s %10.3f ", name, 1e-6 * row->bytes_per_s);
     if (line_bytes_per_s > 0) {
         printf("%6.1f %%", 100 * row->bytes_per_s / line_bytes_per_s);
@@ -286,8 +271,7 @@ static void print_row(const char *name, double line_bytes_per_s,
     fflush(stdout);
 }
 
-int host_bench_links(struct host_error *error)
-{
+int host_bench_links(struct host_error *error) {
     static const struct driver drivers[] = {
         {"tcp, loopback", 0, tcp_pair, open_tcp},
         {"tcp, with a key", 0, choose_meeting, open_net},

@@ -28,8 +28,7 @@ const char host_paper_tables[] =
     "1, 2, 3, 4, 5, 6, 7, 11, relation, goals, check";
 
 /* Whether `name` is among `list`, names with commas between. */
-static bool among(const char *list, const char *name)
-{
+static bool among(const char *list, const char *name) {
     size_t length = strlen(name);
     for (const char *at = list; at != NULL; at = strchr(at, ',')) {
         at += *at == ',' ? 1 : 0;
@@ -41,8 +40,7 @@ static bool among(const char *list, const char *name)
     return false;
 }
 
-static int check_tables(const char *list, struct host_error *error)
-{
+static int check_tables(const char *list, struct host_error *error) {
     for (const char *at = list; at != NULL && *at != '\0';) {
         size_t length = strcspn(at, ",");
         bool known = false;
@@ -60,8 +58,7 @@ static int check_tables(const char *list, struct host_error *error)
     return 0;
 }
 
-static void print_model(const struct host_paper_bench *bench)
-{
+static void print_model(const struct host_paper_bench *bench) {
     const struct host_bench_machine *n = &bench->runs.machine[HOST_PAPER_NCUBE];
     const struct host_bench_machine *w =
         &bench->runs.machine[HOST_PAPER_WORKSTATIONS];
@@ -95,8 +92,7 @@ static void print_model(const struct host_paper_bench *bench)
 }
 
 static int print_tables(struct host_paper_bench *bench,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     const struct host_paper_options *o = bench->options;
     host_progress_phase("calibrating", NULL);
     if (host_paper_runs_begin(&bench->runs, error) != 0) {
@@ -113,8 +109,7 @@ static int print_tables(struct host_paper_bench *bench,
 }
 
 int host_bench_paper(const struct host_paper_options *options,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (check_tables(options->tables, error) != 0) {
         return error->code;
     }

@@ -47,8 +47,7 @@ struct bench {
 /* The command of a turn; false: it has none in this class. */
 static bool command(struct bench *b, unsigned turn,
                     const struct host_bench_set *set,
-                    const char *words[WORDS_MAX])
-{
+                    const char *words[WORDS_MAX]) {
     unsigned n = 0;
     bool first = b->turns[turn].rounds == 0;
     enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
@@ -82,16 +81,14 @@ static bool command(struct bench *b, unsigned turn,
     return way != HOST_WAY_NONE;
 }
 
-static const char *title_of(unsigned turn)
-{
+static const char *title_of(unsigned turn) {
     return turn < PEER ? "incode" : host_bench_peer_titles[turn - PEER];
 }
 
 /* What went wrong in a turn; its set is left to the others. */
 static void note_failure(struct bench *b, unsigned turn,
                          const struct host_bench_set *set,
-                         const struct host_trial *trial)
-{
+                         const struct host_trial *trial) {
     b->turns[turn].failed = true;
     if (turn < PEER && trial->status == HOST_INPUT) {
         b->left_out = true;
@@ -106,8 +103,8 @@ static void note_failure(struct bench *b, unsigned turn,
 }
 
 static int take_turn(struct bench *b, unsigned turn, unsigned round,
-                     const struct host_bench_set *set, struct host_error *error)
-{
+                     const struct host_bench_set *set,
+                     struct host_error *error) {
     const char *words[WORDS_MAX];
     char phase[64];
     struct turns *t = &b->turns[turn];
@@ -138,28 +135,24 @@ static int take_turn(struct bench *b, unsigned turn, unsigned round,
     return status;
 }
 
-static int compare(const void *a, const void *b)
-{
+static int compare(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
-static double median(double *s, unsigned n)
-{
+static double median(double *s, unsigned n) {
     qsort(s, n, sizeof *s, compare);
     return n == 0 ? 0 : 0.5 * (s[(n - 1) / 2] + s[n / 2]);
 }
 
-static double time_of(const struct bench *b, struct turns *t)
-{
+static double time_of(const struct bench *b, struct turns *t) {
     return t->late || t->failed
                ? 0
                : median(b->class->wall ? t->wall_s : t->cpu_s, t->rounds);
 }
 
 /* CGAL breaks ties as this program does: its tetrahedra are the same. */
-static void check_digests(struct bench *b, const struct host_bench_set *set)
-{
+static void check_digests(struct bench *b, const struct host_bench_set *set) {
     const char *first = b->turns[MAIN].trial.digest;
     for (unsigned turn = OTHER; turn <= PEER; turn++) {
         const char *other = b->turns[turn].trial.digest;
@@ -173,8 +166,7 @@ static void check_digests(struct bench *b, const struct host_bench_set *set)
 
 /* By turns, A B A B; then a row. */
 static int measure(struct bench *b, const struct host_bench_set *set,
-                   struct host_bench_result *r, struct host_error *error)
-{
+                   struct host_bench_result *r, struct host_error *error) {
     memset(b->turns, 0, sizeof b->turns);
     b->left_out = false;
     for (unsigned round = 0; round < b->options->rounds; round++) {
@@ -215,8 +207,7 @@ static int measure(struct bench *b, const struct host_bench_set *set,
 /* --- files -----------------------------------------------------------------
  */
 
-static int add_file(struct bench *b, char *path, struct host_error *error)
-{
+static int add_file(struct bench *b, char *path, struct host_error *error) {
     if (path == NULL || b->files == HOST_BENCH_ROWS_MAX) {
         free(path);
         return host_fail(error, HOST_USAGE,
@@ -229,8 +220,7 @@ static int add_file(struct bench *b, char *path, struct host_error *error)
 
 /* Of a directory, what has an extension of points. */
 static int add_directory(struct bench *b, const char *path,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     struct dirent **entry;
     int count = scandir(path, &entry, NULL, alphasort);
     if (count < 0) {
@@ -255,8 +245,7 @@ static int add_directory(struct bench *b, const char *path,
     return error->code;
 }
 
-static int find_files(struct bench *b, struct host_error *error)
-{
+static int find_files(struct bench *b, struct host_error *error) {
     for (unsigned i = 0; i < b->options->names && error->code == 0; i++) {
         const char *name = b->options->name[i];
         struct stat status;
@@ -276,8 +265,7 @@ static int find_files(struct bench *b, struct host_error *error)
  */
 
 /* Those of the files that are of this class. */
-static int measure_files(struct bench *b, struct host_error *error)
-{
+static int measure_files(struct bench *b, struct host_error *error) {
     const struct host_bench_class *c = b->class;
     for (unsigned i = 0; i < b->files && error->code == 0; i++) {
         struct host_bench_set set;
@@ -298,8 +286,7 @@ static int measure_files(struct bench *b, struct host_error *error)
     return error->code;
 }
 
-static int measure_made(struct bench *b, struct host_error *error)
-{
+static int measure_made(struct bench *b, struct host_error *error) {
     for (const struct host_bench_made *m = b->class->made;
          m->kind != NULL && error->code == 0; m++) {
         struct host_bench_set set;
@@ -318,8 +305,7 @@ static int measure_made(struct bench *b, struct host_error *error)
 }
 
 /* CGAL's whole program, and a place on a disk for what such write. */
-static int make_target(struct bench *b, struct host_error *error)
-{
+static int make_target(struct bench *b, struct host_error *error) {
     if (b->builds.there[0] &&
         host_bench_made("cgal_file", b->to_file, error) != 0) {
         return error->code;
@@ -334,8 +320,7 @@ static int make_target(struct bench *b, struct host_error *error)
     return 0;
 }
 
-static void remove_target(struct bench *b)
-{
+static void remove_target(struct bench *b) {
     if (b->folder[0] != '\0') {
         (void)unlink(b->target);
         (void)rmdir(b->folder);
@@ -344,8 +329,7 @@ static void remove_target(struct bench *b)
 }
 
 static int measure_class(struct bench *b, const struct host_bench_class *c,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     if (c->files != HOST_FILES_NONE && b->files == 0) {
         return 0;
     }
@@ -363,8 +347,7 @@ static int measure_class(struct bench *b, const struct host_bench_class *c,
 }
 
 /* What the tables say of themselves. */
-static void print_notes(const struct bench *b)
-{
+static void print_notes(const struct bench *b) {
     printf("Medians of %u rounds.  node: ns of processor time a tetrahedron, "
            "of all nodes;\n+ host: and of the host, from the points in its "
            "memory to the tetrahedra there;\npeers: of one call with the "
@@ -375,8 +358,7 @@ static void print_notes(const struct bench *b)
 }
 
 int host_bench_peers(const struct host_bench_peers_options *options,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     static struct bench bench;
     struct bench *b = &bench;
     const struct host_bench_class *c;

@@ -30,14 +30,12 @@ enum { SIZES = sizeof sizes / sizeof sizes[0] };
 
 /* --- points --------------------------------------------------------------- */
 
-static double least(double before, double now, bool first)
-{
+static double least(double before, double now, bool first) {
     return first || now < before ? now : before;
 }
 
 static int run_once(const struct host_bench_set *set,
-                    struct host_scaling_point *row, struct host_error *error)
-{
+                    struct host_scaling_point *row, struct host_error *error) {
     const char *const words[] = {
         "/proc/self/exe", "run", set->path,    "--format",   "npy",     "-q",
         "--stats",        "-",   "--strategy", "sequential", "--nodes", "1",
@@ -62,8 +60,7 @@ static int run_once(const struct host_bench_set *set,
 }
 
 static int measure_points(struct host_scaling_rows *rows, uint64_t points,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct host_bench_set set;
     struct host_scaling_point row = {.points = points};
     uint64_t fits = RUNS_POINTS / points;
@@ -87,8 +84,7 @@ static int measure_points(struct host_scaling_rows *rows, uint64_t points,
 
 static int model_nodes(struct host_scaling_rows *rows,
                        const struct host_points *points, const char *strategy,
-                       unsigned nodes, struct host_error *error)
-{
+                       unsigned nodes, struct host_error *error) {
     static struct host_virtual_run run;
     struct host_run_options options;
     char phase[48];
@@ -120,8 +116,7 @@ static int model_nodes(struct host_scaling_rows *rows,
 }
 
 static int model_all(struct host_scaling_rows *rows, unsigned nodes_max,
-                     uint64_t count, struct host_error *error)
-{
+                     uint64_t count, struct host_error *error) {
     struct host_points points = {0};
     int status = host_gen("uniform", count, 1, &points, error);
     host_scaling_nodes_head(count);
@@ -138,8 +133,7 @@ static int model_all(struct host_scaling_rows *rows, unsigned nodes_max,
 /* --- all ------------------------------------------------------------------ */
 
 static int print_all(const struct host_scaling_options *o,
-                     struct host_scaling_rows *rows, struct host_error *error)
-{
+                     struct host_scaling_rows *rows, struct host_error *error) {
     int status = 0;
     host_scaling_points_head(rows);
     for (int i = 0; i < SIZES && status == 0; i++) {
@@ -161,8 +155,7 @@ static int print_all(const struct host_scaling_options *o,
 }
 
 int host_bench_scaling(const struct host_scaling_options *options,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     const struct host_scaling_options *o = options;
     if (o->svg != NULL && host_gnuplot_there(o->svg, error) != 0) {
         return error->code;

@@ -11,8 +11,7 @@
 
 enum { HEADER = 128 };
 
-static int put(const struct host_bench_set *set, const void *bytes, size_t n)
-{
+static int put(const struct host_bench_set *set, const void *bytes, size_t n) {
     const char *at = bytes;
     while (n > 0) {
         ssize_t done = write(set->file, at, n);
@@ -27,8 +26,7 @@ static int put(const struct host_bench_set *set, const void *bytes, size_t n)
 
 /* Takes the points over. */
 static int hold(struct host_bench_set *set, struct host_points *points,
-                struct host_error *error)
-{
+                struct host_error *error) {
     char header[HEADER + 1];
     (void)snprintf(header, sizeof header,
                    "\x93NUMPY\x01_%c_{'descr': '<f8', 'fortran_order': False, "
@@ -52,8 +50,7 @@ static int hold(struct host_bench_set *set, struct host_points *points,
 }
 
 int host_bench_set_made(struct host_bench_set *set, const char *kind,
-                        uint64_t n, struct host_error *error)
-{
+                        uint64_t n, struct host_error *error) {
     struct host_points points;
     memset(set, 0, sizeof *set);
     set->file = -1;
@@ -64,8 +61,7 @@ int host_bench_set_made(struct host_bench_set *set, const char *kind,
 }
 
 int host_bench_set_read(struct host_bench_set *set, const char *path,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_points points = {0};
     const char *slash = strrchr(path, '/');
     memset(set, 0, sizeof *set);
@@ -78,8 +74,7 @@ int host_bench_set_read(struct host_bench_set *set, const char *path,
                : hold(set, &points, error);
 }
 
-void host_bench_set_free(struct host_bench_set *set)
-{
+void host_bench_set_free(struct host_bench_set *set) {
     if (set->file >= 0) {
         (void)close(set->file);
         set->file = -1;

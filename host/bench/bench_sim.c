@@ -16,8 +16,7 @@ struct sim_bench {
 };
 
 /* One step of time: end 1 echoes, where that is asked. */
-static void sim_turn(struct sim_bench *s, size_t size)
-{
+static void sim_turn(struct sim_bench *s, size_t size) {
     static const uint8_t bytes[HOST_BENCH_MESSAGE];
     struct link_message message;
     s->now_us += SIM_STEP_US;
@@ -38,8 +37,7 @@ static void sim_turn(struct sim_bench *s, size_t size)
 
 /* Virtual microseconds until end 0 has had `count` messages. */
 static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
-                        size_t size)
-{
+                        size_t size) {
     uint64_t begin = s->now_us;
     s->echo = echo;
     s->got[0] = 0;
@@ -51,8 +49,7 @@ static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
     return (double)(s->now_us - begin);
 }
 
-int host_bench_sim(struct host_bench_row *row, struct host_error *error)
-{
+int host_bench_sim(struct host_bench_row *row, struct host_error *error) {
     static struct sim_bench s;
     static const struct sim_quality quality = {.bytes_per_s =
                                                    HOST_BENCH_SIM_BYTES,

@@ -29,40 +29,34 @@ struct cells {
 };
 
 static struct cell *add(struct cells *c, const char *title, double value,
-                        int digits)
-{
+                        int digits) {
     struct cell *cell = &c->cell[c->count++];
     *cell = (struct cell){.title = title, .value = value, .digits = digits};
     return cell;
 }
 
 static void add_held(struct cells *c, const char *title, double value,
-                     bool most, double goal)
-{
+                     bool most, double goal) {
     struct cell *cell = add(c, title, value, 2);
     cell->held = true;
     cell->most = most;
     cell->goal = goal;
 }
 
-static double over(double a, double b)
-{
+static double over(double a, double b) {
     return a > 0 && b > 0 ? a / b : 0;
 }
 
-static double each(double s, const struct host_bench_result *r)
-{
+static double each(double s, const struct host_bench_result *r) {
     return over(1e9 * s, (double)r->tetrahedra);
 }
 
-static bool has_steps(const struct host_bench_class *c)
-{
+static bool has_steps(const struct host_bench_class *c) {
     return c->made[1].step > 0;
 }
 
 static double step(const struct host_bench_table *t,
-                   const struct host_bench_result *r)
-{
+                   const struct host_bench_result *r) {
     return t->class->first
                ? over(each(r->node, r), each(t->first.node, &t->first))
            : strcmp(t->before_name, r->name) == 0
@@ -71,8 +65,7 @@ static double step(const struct host_bench_table *t,
 }
 
 static void add_times(struct cells *c, const struct host_bench_table *t,
-                      const struct host_bench_result *r)
-{
+                      const struct host_bench_result *r) {
     bool wall = t->class->wall;
     add(c, wall ? "clock" : "node", each(r->node, r), 0);
     if (!wall) {
@@ -94,8 +87,7 @@ static void add_times(struct cells *c, const struct host_bench_table *t,
 }
 
 static void collect(struct cells *c, const struct host_bench_table *t,
-                    const struct host_bench_result *r)
-{
+                    const struct host_bench_result *r) {
     const struct host_bench_class *class = t->class;
     c->count = 0;
     add(c, "points", (double)r->points, 0);
@@ -127,15 +119,13 @@ static void collect(struct cells *c, const struct host_bench_table *t,
     }
 }
 
-static bool reached(const struct cell *cell)
-{
+static bool reached(const struct cell *cell) {
     return cell->value > 0 && !cell->beyond &&
            (cell->most ? cell->value <= cell->goal : cell->value >= cell->goal);
 }
 
 static void print_text(const struct cell *cell, const char *value,
-                       const char *goal)
-{
+                       const char *goal) {
     if (cell->held) {
         printf(" %*s %-6s", VALUE, value, goal);
     } else {
@@ -143,8 +133,7 @@ static void print_text(const struct cell *cell, const char *value,
     }
 }
 
-static void print_cell(struct host_bench_table *t, const struct cell *cell)
-{
+static void print_cell(struct host_bench_table *t, const struct cell *cell) {
     char value[32] = "-", goal[32] = "";
     if (cell->value > 0) {
         (void)snprintf(value, sizeof value, "%s%.*f", cell->beyond ? "> " : "",
@@ -162,8 +151,7 @@ static void print_cell(struct host_bench_table *t, const struct cell *cell)
 
 void host_bench_table_begin(struct host_bench_table *table,
                             const struct host_bench_class *c,
-                            const bool peer[HOST_BENCH_PEERS], double limit_s)
-{
+                            const bool peer[HOST_BENCH_PEERS], double limit_s) {
     static const struct host_bench_result nothing = {.name = ""};
     struct cells cells;
     memset(table, 0, sizeof *table);
@@ -181,8 +169,7 @@ void host_bench_table_begin(struct host_bench_table *table,
 }
 
 void host_bench_table_row(struct host_bench_table *table,
-                          const struct host_bench_result *result)
-{
+                          const struct host_bench_result *result) {
     struct cells cells;
     collect(&cells, table, result);
     host_progress_erase();
@@ -207,14 +194,12 @@ void host_bench_table_row(struct host_bench_table *table,
                    result->name);
 }
 
-static int compare(const void *a, const void *b)
-{
+static int compare(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
-static double mean(const double *ratio, unsigned n)
-{
+static double mean(const double *ratio, unsigned n) {
     double sum = 0;
     for (unsigned i = 0; i < n; i++) {
         sum += log(ratio[i]);
@@ -222,8 +207,7 @@ static double mean(const double *ratio, unsigned n)
     return exp(sum / n);
 }
 
-unsigned host_bench_table_end(struct host_bench_table *table)
-{
+unsigned host_bench_table_end(struct host_bench_table *table) {
     const struct host_bench_class *c = table->class;
     for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
         double *ratio = table->ratio[i], goal = c->summary[i];

@@ -17,8 +17,8 @@
 enum { LOOK_MS = 100 };
 
 /* In the child. */
-static _Noreturn void become(char *const words[], pid_t bench, int out, int err)
-{
+static _Noreturn void become(char *const words[], pid_t bench, int out,
+                             int err) {
     int null = open("/dev/null", O_RDONLY | O_CLOEXEC);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() == bench) { /* else it ended before it could be watched */
@@ -32,8 +32,7 @@ static _Noreturn void become(char *const words[], pid_t bench, int out, int err)
 }
 
 /* Waits for the child, which it ends at the limit. */
-static void await(pid_t child, double limit_s, struct host_trial *trial)
-{
+static void await(pid_t child, double limit_s, struct host_trial *trial) {
     uint64_t begin = host_now_us();
     int end = pidfd_open(child, 0), status = 0;
     struct pollfd ended = {.fd = end, .events = POLLIN};
@@ -53,8 +52,7 @@ static void await(pid_t child, double limit_s, struct host_trial *trial)
 }
 
 /* The last line that is not empty. */
-static void last_line(FILE *err, char *text, size_t size)
-{
+static void last_line(FILE *err, char *text, size_t size) {
     char line[400];
     rewind(err);
     while (fgets(line, sizeof line, err) != NULL) {
@@ -65,18 +63,15 @@ static void last_line(FILE *err, char *text, size_t size)
     }
 }
 
-static double real(const json_t *object, const char *name)
-{
+static double real(const json_t *object, const char *name) {
     return json_number_value(json_object_get(object, name));
 }
 
-static uint64_t whole(const json_t *object, const char *name)
-{
+static uint64_t whole(const json_t *object, const char *name) {
     return (uint64_t)json_integer_value(json_object_get(object, name));
 }
 
-static void read_said(FILE *out, struct host_trial *t)
-{
+static void read_said(FILE *out, struct host_trial *t) {
     rewind(out);
     json_t *said = json_loadf(out, 0, NULL);
     json_t *nodes = json_object_get(said, "per_node"), *node;
@@ -90,8 +85,7 @@ static void read_said(FILE *out, struct host_trial *t)
     t->wall_s = real(said, nodes == NULL ? "wall_s" : "time_triangulation_s");
     (void)snprintf(t->digest, sizeof t->digest, "%s",
                    digest == NULL ? "" : digest);
-    json_array_foreach(nodes, i, node)
-    {
+    json_array_foreach(nodes, i, node) {
         t->cpu_s += real(node, "cpu_s");
         t->pages_asked += whole(node, "page_requests");
     }
@@ -99,8 +93,7 @@ static void read_said(FILE *out, struct host_trial *t)
 }
 
 int host_trial_run(char *const words[], double limit_s,
-                   struct host_trial *trial, struct host_error *error)
-{
+                   struct host_trial *trial, struct host_error *error) {
     FILE *out = tmpfile(), *err = tmpfile();
     pid_t bench = getpid();
     uint64_t begin = host_now_us();

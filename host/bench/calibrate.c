@@ -18,15 +18,13 @@ static const struct {
     {"grid", 8000, 4 << 20},     {"terrain", 10000, 4 << 20},
 };
 
-double host_calibrate_messages(const struct node_finished_message *totals)
-{
+double host_calibrate_messages(const struct node_finished_message *totals) {
     return (double)(totals->bytes_in + totals->bytes_out) / CUBE_PAYLOAD_MAX;
 }
 
 /* Coordinate by coordinate: the sum is convex. */
 void host_calibrate_fit(const double (*a)[HOST_CALIBRATE_TERMS], unsigned rows,
-                        double x[HOST_CALIBRATE_TERMS])
-{
+                        double x[HOST_CALIBRATE_TERMS]) {
     double left[HOST_CALIBRATE_RUNS];
     for (unsigned i = 0; i < rows; i++) {
         left[i] = 1;
@@ -50,8 +48,7 @@ void host_calibrate_fit(const double (*a)[HOST_CALIBRATE_TERMS], unsigned rows,
 
 /* The run that took least: its counts, each over the time in nanoseconds. */
 static int measure(unsigned set, unsigned times,
-                   double row[HOST_CALIBRATE_TERMS], struct host_error *error)
-{
+                   double row[HOST_CALIBRATE_TERMS], struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options o;
     struct host_points points = {0};
@@ -87,16 +84,14 @@ static int measure(unsigned set, unsigned times,
 
 /* A tetrahedron's price is divided as model.h says: calls and tetrahedra come
  * in nearly the same numbers, so that no fit tells them apart. */
-static void divide(struct host_calibration *fit)
-{
+static void divide(struct host_calibration *fit) {
     double both = fit->price[HOST_BENCH_CALLS] + fit->price[HOST_BENCH_BUILT];
     fit->price[HOST_BENCH_BUILT] = host_bench_list_share * both;
     fit->price[HOST_BENCH_CALLS] = both - fit->price[HOST_BENCH_BUILT];
 }
 
 int host_calibrate(bool quick, struct host_calibration *fit,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     double a[HOST_CALIBRATE_RUNS][HOST_CALIBRATE_TERMS];
     double x[HOST_CALIBRATE_TERMS], square = 0;
     for (unsigned i = 0; i < HOST_CALIBRATE_RUNS; i++) {

@@ -10,8 +10,7 @@
 
 /* gnuplot, with these as its standard input and output: as waitpid has it, or
  * -1. */
-static int gnuplot(const char *word, int in, int out)
-{
+static int gnuplot(const char *word, int in, int out) {
     int status = 0;
     pid_t child = fork();
     if (child == 0) {
@@ -23,8 +22,7 @@ static int gnuplot(const char *word, int in, int out)
     return child < 0 || waitpid(child, &status, 0) < 0 ? -1 : status;
 }
 
-int host_gnuplot_there(const char *path, struct host_error *error)
-{
+int host_gnuplot_there(const char *path, struct host_error *error) {
     int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
     int status = nothing < 0 ? -1 : gnuplot("--version", nothing, nothing);
     (void)close(nothing);
@@ -37,8 +35,8 @@ int host_gnuplot_there(const char *path, struct host_error *error)
 
 /* With its standard input from the script and its output to the file, whose
  * name may have any letters. */
-int host_gnuplot_draw(FILE *script, const char *path, struct host_error *error)
-{
+int host_gnuplot_draw(FILE *script, const char *path,
+                      struct host_error *error) {
     (void)fflush(script);
     rewind(script);
     FILE *out = host_create_over(path);

@@ -51,8 +51,7 @@ const struct host_bench_machine host_bench_here = {.name = "this machine",
                                                    .gather_us = 2};
 
 void host_bench_counts(const struct node_finished_message *totals,
-                       double counts[HOST_BENCH_COUNTS])
-{
+                       double counts[HOST_BENCH_COUNTS]) {
     const struct incode_statistics *s = &totals->statistics;
     counts[HOST_BENCH_CALLS] = (double)s->make_tetra_calls;
     counts[HOST_BENCH_BUILT] = (double)s->tetrahedra_built;
@@ -61,8 +60,7 @@ void host_bench_counts(const struct node_finished_message *totals,
 }
 
 double host_bench_work_ns(const double price[HOST_BENCH_COUNTS],
-                          const double counts[HOST_BENCH_COUNTS])
-{
+                          const double counts[HOST_BENCH_COUNTS]) {
     double ns = 0;
     for (int k = 0; k < HOST_BENCH_COUNTS; k++) {
         ns += price[k] * counts[k];
@@ -72,8 +70,7 @@ double host_bench_work_ns(const double price[HOST_BENCH_COUNTS],
 
 double host_bench_node_ns(const struct host_bench_machine *machine,
                           const struct node_finished_message *totals,
-                          uint64_t messages)
-{
+                          uint64_t messages) {
     double counts[HOST_BENCH_COUNTS];
     host_bench_counts(totals, counts);
     return machine->scale * host_bench_work_ns(machine->price, counts) +
@@ -81,8 +78,7 @@ double host_bench_node_ns(const struct host_bench_machine *machine,
 }
 
 double host_bench_io_s(const struct host_bench_machine *machine, uint64_t bytes,
-                       unsigned dimension)
-{
+                       unsigned dimension) {
     const struct sim_quality *h = &machine->host_wire, *w = &machine->wire;
     double hop_s =
         1e-6 * w->latency_us + (double)INCODE_PAGE_BYTES / w->bytes_per_s;

@@ -232,8 +232,7 @@ static const struct host_paper_series all[] = {
 const struct host_paper_series *host_paper_find(const char *table,
                                                 const char *set,
                                                 uint64_t points,
-                                                const char *what)
-{
+                                                const char *what) {
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         const struct host_paper_series *s = &all[i];
         if (strcmp(s->table, table) == 0 && strcmp(s->set, set) == 0 &&
@@ -245,8 +244,7 @@ const struct host_paper_series *host_paper_find(const char *table,
 }
 
 const struct host_paper_row *
-host_paper_row_of(const struct host_paper_series *series, unsigned nodes)
-{
+host_paper_row_of(const struct host_paper_series *series, unsigned nodes) {
     for (int i = 0; series != NULL && i < HOST_PAPER_ROWS; i++) {
         if (series->row[i].t_max > 0 && series->row[i].nodes == nodes) {
             return &series->row[i];

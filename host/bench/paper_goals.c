@@ -5,8 +5,7 @@
 
 /* Speed-up of a run on Uniform 20,000 by the model of the nCUBE 2; 0: error. */
 static double speed_up(struct host_paper_bench *bench, const char *strategy,
-                       unsigned nodes, struct host_error *error)
-{
+                       unsigned nodes, struct host_error *error) {
     const struct host_paper_case c = {
         .set = "Uniform",
         .points = 20000,
@@ -22,16 +21,14 @@ static double speed_up(struct host_paper_bench *bench, const char *strategy,
     return r == NULL ? 0 : alone_s / r->t_max;
 }
 
-static double paper_speed_up(const char *table, unsigned nodes)
-{
+static double paper_speed_up(const char *table, unsigned nodes) {
     const struct host_paper_series *s =
         host_paper_find(table, "Uniform", 20000, "");
     return s->alone_s / host_paper_row_of(s, nodes)->t_max;
 }
 
 /* The paper's, in its own figures. */
-static void paper_relation(unsigned n)
-{
+static void paper_relation(unsigned n) {
     double gain = paper_speed_up("2", 4 * n) / paper_speed_up("2", n);
     double slaves = paper_speed_up("6", 3);
     host_paper_note("N = %2u, the paper's figures: %.2f %s %.2f", n, gain,
@@ -39,8 +36,7 @@ static void paper_relation(unsigned n)
 }
 
 static int model_relation(struct host_paper_bench *bench, unsigned n,
-                          double slaves, struct host_error *error)
-{
+                          double slaves, struct host_error *error) {
     double few = speed_up(bench, "spatial", n, error);
     double many = few > 0 ? speed_up(bench, "spatial", 4 * n, error) : 0;
     if (error->code == 0) {
@@ -56,8 +52,7 @@ static int model_relation(struct host_paper_bench *bench, unsigned n,
 /* Formula (2): S_hybrid(4N) = S_spatial(N) * S_master-slaves(4), with initial
  * work counted once, which here is next to nothing. */
 static int estimate(struct host_paper_bench *bench, unsigned nodes,
-                    double slaves, struct host_error *error)
-{
+                    double slaves, struct host_error *error) {
     double paper = paper_speed_up("5", nodes);
     double regions = speed_up(bench, "spatial", nodes / 4, error);
     double hybrid = regions > 0 && host_paper_has(bench, "hybrid")
@@ -81,8 +76,7 @@ static int estimate(struct host_paper_bench *bench, unsigned nodes,
 }
 
 int host_paper_relation(struct host_paper_bench *bench,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     double slaves = 0;
     host_paper_table(&bench->print, "relation",
                      "Relation (1): S_spatial(4N) / S_spatial(N) < "
@@ -130,14 +124,12 @@ static const struct goal goals[] = {
     {"Uniform", "exchange", 1000000, 1024, EFFICIENCY, 0.60, 0.70, 0, true},
 };
 
-static bool meets(const struct goal *g, double value, double goal)
-{
+static bool meets(const struct goal *g, double value, double goal) {
     return g->figure == DUPLICATION ? value <= goal : value >= goal;
 }
 
 static void say(const struct host_paper_bench *bench, const struct goal *g,
-                double value)
-{
+                double value) {
     static const char *const figures[] = {"duplication factor", "efficiency",
                                           "speed-up"};
     char wanted[48] = "", paper[32] = "";
@@ -159,8 +151,7 @@ static void say(const struct host_paper_bench *bench, const struct goal *g,
 }
 
 static int hold(struct host_paper_bench *bench, const struct goal *g,
-                struct host_error *error)
-{
+                struct host_error *error) {
     const struct host_paper_case c = {.set = g->set,
                                       .points = g->points,
                                       .strategy = g->strategy,
@@ -178,8 +169,7 @@ static int hold(struct host_paper_bench *bench, const struct goal *g,
     return error->code;
 }
 
-int host_paper_goals(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_goals(struct host_paper_bench *bench, struct host_error *error) {
     const char *missing = "";
     host_paper_table(&bench->print, "goals", "Goals, modelled nCUBE 2");
     for (size_t i = 0; i < sizeof goals / sizeof goals[0]; i++) {

@@ -14,8 +14,7 @@ static const uint8_t faces[4][3] = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
 
 /* In the list of its lowest vertex, turned until that comes first. */
 static void toggle(struct incode_afl *afl, const uint32_t v[4],
-                   const uint8_t face[3])
-{
+                   const uint8_t face[3]) {
     uint32_t f[3] = {v[face[0]], v[face[1]], v[face[2]]};
     unsigned first =
         f[0] < f[1] ? (f[0] < f[2] ? 0 : 2) : (f[1] < f[2] ? 1 : 2);
@@ -23,8 +22,7 @@ static void toggle(struct incode_afl *afl, const uint32_t v[4],
 }
 
 int host_paper_list(const struct host_tetrahedra *tets, uint64_t vertices,
-                    struct host_paper_list *list, struct host_error *error)
-{
+                    struct host_paper_list *list, struct host_error *error) {
     struct incode_afl afl;
     uint32_t capacity = (uint32_t)(2 * tets->count + 4);
     uint32_t bricks = (uint32_t)(vertices / INCODE_BRICK_POINTS + 1);

@@ -49,13 +49,11 @@ static const struct curve curves[] = {
 
 enum { CURVES = sizeof curves / sizeof curves[0] };
 
-static void point(FILE *plot, unsigned nodes, double per_s, double mflops)
-{
+static void point(FILE *plot, unsigned nodes, double per_s, double mflops) {
     fprintf(plot, "%u %.6g %.6g\n", nodes, per_s, per_s / (nodes * mflops));
 }
 
-static void paper_curve(FILE *plot, const struct curve *curve, double mflops)
-{
+static void paper_curve(FILE *plot, const struct curve *curve, double mflops) {
     const struct host_paper_series *s =
         host_paper_find(curve->table, "Uniform", 20000, "");
     for (int i = 0; i < HOST_PAPER_ROWS && s->row[i].t_max > 0; i++) {
@@ -66,8 +64,7 @@ static void paper_curve(FILE *plot, const struct curve *curve, double mflops)
 
 static int modelled_curve(struct host_paper_bench *bench, FILE *plot,
                           const struct curve *curve, double mflops,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct host_paper_case c = {.set = "Uniform",
                                 .points = 20000,
                                 .strategy = curve->strategy,
@@ -88,8 +85,7 @@ static int modelled_curve(struct host_paper_bench *bench, FILE *plot,
     return error->code;
 }
 
-static bool drawn(const struct host_paper_bench *bench, const struct curve *c)
-{
+static bool drawn(const struct host_paper_bench *bench, const struct curve *c) {
     const char *only = bench->options->strategy;
     return c->table != NULL ||
            (host_strategy_named(c->strategy) != NULL &&
@@ -98,8 +94,7 @@ static bool drawn(const struct host_paper_bench *bench, const struct curve *c)
 
 /* One panel; column: of the curves' data. */
 static void panel(const struct host_paper_bench *bench, FILE *plot,
-                  const char *title, int column)
-{
+                  const char *title, int column) {
     fprintf(plot, "set title \"%s\"\nplot ", title);
     for (int i = 0; i < CURVES; i++) {
         const char *form = curves[i].table != NULL
@@ -114,8 +109,7 @@ static void panel(const struct host_paper_bench *bench, FILE *plot,
 }
 
 static int draw(struct host_paper_bench *bench, FILE *plot,
-                struct host_error *error)
-{
+                struct host_error *error) {
     for (int i = 0; i < CURVES && error->code == 0; i++) {
         const struct curve *c = &curves[i];
         double mflops = bench->runs.machine[c->machine].mflops;
@@ -139,8 +133,7 @@ static int draw(struct host_paper_bench *bench, FILE *plot,
 }
 
 int host_paper_figure_11(struct host_paper_bench *bench,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     const char *path = bench->options->svg;
     host_paper_table(
         &bench->print, "11",

@@ -9,8 +9,7 @@
 #include "host/order/names.h"
 
 int host_paper_print_begin(struct host_paper_print *print, const char *csv,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     *print = (struct host_paper_print){NULL, ""};
     if (csv == NULL) {
         return 0;
@@ -30,8 +29,7 @@ int host_paper_print_begin(struct host_paper_print *print, const char *csv,
 }
 
 int host_paper_print_end(struct host_paper_print *print, const char *csv,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     FILE *file = print->csv;
     print->csv = NULL;
     if (file == NULL) {
@@ -45,16 +43,14 @@ int host_paper_print_end(struct host_paper_print *print, const char *csv,
 }
 
 void host_paper_table(struct host_paper_print *print, const char *table,
-                      const char *title)
-{
+                      const char *title) {
     host_progress_erase();
     print->table = table;
     printf("\n%s\n", title);
     (void)fflush(stdout);
 }
 
-void host_paper_note(const char *format, ...)
-{
+void host_paper_note(const char *format, ...) {
     va_list arguments;
     host_progress_erase();
     va_start(arguments, format);
@@ -64,8 +60,7 @@ void host_paper_note(const char *format, ...)
     (void)fflush(stdout);
 }
 
-void host_paper_head(const char *first, const char *format, ...)
-{
+void host_paper_head(const char *first, const char *format, ...) {
     va_list arguments;
     host_progress_erase();
     printf("\n");
@@ -80,14 +75,12 @@ void host_paper_head(const char *first, const char *format, ...)
     (void)fflush(stdout);
 }
 
-static double over(double a, double b)
-{
+static double over(double a, double b) {
     return b > 0 ? a / b : 0;
 }
 
 /* "-" for what is not known. */
-static void number(int width, int digits, double value)
-{
+static void number(int width, int digits, double value) {
     if (value > 0) {
         printf(" %*.*f", width, digits, value);
     } else {
@@ -96,14 +89,12 @@ static void number(int width, int digits, double value)
 }
 
 /* Nodes that an efficiency is of: a manager, and its builders. */
-static unsigned elements_of(unsigned nodes, unsigned builders)
-{
+static unsigned elements_of(unsigned nodes, unsigned builders) {
     return builders > 0 ? builders + 1 : nodes;
 }
 
 static void paper_half(const struct host_paper_series *series,
-                       const struct host_paper_row *row, unsigned nodes)
-{
+                       const struct host_paper_row *row, unsigned nodes) {
     double speed_up = over(series->alone_s, row->t_max);
     printf(" |");
     number(8, 2, row->t_min);
@@ -115,13 +106,11 @@ static void paper_half(const struct host_paper_series *series,
     number(6, 0, over((double)series->tetrahedra, row->t_max));
 }
 
-static void csv_text(FILE *file, const char *text)
-{
+static void csv_text(FILE *file, const char *text) {
     fprintf(file, "%s,", text == NULL ? "" : text);
 }
 
-static void csv_number(FILE *file, double value, char end)
-{
+static void csv_number(FILE *file, double value, char end) {
     if (value > 0) {
         fprintf(file, "%.9g", value);
     }
@@ -129,8 +118,7 @@ static void csv_number(FILE *file, double value, char end)
 }
 
 void host_paper_csv_row(struct host_paper_print *print,
-                        const struct host_paper_csv *r)
-{
+                        const struct host_paper_csv *r) {
     FILE *f = print->csv;
     if (f == NULL) {
         return;
@@ -167,8 +155,7 @@ void host_paper_csv_row(struct host_paper_print *print,
 static void csv_of(struct host_paper_print *print,
                    const struct host_paper_result *r, double speed_up,
                    const struct host_bench_machine *machine,
-                   const struct host_paper_row *row)
-{
+                   const struct host_paper_row *row) {
     static const struct host_paper_row none;
     const struct host_paper_row *p = row == NULL ? &none : row;
     const struct host_paper_csv line = {
@@ -200,8 +187,7 @@ void host_paper_line(struct host_paper_print *print,
                      const struct host_paper_result *result, double alone_s,
                      const struct host_bench_machine *machine,
                      const struct host_paper_series *series,
-                     const struct host_paper_row *row)
-{
+                     const struct host_paper_row *row) {
     const struct host_paper_result *r = result;
     unsigned nodes = elements_of(r->c.nodes, r->c.builders);
     double speed_up = over(alone_s, r->t_max);

@@ -17,8 +17,7 @@ enum { FIN_I = 40, FIN_J = 32, FIN_K = 32, FIN = FIN_I * FIN_J * FIN_K };
 /* Every second node along the second and third index, and in a quick run every
  * fourth and the second along the first: 10,240 or 1,280 points. */
 static int thin_fin(const struct host_points *whole, bool quick,
-                    struct host_points *points, struct host_error *error)
-{
+                    struct host_points *points, struct host_error *error) {
     unsigned step_i = quick ? 2 : 1, step = quick ? 4 : 2;
     for (unsigned row = 0; row < FIN && error->code == 0; row++) {
         unsigned i = row % FIN_I, j = row / FIN_I % FIN_J,
@@ -32,8 +31,7 @@ static int thin_fin(const struct host_points *whole, bool quick,
 }
 
 static int make_fin(const struct host_paper_runs *runs,
-                    struct host_points *points, struct host_error *error)
-{
+                    struct host_points *points, struct host_error *error) {
     struct host_points whole = {0};
     int status = runs->bluntfin == NULL
                      ? host_gen("bluntfin", FIN, 1, &whole, error)
@@ -53,8 +51,7 @@ static int make_fin(const struct host_paper_runs *runs,
 
 static int make_set(const struct host_paper_runs *runs, const char *set,
                     uint64_t points, struct host_points *xyz,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     uint64_t n = runs->quick ? points / HOST_PAPER_QUICK : points;
     if (strcmp(set, "Blunt Fin") == 0) {
         return make_fin(runs, xyz, error);
@@ -65,8 +62,7 @@ static int make_set(const struct host_paper_runs *runs, const char *set,
 
 const struct host_points *host_paper_set(struct host_paper_runs *runs,
                                          const char *set, uint64_t points,
-                                         struct host_error *error)
-{
+                                         struct host_error *error) {
     for (unsigned i = 0; i < runs->sets; i++) {
         if (strcmp(runs->set[i].set, set) == 0 &&
             runs->set[i].points == points) {
@@ -90,8 +86,7 @@ const struct host_points *host_paper_set(struct host_paper_runs *runs,
 /* --- runs ----------------------------------------------------------------- */
 
 static void configure(const struct host_paper_case *c,
-                      struct host_run_options *options)
-{
+                      struct host_run_options *options) {
     host_run_defaults(options);
     options->strategy = host_strategy_named(c->strategy);
     options->nodes = c->nodes;
@@ -103,8 +98,7 @@ static void configure(const struct host_paper_case *c,
 }
 
 /* As "exchange, 128 nodes": what the line on the terminal says. */
-static void show(const struct host_paper_case *c)
-{
+static void show(const struct host_paper_case *c) {
     static char phase[96];
     (void)snprintf(phase, sizeof phase, "%s %llu, %s, %u node%s", c->set,
                    (unsigned long long)c->points, c->strategy, c->nodes,
@@ -112,8 +106,7 @@ static void show(const struct host_paper_case *c)
     host_progress_phase(phase, NULL);
 }
 
-static double busiest(const struct host_run_result *r)
-{
+static double busiest(const struct host_run_result *r) {
     uint64_t most = 0;
     for (unsigned i = 0; i < r->nodes; i++) {
         uint64_t us = r->node[i].statistics.busy_us;
@@ -124,8 +117,8 @@ static double busiest(const struct host_run_result *r)
 
 static int make_run(struct host_paper_runs *runs,
                     const struct host_paper_case *c,
-                    struct host_paper_result *result, struct host_error *error)
-{
+                    struct host_paper_result *result,
+                    struct host_error *error) {
     static struct host_virtual_run run;
     struct host_run_options options;
     const struct host_points *points =
@@ -155,8 +148,7 @@ static int make_run(struct host_paper_runs *runs,
 }
 
 static bool same(const struct host_paper_case *a,
-                 const struct host_paper_case *b)
-{
+                 const struct host_paper_case *b) {
     return strcmp(a->set, b->set) == 0 && a->points == b->points &&
            strcmp(a->strategy, b->strategy) == 0 &&
            a->paper_rule == b->paper_rule && a->partition == b->partition &&
@@ -166,8 +158,7 @@ static bool same(const struct host_paper_case *a,
 
 const struct host_paper_result *host_paper_run(struct host_paper_runs *runs,
                                                const struct host_paper_case *c,
-                                               struct host_error *error)
-{
+                                               struct host_error *error) {
     for (unsigned i = 0; i < runs->results; i++) {
         if (same(&runs->result[i].c, c)) {
             return &runs->result[i];
@@ -189,8 +180,7 @@ const struct host_paper_result *host_paper_run(struct host_paper_runs *runs,
 static const struct host_paper_result *alone(struct host_paper_runs *runs,
                                              const char *set, uint64_t points,
                                              enum host_paper_machine machine,
-                                             struct host_error *error)
-{
+                                             struct host_error *error) {
     const struct host_paper_case c = {.set = set,
                                       .points = points,
                                       .strategy = "sequential",
@@ -201,8 +191,7 @@ static const struct host_paper_result *alone(struct host_paper_runs *runs,
 
 double host_paper_alone_s(struct host_paper_runs *runs,
                           const struct host_paper_case *c,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     const struct host_paper_result *r =
         alone(runs, c->set, c->points, c->machine, error);
     return r == NULL ? 0 : r->t_max;
@@ -212,8 +201,7 @@ double host_paper_alone_s(struct host_paper_runs *runs,
  * been run; a slow machine's nodes divide it into smaller steps, so that it is
  * run once more, at the scale that was found.  All points, quick or not. */
 static int find_scale(struct host_bench_machine *machine,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     static struct host_paper_runs whole;
     machine->scale = 1;
     for (int i = 0; i < 2 && error->code == 0; i++) {
@@ -229,8 +217,7 @@ static int find_scale(struct host_bench_machine *machine,
 }
 
 int host_paper_runs_begin(struct host_paper_runs *runs,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     runs->machine[HOST_PAPER_NCUBE] = host_bench_ncube;
     runs->machine[HOST_PAPER_WORKSTATIONS] = host_bench_workstations;
     runs->machine[HOST_PAPER_HERE] = host_bench_here;
@@ -242,8 +229,7 @@ int host_paper_runs_begin(struct host_paper_runs *runs,
     return error->code;
 }
 
-void host_paper_runs_end(struct host_paper_runs *runs)
-{
+void host_paper_runs_end(struct host_paper_runs *runs) {
     for (unsigned i = 0; i < runs->sets; i++) {
         host_points_free(&runs->set[i].xyz);
     }

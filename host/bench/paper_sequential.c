@@ -16,8 +16,7 @@
 static int run(const struct host_points *points, const char *strategy,
                unsigned nodes, enum incode_index index,
                struct host_tetrahedra *tets, struct host_run_result *result,
-               struct host_error *error)
-{
+               struct host_error *error) {
     struct host_run_options o;
     struct host_tetrahedra own = {0};
     host_run_defaults(&o);
@@ -33,8 +32,7 @@ static int run(const struct host_points *points, const char *strategy,
     return status;
 }
 
-static double busiest(const struct host_run_result *r)
-{
+static double busiest(const struct host_run_result *r) {
     uint64_t most = 0;
     for (unsigned i = 0; i < r->nodes; i++) {
         uint64_t us = r->node[i].statistics.busy_us;
@@ -48,8 +46,7 @@ static double busiest(const struct host_run_result *r)
 /* Rows of points become vertex numbers, as the nodes count them. */
 static int number_vertices(const struct host_points *points,
                            struct host_tetrahedra *tets, uint64_t *vertices,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     struct host_order order = {0};
     if (host_order_make(&order, "points", points->xyz, points->count,
                         HOST_ADAPTIVE, 1, false, error) != 0) {
@@ -74,8 +71,7 @@ static int number_vertices(const struct host_points *points,
 
 static void put_csv(struct host_paper_bench *bench,
                     const struct host_run_result *r, enum incode_index index,
-                    double paper_s)
-{
+                    double paper_s) {
     const struct host_paper_csv row = {.set = "Uniform",
                                        .machine = "this machine",
                                        .how = "measured",
@@ -97,8 +93,7 @@ static void put_csv(struct host_paper_bench *bench,
 
 static int sequential_row(struct host_paper_bench *bench,
                           const struct host_paper_sequential *p,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     static struct host_run_result r;
     static const enum incode_index indexes[] = {INCODE_NAIVE, INCODE_GRID,
                                                 INCODE_KD};
@@ -137,8 +132,8 @@ static int sequential_row(struct host_paper_bench *bench,
     return 0;
 }
 
-int host_paper_table_1(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_1(struct host_paper_bench *bench,
+                       struct host_error *error) {
     host_paper_table(&bench->print, "1",
                      "Table 1: the sequential program, naive and optimised; "
                      "measured on this machine | the paper's IBM R6000/340");
@@ -159,8 +154,7 @@ int host_paper_table_1(struct host_paper_bench *bench, struct host_error *error)
 
 /* --- the model ------------------------------------------------------------ */
 
-static void print_fit(const struct host_calibration *fit)
-{
+static void print_fit(const struct host_calibration *fit) {
     char prices[256] = "";
     size_t used = 0;
     for (int k = 0; k < HOST_BENCH_COUNTS; k++) {
@@ -180,8 +174,7 @@ static void print_fit(const struct host_calibration *fit)
 /* The least of three real runs, and the model's. */
 static int hold(struct host_paper_bench *bench,
                 const struct host_calibration *fit, const char *set,
-                uint64_t points, unsigned nodes, struct host_error *error)
-{
+                uint64_t points, unsigned nodes, struct host_error *error) {
     static struct host_run_result r;
     double busy = INFINITY, wall = INFINITY;
     const struct host_points *xyz =
@@ -212,8 +205,7 @@ static int hold(struct host_paper_bench *bench,
     return error->code;
 }
 
-int host_paper_check(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_check(struct host_paper_bench *bench, struct host_error *error) {
     static struct host_calibration fit;
     static const struct {
         const char *set;

@@ -12,8 +12,8 @@ struct series {
     unsigned first, last; /* nodes, doubled from row to row */
 };
 
-bool host_paper_has(const struct host_paper_bench *bench, const char *strategy)
-{
+bool host_paper_has(const struct host_paper_bench *bench,
+                    const char *strategy) {
     const char *only = bench->options->strategy;
     if (only != NULL && strcmp(only, strategy) != 0) {
         return false;
@@ -27,8 +27,7 @@ bool host_paper_has(const struct host_paper_bench *bench, const char *strategy)
 
 static int row(struct host_paper_bench *bench, const struct series *s,
                const struct host_paper_case *c,
-               const struct host_paper_row *paper, struct host_error *error)
-{
+               const struct host_paper_row *paper, struct host_error *error) {
     double alone_s = host_paper_alone_s(&bench->runs, c, error);
     const struct host_paper_result *r =
         alone_s > 0 ? host_paper_run(&bench->runs, c, error) : NULL;
@@ -40,8 +39,7 @@ static int row(struct host_paper_bench *bench, const struct series *s,
 }
 
 static void head(const struct host_paper_bench *bench, const struct series *s,
-                 const char *first)
-{
+                 const char *first) {
     const struct host_paper_case *c = &s->c;
     host_paper_head(first, "%s %llu%s, %s, %s partition%s; modelled %s%s",
                     c->set, (unsigned long long)c->points,
@@ -53,8 +51,7 @@ static void head(const struct host_paper_bench *bench, const struct series *s,
 }
 
 static int series(struct host_paper_bench *bench, const struct series *s,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     struct host_paper_case c = s->c;
     unsigned most = bench->options->nodes_max;
     if (!host_paper_has(bench, c.strategy)) {
@@ -72,8 +69,7 @@ static int series(struct host_paper_bench *bench, const struct series *s,
 /* A manager, and so many builders beside it, in the least cube that has them.
  */
 static int builders(struct host_paper_bench *bench, const struct series *s,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_paper_case c = s->c;
     if (!host_paper_has(bench, c.strategy)) {
         return 0;
@@ -94,8 +90,8 @@ static int builders(struct host_paper_bench *bench, const struct series *s,
     return error->code;
 }
 
-int host_paper_table_2(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_2(struct host_paper_bench *bench,
+                       struct host_error *error) {
     host_paper_table(&bench->print, "2",
                      "Table 2: spatial decomposition of uniform sets, and what "
                      "goes beyond it");
@@ -118,8 +114,8 @@ int host_paper_table_2(struct host_paper_bench *bench, struct host_error *error)
     return error->code;
 }
 
-int host_paper_table_3(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_3(struct host_paper_bench *bench,
+                       struct host_error *error) {
     host_paper_table(&bench->print, "3",
                      "Table 3: spatial decomposition over Linda, and by "
                      "messages, on workstations");
@@ -140,8 +136,8 @@ int host_paper_table_3(struct host_paper_bench *bench, struct host_error *error)
     return error->code;
 }
 
-int host_paper_table_4(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_4(struct host_paper_bench *bench,
+                       struct host_error *error) {
     static const struct {
         const char *set;
         uint64_t points;
@@ -174,8 +170,8 @@ int host_paper_table_4(struct host_paper_bench *bench, struct host_error *error)
     return error->code;
 }
 
-int host_paper_table_5(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_5(struct host_paper_bench *bench,
+                       struct host_error *error) {
     host_paper_table(&bench->print, "5",
                      "Table 5: clusters of four nodes, which the authors "
                      "estimated");
@@ -187,8 +183,8 @@ int host_paper_table_5(struct host_paper_bench *bench, struct host_error *error)
     return series(bench, &s, error);
 }
 
-int host_paper_table_6(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_6(struct host_paper_bench *bench,
+                       struct host_error *error) {
     static const uint64_t points[] = {4000, 6000, 8000, 10000, 20000};
     host_paper_table(&bench->print, "6",
                      "Table 6: a face manager and its tetrahedron builders");
@@ -203,8 +199,8 @@ int host_paper_table_6(struct host_paper_bench *bench, struct host_error *error)
     return error->code;
 }
 
-int host_paper_table_7(struct host_paper_bench *bench, struct host_error *error)
-{
+int host_paper_table_7(struct host_paper_bench *bench,
+                       struct host_error *error) {
     host_paper_table(&bench->print, "7",
                      "Table 7: the same over Linda, on workstations");
     for (uint64_t n = 10000; n <= 20000 && error->code == 0; n += 10000) {

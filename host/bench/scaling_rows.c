@@ -13,14 +13,12 @@ const char *const host_scaling_strategies[HOST_SCALING_STRATEGIES] = {
 static const double most_of_a_million = 1.15;
 
 /* Nanoseconds for each of so many. */
-static double each(double s, uint64_t count)
-{
+static double each(double s, uint64_t count) {
     return 1e9 * s / (double)count;
 }
 
 static const struct host_scaling_point *
-row_of(const struct host_scaling_rows *rows, uint64_t points)
-{
+row_of(const struct host_scaling_rows *rows, uint64_t points) {
     for (unsigned i = 0; i < rows->points; i++) {
         if (rows->point[i].points == points) {
             return &rows->point[i];
@@ -29,8 +27,7 @@ row_of(const struct host_scaling_rows *rows, uint64_t points)
     return NULL;
 }
 
-void host_scaling_points_head(struct host_scaling_rows *rows)
-{
+void host_scaling_points_head(struct host_scaling_rows *rows) {
     host_progress_erase();
     printf("Uniform points, sequential on one node of 4M: ns of processor time "
            "a point, of the\nnode, of the host (files apart) and of both; ns a "
@@ -48,8 +45,7 @@ void host_scaling_points_head(struct host_scaling_rows *rows)
 }
 
 void host_scaling_points_row(struct host_scaling_rows *rows,
-                             const struct host_scaling_point *point)
-{
+                             const struct host_scaling_point *point) {
     const struct host_scaling_point *p = &rows->point[rows->points++];
     rows->point[rows->points - 1] = *point;
     const struct host_scaling_point *million = row_of(rows, 1000000);
@@ -79,8 +75,7 @@ void host_scaling_points_row(struct host_scaling_rows *rows,
     }
 }
 
-void host_scaling_nodes_head(uint64_t points)
-{
+void host_scaling_nodes_head(uint64_t points) {
     host_progress_erase();
     printf("\nUniform %llu in virtual time, at the prices of this machine's "
            "model, as processes here\nshare processors: ns of processor time a "
@@ -97,8 +92,8 @@ void host_scaling_nodes_head(uint64_t points)
 }
 
 /* The first of the strategy. */
-static double alone(const struct host_scaling_rows *rows, const char *strategy)
-{
+static double alone(const struct host_scaling_rows *rows,
+                    const char *strategy) {
     unsigned i = 0;
     while (strcmp(rows->node[i].strategy, strategy) != 0) {
         i++;
@@ -107,8 +102,7 @@ static double alone(const struct host_scaling_rows *rows, const char *strategy)
 }
 
 void host_scaling_nodes_row(struct host_scaling_rows *rows,
-                            const struct host_scaling_node *node)
-{
+                            const struct host_scaling_node *node) {
     const struct host_scaling_node *n = &rows->node[rows->nodes++];
     rows->node[rows->nodes - 1] = *node;
     double speed_up = alone(rows, n->strategy) / n->busiest_s;
@@ -137,8 +131,7 @@ void host_scaling_nodes_row(struct host_scaling_rows *rows,
 
 /* --- the figure ----------------------------------------------------------- */
 
-static void put_data(const struct host_scaling_rows *rows, FILE *plot)
-{
+static void put_data(const struct host_scaling_rows *rows, FILE *plot) {
     fprintf(plot, "$p << END\n");
     for (unsigned i = 0; i < rows->points; i++) {
         const struct host_scaling_point *p = &rows->point[i];
@@ -161,8 +154,7 @@ static void put_data(const struct host_scaling_rows *rows, FILE *plot)
     }
 }
 
-static void put_panels(FILE *plot)
-{
+static void put_panels(FILE *plot) {
     static const char form[] = "with linespoints pointtype 7 pointsize 0.5";
     fprintf(plot,
             "set terminal svg size 1000,520 dynamic\n"
@@ -188,8 +180,7 @@ static void put_panels(FILE *plot)
 }
 
 int host_scaling_draw(const struct host_scaling_rows *rows, const char *path,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     FILE *script = tmpfile();
     if (script == NULL) {
         return host_fail(error, HOST_BROKEN, "%s: %s; free memory", path,

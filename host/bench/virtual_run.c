@@ -17,8 +17,7 @@ struct virtual_world {
     uint64_t page_bytes_to_all;
 };
 
-static uint64_t used_ns(void *context, unsigned i, const struct node *node)
-{
+static uint64_t used_ns(void *context, unsigned i, const struct node *node) {
     const struct virtual_world *v = context;
     const struct cube_statistics *m = node_messages(node);
     struct node_finished_message totals;
@@ -28,8 +27,7 @@ static uint64_t used_ns(void *context, unsigned i, const struct node *node)
                                                  m->written + m->read));
 }
 
-static int open_world(struct virtual_world *v, struct host_error *error)
-{
+static int open_world(struct virtual_world *v, struct host_error *error) {
     const struct host_run_options *run = v->run->options;
     const struct host_bench_machine *m = v->run->machine;
     struct host_world_options o = {
@@ -51,8 +49,7 @@ static int open_world(struct virtual_world *v, struct host_error *error)
 }
 
 static int serve(struct virtual_world *v, struct host_machine *machine,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     const struct host_run_options *run = v->run->options;
     struct host_service *s = &v->service;
     s->machine = machine;
@@ -76,8 +73,7 @@ static int serve(struct virtual_world *v, struct host_machine *machine,
     return status;
 }
 
-static void sum(struct virtual_world *v)
-{
+static void sum(struct virtual_world *v) {
     struct host_virtual_run *run = v->run;
     struct host_run_result *r = &run->result;
     uint64_t bytes = v->page_bytes_to_all;
@@ -95,8 +91,8 @@ static void sum(struct virtual_world *v)
 }
 
 int host_virtual_run(struct host_virtual_run *run,
-                     const struct host_points *points, struct host_error *error)
-{
+                     const struct host_points *points,
+                     struct host_error *error) {
     struct virtual_world *v = calloc(1, sizeof *v);
     if (v == NULL) {
         return host_fail_memory(error, "the simulated cube");

@@ -31,8 +31,7 @@ enum { NAMED_MAX = 8 }; /* faults in the report's text */
 
 /* --- Faults ----------------------------------------------------------- */
 
-static bool make_fault_room(struct check *c)
-{
+static bool make_fault_room(struct check *c) {
     uint64_t room = c->faults_room + c->faults_room / 2 + NAMED_MAX;
     struct check_fault *grown =
         realloc(c->fault, (size_t)room * sizeof *c->fault);
@@ -47,8 +46,7 @@ static bool make_fault_room(struct check *c)
 
 void check_fault(struct check *c, const char *subject, const char *what,
                  const uint64_t *tets, int tet_count, const uint32_t *vertices,
-                 int count)
-{
+                 int count) {
     struct check_fault f = {.subject = subject, .what = what};
     f.tets = (uint8_t)tet_count;
     f.vertices = (uint8_t)count;
@@ -70,8 +68,7 @@ void check_fault(struct check *c, const char *subject, const char *what,
     (void)pthread_mutex_unlock(&c->lock);
 }
 
-void check_fail(struct check *c, const struct host_error *error)
-{
+void check_fail(struct check *c, const struct host_error *error) {
     (void)pthread_mutex_lock(&c->lock);
     if (error->code != 0 && c->error->code == 0) {
         *c->error = *error;
@@ -80,15 +77,13 @@ void check_fail(struct check *c, const struct host_error *error)
 }
 
 /* The row of the input that a vertex stands for. */
-static unsigned row_of(const struct check *c, uint32_t vertex)
-{
+static unsigned row_of(const struct check *c, uint32_t vertex) {
     const struct host_order *order = c->sites->order;
     return order == NULL || vertex >= c->sites->count ? vertex
                                                       : order->row[vertex];
 }
 
-static void add_line(const struct check *c, const struct check_fault *f)
-{
+static void add_line(const struct check *c, const struct check_fault *f) {
     char *text = c->report->text;
     size_t used = strlen(text), room = sizeof c->report->text;
     used += (size_t)snprintf(text + used, room - used, "%s", f->subject);
@@ -101,8 +96,7 @@ static void add_line(const struct check *c, const struct check_fault *f)
 }
 
 static void deliver(const struct check *c,
-                    const struct host_check_listener *listener)
-{
+                    const struct host_check_listener *listener) {
     static_assert(sizeof c->report->text / NAMED_MAX >= 160,
                   "a line has a subject, five numbers, and what is wrong");
     for (uint64_t i = 0; i < c->faults_kept; i++) {
@@ -117,8 +111,7 @@ static void deliver(const struct check *c,
     }
 }
 
-static void verdict(const struct check *c)
-{
+static void verdict(const struct check *c) {
     const struct host_check_report *r = c->report;
     if (c->error->code == 0 && r->faults > 0) {
         int length = (int)strcspn(r->text, "\n");
@@ -133,8 +126,7 @@ static void verdict(const struct check *c)
 /* --- The boundary ----------------------------------------------------- */
 
 static void hull_fault(void *context, const uint64_t *tets, int tet_count,
-                       const uint32_t *vertices, int count, const char *what)
-{
+                       const uint32_t *vertices, int count, const char *what) {
     static const char *const subject[] = {"hull:", "point", "edge", "facet"};
     check_fault(context, subject[count], what, tets, tet_count, vertices,
                 count);
@@ -147,8 +139,7 @@ struct beyond {
 
 /* A facet of the boundary with a point beyond it is not on the hull: a
  * tetrahedron there is missing or wrong. */
-static void find_beyond(void *context, unsigned number)
-{
+static void find_beyond(void *context, unsigned number) {
     (void)number;
     struct beyond *b = context;
     struct check *c = b->c;
@@ -169,8 +160,7 @@ static void find_beyond(void *context, unsigned number)
     }
 }
 
-static int check_boundary(struct check *c)
-{
+static int check_boundary(struct check *c) {
     struct host_hull_listener listener = {c, hull_fault};
     struct beyond b = {.c = c};
     uint64_t before = c->report->faults;
@@ -193,8 +183,7 @@ static int check_boundary(struct check *c)
 /* --- All together ----------------------------------------------------- */
 
 /* Ranges of whole words of `bad`, whose entries have 32 bits. */
-static int cut_parts(struct check *c)
-{
+static int cut_parts(struct check *c) {
     uint64_t count = c->tets->count, words = count / 64 + 1;
     unsigned threads = host_threads();
     c->parts = threads < CHECK_THREADS_MAX ? threads : CHECK_THREADS_MAX;
@@ -216,8 +205,7 @@ static int cut_parts(struct check *c)
     return 0;
 }
 
-static int check_all(struct check *c)
-{
+static int check_all(struct check *c) {
     if (getrandom(c->key, sizeof c->key, 0) != (ssize_t)sizeof c->key) {
         return host_fail(c->error, HOST_BROKEN,
                          "verify: the system gives no random numbers; look "
@@ -232,8 +220,7 @@ static int check_all(struct check *c)
 int host_check(const struct host_sites *sites,
                const struct host_tetrahedra *tets, enum host_check_depth depth,
                const struct host_check_listener *listener,
-               struct host_check_report *report, struct host_error *error)
-{
+               struct host_check_report *report, struct host_error *error) {
     struct check c = {.sites = sites,
                       .tets = tets,
                       .depth = depth,

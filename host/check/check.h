@@ -39,16 +39,14 @@ struct host_sites {
 };
 
 static inline struct host_sites
-host_sites_of_order(const struct host_order *order)
-{
+host_sites_of_order(const struct host_order *order) {
     return (struct host_sites){
         .order = order, .count = (uint64_t)order->bricks * INCODE_BRICK_POINTS};
 }
 
 /* Whether v < count is a vertex: not an unused slot, not a repeated row. */
 static inline bool host_site_is_vertex(const struct host_sites *sites,
-                                       uint32_t v)
-{
+                                       uint32_t v) {
     return sites->order == NULL
                ? sites->lowest[v] == v
                : v % INCODE_BRICK_POINTS <
@@ -56,8 +54,7 @@ static inline bool host_site_is_vertex(const struct host_sites *sites,
 }
 
 static inline void host_site(const struct host_sites *sites, uint32_t v,
-                             double xyz[3])
-{
+                             double xyz[3]) {
     if (sites->order != NULL) {
         host_vertex(sites->order, v, xyz);
         return;

@@ -18,8 +18,7 @@ enum {
 };
 
 int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     if (hull->count == hull->capacity) {
         size_t capacity = 2 * hull->capacity + 1024;
         void *grown = realloc(hull->facet, capacity * sizeof *hull->facet);
@@ -34,8 +33,7 @@ int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
     return 0;
 }
 
-void host_hull_free(struct host_hull *hull)
-{
+void host_hull_free(struct host_hull *hull) {
     free(hull->facet);
     hull->facet = NULL;
     hull->count = hull->capacity = 0;
@@ -64,29 +62,25 @@ struct check {
 };
 
 static void fault(struct check *c, const uint64_t *tets, int tet_count,
-                  const uint32_t *v, int n, const char *what)
-{
+                  const uint32_t *v, int n, const char *what) {
     __atomic_store_n(&c->broken, true, __ATOMIC_RELAXED);
     c->listener->fault(c->listener->context, tets, tet_count, v, n, what);
 }
 
-static void at(const struct check *c, uint32_t vertex, double p[3])
-{
+static void at(const struct check *c, uint32_t vertex, double p[3]) {
     host_site(c->hull->sites, vertex, p);
     for (int d = 0; d < 3 && c->scaled; d++) {
         p[d] = scalbn(p[d] - c->shift[d], c->power[d]);
     }
 }
 
-static void outward(const struct check *c, size_t facet, uint32_t v[3])
-{
+static void outward(const struct check *c, size_t facet, uint32_t v[3]) {
     const struct host_hull_facet *f = &c->hull->facet[facet];
     host_facet_outward(c->hull->tets->v[f->tet], f->corner, v);
 }
 
 /* +1 where p lies outside the facet's plane. */
-static int side(const struct check *c, const uint32_t v[3], const double *p)
-{
+static int side(const struct check *c, const uint32_t v[3], const double *p) {
     struct incode_tally tally = {0};
     double a[3][3];
     for (int k = 0; k < 3; k++) {
@@ -96,8 +90,7 @@ static int side(const struct check *c, const uint32_t v[3], const double *p)
 }
 
 static int side_of_vertex(const struct check *c, const uint32_t v[3],
-                          uint32_t vertex)
-{
+                          uint32_t vertex) {
     double p[3];
     at(c, vertex, p);
     return side(c, v, p);
@@ -111,8 +104,7 @@ struct all {
     uint64_t count;
 };
 
-static void run_some(void *context, unsigned part)
-{
+static void run_some(void *context, unsigned part) {
     (void)part;
     const struct all *all = context;
     uint64_t i;
@@ -125,8 +117,7 @@ static void run_some(void *context, unsigned part)
 
 static void for_all(struct check *c, uint64_t count,
                     void (*function)(struct check *c, size_t first,
-                                     size_t last))
-{
+                                     size_t last)) {
     struct all all = {c, function, count};
     c->next = 0;
     host_fork_all(count > TURN ? host_threads() : 1, run_some, &all);
@@ -137,8 +128,7 @@ static void for_all(struct check *c, uint64_t count,
 /* No dent: the other facet's third vertex is not above this one.  Where it is
  * level, both must face the same way, or the surface folds back. */
 static bool is_dent(const struct check *c, const struct edge *a,
-                    const struct edge *b)
-{
+                    const struct edge *b) {
     uint32_t f[3], g[3];
     outward(c, a->facet / 4, f);
     outward(c, b->facet / 4, g);
@@ -152,8 +142,7 @@ static bool is_dent(const struct check *c, const struct edge *a,
 }
 
 static void check_edge(struct check *c, uint32_t low, const struct edge *edge,
-                       size_t n)
-{
+                       size_t n) {
     uint32_t v[2] = {low, edge->high}, f[3], g[3];
     uint64_t tets[2] = {c->hull->facet[edge[0].facet / 4].tet,
                         c->hull->facet[edge[n > 1].facet / 4].tet};
@@ -171,8 +160,7 @@ static void check_edge(struct check *c, uint32_t low, const struct edge *edge,
     }
 }
 
-static int compare_edges(const void *p, const void *q)
-{
+static int compare_edges(const void *p, const void *q) {
     const struct edge *a = p, *b = q;
     if (a->high != b->high) {
         return a->high < b->high ? -1 : 1;
@@ -180,8 +168,7 @@ static int compare_edges(const void *p, const void *q)
     return a->facet < b->facet ? -1 : a->facet > b->facet;
 }
 
-static void sort_edges(struct edge *edge, size_t n)
-{
+static void sort_edges(struct edge *edge, size_t n) {
     enum { FEW_MAX = 64 };
     if (n > FEW_MAX) {
         qsort(edge, n, sizeof *edge, compare_edges);
@@ -197,8 +184,7 @@ static void sort_edges(struct edge *edge, size_t n)
     }
 }
 
-static void check_vertex(struct check *c, size_t v)
-{
+static void check_vertex(struct check *c, size_t v) {
     struct edge *edge = c->edge + c->end[v];
     size_t n = c->end[v + 1] - c->end[v];
     sort_edges(edge, n);
@@ -209,8 +195,7 @@ static void check_vertex(struct check *c, size_t v)
     }
 }
 
-static void check_vertices(struct check *c, size_t first, size_t last)
-{
+static void check_vertices(struct check *c, size_t first, size_t last) {
     uint64_t vertices = 0;
     for (size_t v = first; v < last; v++) {
         if (c->on[v] != 0) {
@@ -222,8 +207,7 @@ static void check_vertices(struct check *c, size_t first, size_t last)
 }
 
 /* Counts, then fills: afterwards end[v] is where the edges of v begin. */
-static void list_edges(struct check *c)
-{
+static void list_edges(struct check *c) {
     uint32_t *next = c->end + 1, sum = 0;
     for (int fill = 0; fill < 2; fill++) {
         for (size_t i = 0; i < c->hull->count; i++) {
@@ -249,15 +233,13 @@ static void list_edges(struct check *c)
 }
 
 /* A closed surface of triangles with as many vertices as a sphere's. */
-static void check_euler(struct check *c)
-{
+static void check_euler(struct check *c) {
     if (c->hull->count + 4 != 2 * c->hull->vertices) {
         fault(c, NULL, 0, NULL, 0, "its Euler characteristic is not 2");
     }
 }
 
-static int check_edges(struct check *c, struct host_error *error)
-{
+static int check_edges(struct check *c, struct host_error *error) {
     size_t sites = (size_t)c->hull->sites->count, n = 3 * c->hull->count;
     c->end = host_map((sites + 1) * sizeof *c->end);
     c->on = host_map(sites);
@@ -277,8 +259,7 @@ static int check_edges(struct check *c, struct host_error *error)
 
 /* --- Wound once ------------------------------------------------------- */
 
-static uint64_t mix(uint64_t z)
-{
+static uint64_t mix(uint64_t z) {
     z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
     z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
     return z ^ (z >> 31);
@@ -286,8 +267,7 @@ static uint64_t mix(uint64_t z)
 
 /* A point about the middle of n vertices, a little off the symmetric place. */
 static void blend(const struct check *c, const uint32_t *v, int n,
-                  uint64_t seed, double p[3])
-{
+                  uint64_t seed, double p[3]) {
     double weight[4], sum = 0;
     for (int i = 0; i < n; i++) {
         uint64_t z = mix(seed * 4 + (uint64_t)i + 1);
@@ -309,8 +289,7 @@ static void blend(const struct check *c, const uint32_t *v, int n,
 }
 
 /* A double point strictly inside some tetrahedron. */
-static bool find_inside(struct check *c)
-{
+static bool find_inside(struct check *c) {
     uint64_t count = c->hull->tets->count;
     uint64_t tries = count < INSIDE_TRIES ? count : INSIDE_TRIES;
     for (uint64_t i = 0; i < tries; i++) {
@@ -335,15 +314,13 @@ static bool find_inside(struct check *c)
     return false;
 }
 
-static void facet_fault(struct check *c, size_t facet, const char *what)
-{
+static void facet_fault(struct check *c, size_t facet, const char *what) {
     uint32_t v[3];
     outward(c, facet, v);
     fault(c, &c->hull->facet[facet].tet, 1, v, 3, what);
 }
 
-static void check_facing(struct check *c, size_t first, size_t last)
-{
+static void check_facing(struct check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         uint32_t v[3];
         outward(c, facet, v);
@@ -355,8 +332,7 @@ static void check_facing(struct check *c, size_t first, size_t last)
 
 /* Whether the ray crosses a facet: 1, 0, or -1 where it meets its edge.  All
  * facets face away from its start. */
-static int crosses(const struct check *c, size_t facet)
-{
+static int crosses(const struct check *c, size_t facet) {
     struct incode_tally tally = {0};
     uint32_t v[3];
     double p[3][3];
@@ -374,8 +350,7 @@ static int crosses(const struct check *c, size_t facet)
     return lowest > 0 ? 1 : lowest == 0 ? -1 : 0;
 }
 
-static void count_crossed(struct check *c, size_t first, size_t last)
-{
+static void count_crossed(struct check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         int crossed = crosses(c, facet);
         if (crossed < 0) {
@@ -391,8 +366,7 @@ static void count_crossed(struct check *c, size_t first, size_t last)
  * lie above any facet.  So each sheet of the surface covers the boundary of one
  * convex body, and with all its extreme vertices; two sheets would have an
  * Euler characteristic beyond 2 for the vertices that they share. */
-static void check_thin_facet(struct check *c, size_t facet)
-{
+static void check_thin_facet(struct check *c, size_t facet) {
     uint32_t v[3], w[3];
     outward(c, facet, v);
     for (size_t j = 0; j < c->hull->count; j++) {
@@ -406,15 +380,13 @@ static void check_thin_facet(struct check *c, size_t facet)
     }
 }
 
-static void check_thin(struct check *c, size_t first, size_t last)
-{
+static void check_thin(struct check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         check_thin_facet(c, facet);
     }
 }
 
-static void check_rays(struct check *c)
-{
+static void check_rays(struct check *c) {
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         uint32_t v[3];
         size_t facet = (size_t)(mix(i + 77) % c->hull->count);
@@ -435,16 +407,14 @@ static void check_rays(struct check *c)
 
 /* Whether a - b is a double: the error of the difference is 0 (Knuth, The Art
  * of Computer Programming 2, 4.2.2). */
-static bool is_exact_difference(double a, double b)
-{
+static bool is_exact_difference(double a, double b) {
     double d = a - b, bb = a - d;
     return isfinite(d) && (a - (d + bb)) + (bb - b) == 0.0;
 }
 
 /* The lowest coordinate of each axis on which all points can be moved by it
  * exactly; else 0. */
-static void find_shift(struct check *c)
-{
+static void find_shift(struct check *c) {
     const struct host_sites *sites = c->hull->sites;
     double lowest[3] = {INFINITY, INFINITY, INFINITY}, p[3];
     bool exact[3] = {true, true, true};
@@ -466,8 +436,7 @@ static void find_shift(struct check *c)
 /* The points at the origin and as large as they may be, axis by axis: exact,
  * and no orientation changes, but a body of denormals, or one that is a few ulp
  * thick, gets an inside. */
-static void magnify(struct check *c)
-{
+static void magnify(struct check *c) {
     const struct host_sites *sites = c->hull->sites;
     double most[3] = {0}, p[3];
     find_shift(c);
@@ -486,8 +455,7 @@ static void magnify(struct check *c)
     c->scaled = true;
 }
 
-static void check_winding(struct check *c)
-{
+static void check_winding(struct check *c) {
     bool inside = find_inside(c);
     if (!inside) {
         magnify(c);
@@ -505,8 +473,7 @@ static void check_winding(struct check *c)
 
 int host_hull_check(struct host_hull *hull,
                     const struct host_hull_listener *listener,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct check c = {.hull = hull, .listener = listener};
     hull->vertices = 0;
     if (hull->count == 0) {

@@ -15,16 +15,14 @@ static const double rounding = 64 * 0x1p-53, least = 1e-290;
 /* --- Boxes ------------------------------------------------------------ */
 
 static void cover(const struct host_judge *j, uint64_t box, const double lo[3],
-                  const double hi[3])
-{
+                  const double hi[3]) {
     for (int d = 0; d < 3; d++) {
         j->side[d][box] = fmin(j->side[d][box], lo[d]);
         j->side[3 + d][box] = fmax(j->side[3 + d][box], hi[d]);
     }
 }
 
-static void make_boxes(const struct host_judge *j)
-{
+static void make_boxes(const struct host_judge *j) {
     for (uint64_t i = 0; i < j->bricks + j->groups; i++) {
         for (int d = 0; d < 3; d++) {
             j->side[d][i] = INFINITY;
@@ -42,8 +40,7 @@ static void make_boxes(const struct host_judge *j)
 }
 
 int host_judge_make(struct host_judge *judge, const struct host_sites *sites,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     *judge = (struct host_judge){.sites = *sites};
     judge->bricks = (sites->count + GROUP - 1) / GROUP;
     judge->groups = (judge->bricks + GROUP - 1) / GROUP;
@@ -59,8 +56,7 @@ int host_judge_make(struct host_judge *judge, const struct host_sites *sites,
     return 0;
 }
 
-void host_judge_free(struct host_judge *judge)
-{
+void host_judge_free(struct host_judge *judge) {
     host_unmap(judge->side[0], 6 * (size_t)(judge->bricks + judge->groups) *
                                    sizeof *judge->side[0]);
     *judge = (struct host_judge){0};
@@ -85,8 +81,7 @@ struct query {
 
 /* u x v, and the sizes. */
 static void cross(const double u[3], const double v[3], double n[3],
-                  double size[3])
-{
+                  double size[3]) {
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
         double p = u[i] * v[j], q = u[j] * v[i];
@@ -95,8 +90,7 @@ static void cross(const double u[3], const double v[3], double n[3],
     }
 }
 
-static void set_half(struct query *q)
-{
+static void set_half(struct query *q) {
     double u[3], v[3];
     for (int d = 0; d < 3; d++) {
         u[d] = q->at[1][d] - q->at[0][d];
@@ -105,8 +99,7 @@ static void set_half(struct query *q)
     cross(u, v, q->n, q->n_size);
 }
 
-static void set_ball(struct query *q)
-{
+static void set_ball(struct query *q) {
     double e[3][3];
     memset(q->g, 0, sizeof q->g);
     memset(q->g_size, 0, sizeof q->g_size);
@@ -135,8 +128,7 @@ static void set_ball(struct query *q)
 }
 
 /* The least of volume x^2 - g x on [lo, hi]. */
-static inline double lowest_of(double volume, double g, double lo, double hi)
-{
+static inline double lowest_of(double volume, double g, double lo, double hi) {
     double x = 0.5 * g / volume;
     x = x > lo ? x : lo; /* also where it is not a number */
     x = x < hi ? x : hi;
@@ -149,8 +141,7 @@ static inline double lowest_of(double volume, double g, double lo, double hi)
 /* Which of n <= GROUP boxes from `first` on may hold a point that is wanted; a
  * box whose bound leaves the range of doubles may. */
 static void mark_boxes(const struct query *q, uint64_t first, uint64_t n,
-                       uint8_t *may)
-{
+                       uint8_t *may) {
     double *const *side = q->judge->side;
     for (uint64_t i = 0; i < n; i++) {
         double above = 0, below = 0, above_size = least, below_size = least;
@@ -172,8 +163,7 @@ static void mark_boxes(const struct query *q, uint64_t first, uint64_t n,
 }
 
 /* Whether vertex v is inside; then it is the better apex. */
-static void try_vertex(struct query *q, uint32_t v)
-{
+static void try_vertex(struct query *q, uint32_t v) {
     double p[3];
     if (!host_site_is_vertex(&q->judge->sites, v)) {
         return;
@@ -200,8 +190,7 @@ static void try_vertex(struct query *q, uint32_t v)
     }
 }
 
-static void try_brick(struct query *q, uint64_t brick)
-{
+static void try_brick(struct query *q, uint64_t brick) {
     uint64_t first = brick * GROUP, left = q->judge->sites.count - first;
     for (uint64_t i = 0; i < GROUP && i < left; i++) {
         try_vertex(q, (uint32_t)(first + i));
@@ -211,8 +200,7 @@ static void try_brick(struct query *q, uint64_t brick)
     }
 }
 
-static void try_group(struct query *q, uint64_t group)
-{
+static void try_group(struct query *q, uint64_t group) {
     uint8_t may[GROUP];
     uint64_t first = group * GROUP, left = q->judge->bricks - first;
     uint64_t n = left < GROUP ? left : GROUP;
@@ -230,8 +218,7 @@ static void try_group(struct query *q, uint64_t group)
 
 /* The bricks of the query's own vertices come first: their points make the ball
  * small. */
-static void search(struct query *q)
-{
+static void search(struct query *q) {
     uint64_t groups = q->judge->groups;
     uint32_t own[4];
     memcpy(own, q->t, sizeof own);
@@ -253,8 +240,7 @@ static void search(struct query *q)
 }
 
 static struct query query_of(const struct host_judge *judge, const uint32_t *v,
-                             int count)
-{
+                             int count) {
     struct query q = {.judge = judge, .t = {0, 0, 0, INCODE_NONE}};
     for (int k = 0; k < count; k++) {
         q.t[k] = v[k];
@@ -264,8 +250,8 @@ static struct query query_of(const struct host_judge *judge, const uint32_t *v,
     return q;
 }
 
-bool host_judge_tetrahedron(const struct host_judge *judge, const uint32_t t[4])
-{
+bool host_judge_tetrahedron(const struct host_judge *judge,
+                            const uint32_t t[4]) {
     struct query q = query_of(judge, t, 4);
     if (incode_orient3d(&q.tally, q.at[0], q.at[1], q.at[2], q.at[3]) <= 0) {
         return false;
@@ -276,16 +262,14 @@ bool host_judge_tetrahedron(const struct host_judge *judge, const uint32_t t[4])
     return !q.found;
 }
 
-uint32_t host_judge_apex(const struct host_judge *judge, const uint32_t f[3])
-{
+uint32_t host_judge_apex(const struct host_judge *judge, const uint32_t f[3]) {
     struct query q = query_of(judge, f, 3);
     q.half = true;
     search(&q);
     return q.t[3];
 }
 
-bool host_judge_beyond(const struct host_judge *judge, const uint32_t f[3])
-{
+bool host_judge_beyond(const struct host_judge *judge, const uint32_t f[3]) {
     struct query q = query_of(judge, f, 3);
     q.half = q.any = true;
     search(&q);

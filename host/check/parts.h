@@ -70,28 +70,25 @@ void check_fault(struct check *c, const char *subject, const char *what,
 /* Notes an error, unless there is one. */
 void check_fail(struct check *c, const struct host_error *error);
 
-static inline bool check_is_bad(const struct check *c, uint64_t tet)
-{
+static inline bool check_is_bad(const struct check *c, uint64_t tet) {
     return c->any_bad && (c->bad[tet / 64] >> tet % 64 & 1) != 0;
 }
 
 /* Takes the next `turn` items of `total`: the first of them; `total` if none
  * are left. */
 static inline uint64_t check_take(struct check *c, uint64_t turn,
-                                  uint64_t total)
-{
+                                  uint64_t total) {
     uint64_t i = __atomic_fetch_add(&c->next, turn, __ATOMIC_RELAXED);
     return i < total ? i : total;
 }
 
-static inline uint64_t check_end(uint64_t first, uint64_t turn, uint64_t total)
-{
+static inline uint64_t check_end(uint64_t first, uint64_t turn,
+                                 uint64_t total) {
     return total - first < turn ? total : first + turn;
 }
 
 /* The lowest two vertices. */
-static inline void check_lowest_two(const uint32_t t[4], uint32_t low[2])
-{
+static inline void check_lowest_two(const uint32_t t[4], uint32_t low[2]) {
     uint32_t a = t[0] < t[1] ? t[0] : t[1], b = t[0] < t[1] ? t[1] : t[0];
     uint32_t c = t[2] < t[3] ? t[2] : t[3], d = t[2] < t[3] ? t[3] : t[2];
     uint32_t higher = a < c ? c : a, other = b < d ? b : d;

@@ -24,8 +24,7 @@ enum { BLOCK = 64 }; /* tetrahedra at a time: a word of `bad` */
 
 /* The mark of a vertex: the finaliser of Steele, Lea and Flood's SplitMix64,
  * with a second key between its two steps. */
-static inline uint64_t mark_of(uint32_t vertex, const uint64_t key[2])
-{
+static inline uint64_t mark_of(uint32_t vertex, const uint64_t key[2]) {
     uint64_t x = key[0] + vertex;
     x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9) ^ key[1];
     x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
@@ -49,8 +48,7 @@ struct block {
     struct incode_tally tally;
 };
 
-static void leave_out(struct block *b, uint32_t i, const char *what)
-{
+static void leave_out(struct block *b, uint32_t i, const char *what) {
     uint64_t tet = b->first + i;
     check_fault((struct check *)b->c, "tetrahedron", what, &tet, 1,
                 b->c->tets->v[tet], 4);
@@ -58,8 +56,7 @@ static void leave_out(struct block *b, uint32_t i, const char *what)
 }
 
 /* What is wrong with a vertex number; NULL: it is a vertex. */
-static const char *vertex_fault(const struct host_sites *sites, uint32_t v)
-{
+static const char *vertex_fault(const struct host_sites *sites, uint32_t v) {
     if (v >= sites->count) {
         return "has a vertex that is no row of the points";
     }
@@ -69,8 +66,7 @@ static const char *vertex_fault(const struct host_sites *sites, uint32_t v)
 }
 
 /* Leaves out tetrahedra whose numbers must not be looked up. */
-static void check_vertices(struct block *b)
-{
+static void check_vertices(struct block *b) {
     memcpy(b->kept, b->v, b->n * sizeof *b->v);
     b->v = (const uint32_t(*)[4])b->kept;
     for (uint32_t i = 0; i < b->n; i++) {
@@ -85,8 +81,7 @@ static void check_vertices(struct block *b)
     }
 }
 
-static inline void order_two(uint32_t *a, uint32_t *b, uint32_t *odd)
-{
+static inline void order_two(uint32_t *a, uint32_t *b, uint32_t *odd) {
     uint32_t low = *a < *b ? *a : *b, high = *a < *b ? *b : *a;
     *odd ^= *a > *b;
     *a = low;
@@ -95,8 +90,7 @@ static inline void order_two(uint32_t *a, uint32_t *b, uint32_t *odd)
 
 /* Sorts the vertices of each tetrahedron, and checks their numbers: those out
  * of range at once, other wrong ones once any is known to be there. */
-static void sort_vertices(struct block *b)
-{
+static void sort_vertices(struct block *b) {
     uint32_t most = 0;
     for (uint32_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 4; k++) {
@@ -123,8 +117,7 @@ static void sort_vertices(struct block *b)
     }
 }
 
-static void gather_points(struct block *b)
-{
+static void gather_points(struct block *b) {
     const struct host_sites *sites = b->c->sites;
     for (uint32_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 4; k++) {
@@ -137,20 +130,17 @@ static void gather_points(struct block *b)
     }
 }
 
-static inline double magnitude(double a)
-{
+static inline double magnitude(double a) {
     return a < 0 ? -a : a;
 }
 
-static inline double larger(double a, double b)
-{
+static inline double larger(double a, double b) {
     return a > b ? a : b;
 }
 
 /* sure[i]: not 0 where tetrahedron i is positive by the static filter of
  * incode_orient3d. */
-static void filter_orientation(struct block *b)
-{
+static void filter_orientation(struct block *b) {
     for (uint32_t i = 0; i < BLOCK; i++) {
         double d[3][3], m[3];
         for (int k = 0; k < 3; k++) {
@@ -172,8 +162,7 @@ static void filter_orientation(struct block *b)
     }
 }
 
-static void check_orientation(struct block *b)
-{
+static void check_orientation(struct block *b) {
     int64_t sure = 1;
     gather_points(b);
     filter_orientation(b);
@@ -197,16 +186,14 @@ static void check_orientation(struct block *b)
 }
 
 /* x, or -x if odd is 1. */
-static inline uint64_t with_sign(uint64_t x, uint32_t odd)
-{
+static inline uint64_t with_sign(uint64_t x, uint32_t odd) {
     uint64_t all = (uint64_t)0 - odd;
     return (x ^ all) - all;
 }
 
 /* What the facets of a, b, c, d (sorted) add: -bc + bd - cd at a, and cd at b,
  * negated for an odd permutation. */
-static void sum_facets(struct block *b)
-{
+static void sum_facets(struct block *b) {
     const uint64_t *key = b->c->key;
     for (uint32_t i = 0; i < BLOCK; i++) {
         uint64_t m1 = mark_of(b->sorted[1][i], key);
@@ -221,8 +208,7 @@ static void sum_facets(struct block *b)
 /* Bit 0 of a sum: the vertex is used.  The other two vertices' bytes say so. */
 static inline void
 add_one(const struct block *b, uint32_t i, uint64_t *sum,
-        uint8_t *used /* NOLINT(readability-non-const-parameter): atomic */)
-{
+        uint8_t *used /* NOLINT(readability-non-const-parameter): atomic */) {
     uint64_t *low = &sum[b->sorted[0][i]], *second = &sum[b->sorted[1][i]];
     *low = (*low + b->sum[0][i]) | 1;
     *second = (*second + b->sum[1][i]) | 1;
@@ -232,8 +218,7 @@ add_one(const struct block *b, uint32_t i, uint64_t *sum,
 
 /* A whole block in four places in turn: neighbours in the list often have the
  * same lowest vertex, and an addition waits for the one before. */
-static void add_sums(const struct block *b, uint64_t *sum, uint8_t *used)
-{
+static void add_sums(const struct block *b, uint64_t *sum, uint8_t *used) {
     enum { TURNS = BLOCK / 4 };
     if (b->n == BLOCK && b->bad == 0) {
         for (uint32_t i = 0; i < TURNS; i++) {
@@ -251,8 +236,7 @@ static void add_sums(const struct block *b, uint64_t *sum, uint8_t *used)
     }
 }
 
-static void sum_part(void *context, unsigned number)
-{
+static void sum_part(void *context, unsigned number) {
     struct check *c = context;
     const struct check_part *part = &c->part[number];
     struct block b = {.c = c};
@@ -274,8 +258,7 @@ static void sum_part(void *context, unsigned number)
 
 /* --- Hot vertices, and their tetrahedra ------------------------------- */
 
-static void find_hot(void *context, unsigned number)
-{
+static void find_hot(void *context, unsigned number) {
     (void)number;
     struct check *c = context;
     uint64_t count = c->sites->count, i, distinct = 0;
@@ -305,15 +288,13 @@ static void find_hot(void *context, unsigned number)
 
 /* Out of line, so that the loop below stays short: a third of its time. */
 static __attribute__((noinline)) bool is_candidate(const uint8_t *hot,
-                                                   const uint32_t t[4])
-{
+                                                   const uint32_t t[4]) {
     uint32_t low[2];
     check_lowest_two(t, low);
     return (hot[low[0]] | hot[low[1]]) != 0;
 }
 
-static void list_part(void *context, unsigned number)
-{
+static void list_part(void *context, unsigned number) {
     struct check *c = context;
     struct check_part *part = &c->part[number];
     const uint8_t *hot = c->hot;
@@ -333,8 +314,7 @@ static void list_part(void *context, unsigned number)
 
 /* --- All together ----------------------------------------------------- */
 
-static bool make_room(struct check *c)
-{
+static bool make_room(struct check *c) {
     size_t count = (size_t)c->sites->count;
     bool enough = true;
     c->used = host_map(count);
@@ -354,21 +334,18 @@ static bool make_room(struct check *c)
 }
 
 static void run(struct check *c, unsigned threads,
-                void (*function)(void *, unsigned))
-{
+                void (*function)(void *, unsigned)) {
     c->next = 0;
     host_fork_all(threads, function, c);
 }
 
-static void sum_all(struct check *c)
-{
+static void sum_all(struct check *c) {
     run(c, c->parts, sum_part);
     run(c, host_threads(), find_hot);
 }
 
 /* Once more, with a look at each vertex. */
-static void sum_carefully(struct check *c)
-{
+static void sum_carefully(struct check *c) {
     size_t count = (size_t)c->sites->count;
     for (unsigned i = 0; i < c->parts; i++) {
         memset(c->part[i].sum, 0, count * sizeof *c->part[i].sum);
@@ -381,8 +358,7 @@ static void sum_carefully(struct check *c)
     sum_all(c);
 }
 
-int check_sums(struct check *c)
-{
+int check_sums(struct check *c) {
     size_t count = (size_t)c->sites->count;
     if (make_room(c)) {
         sum_all(c);

@@ -18,20 +18,17 @@ enum { BATCH = 64, TABLE_MIN = 64 };
 
 /* --- The lists -------------------------------------------------------- */
 
-static uint64_t size_of(const struct check_part *part)
-{
+static uint64_t size_of(const struct check_part *part) {
     return part->list == NULL ? part->last - part->first : part->listed;
 }
 
-static uint32_t tet_of(const struct check_part *part, uint64_t i)
-{
+static uint32_t tet_of(const struct check_part *part, uint64_t i) {
     return part->list == NULL ? (uint32_t)i : part->list[i];
 }
 
 /* Counts, then fills: end[v + 1] becomes the first entry of v and, as it is
  * filled, the end of the entries. */
-static void list_entries(void *context, unsigned number)
-{
+static void list_entries(void *context, unsigned number) {
     struct check *c = context;
     struct check_part *part = &c->part[number];
     const uint32_t(*v)[4] = (const uint32_t(*)[4])c->tets->v + part->first;
@@ -71,20 +68,17 @@ struct spheres {
     int64_t sure[BATCH];
 };
 
-static inline double magnitude(double a)
-{
+static inline double magnitude(double a) {
     return a < 0 ? -a : a;
 }
 
-static inline double larger(double a, double b)
-{
+static inline double larger(double a, double b) {
     return a > b ? a : b;
 }
 
 /* sure[i]: not 0 where the apex is outside by the static filter of
  * incode_in_sphere. */
-static void filter_spheres(struct spheres *s)
-{
+static void filter_spheres(struct spheres *s) {
     for (uint32_t i = 0; i < BATCH; i++) {
         double d[4][3], m[3], w[4];
         for (int k = 0; k < 3; k++) {
@@ -119,8 +113,7 @@ static void filter_spheres(struct spheres *s)
 }
 
 static void check_spheres(struct check *c, struct spheres *s,
-                          struct incode_tally *tally)
-{
+                          struct incode_tally *tally) {
     for (uint32_t i = 0; i < s->n; i++) {
         for (int k = 0; k < 5; k++) {
             double xyz[3];
@@ -168,16 +161,14 @@ struct walk {
     struct host_error error;
 };
 
-static uint64_t pack(uint64_t tet, uint32_t corner, uint32_t side)
-{
+static uint64_t pack(uint64_t tet, uint32_t corner, uint32_t side) {
     return tet << 3 | corner << 1 | side;
 }
 
 /* Reports a facet that belongs to two tetrahedra on one side, or to more than
  * two. */
 static void facet_fault(struct walk *w, uint64_t facet, uint64_t other,
-                        const char *what)
-{
+                        const char *what) {
     const uint32_t(*v)[4] = (const uint32_t(*)[4])w->c->tets->v;
     uint64_t tets[2] = {facet >> 3, other >> 3};
     uint32_t p[3];
@@ -185,8 +176,7 @@ static void facet_fault(struct walk *w, uint64_t facet, uint64_t other,
     check_fault(w->c, "facet", what, tets, other == PAIRED ? 1 : 2, p, 3);
 }
 
-static void pair(struct walk *w, uint64_t facet, uint64_t twin)
-{
+static void pair(struct walk *w, uint64_t facet, uint64_t twin) {
     struct spheres *s = &w->spheres;
     const uint32_t(*v)[4] = (const uint32_t(*)[4])w->c->tets->v;
     if (w->c->depth != HOST_CHECK_DELAUNAY) {
@@ -202,8 +192,7 @@ static void pair(struct walk *w, uint64_t facet, uint64_t twin)
 }
 
 static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
-                      uint32_t corner)
-{
+                      uint32_t corner) {
     uint64_t others = x < y ? (uint64_t)x << 32 | y : (uint64_t)y << 32 | x;
     uint64_t facet = pack(tet, corner, x < y);
     size_t i = (size_t)((others * UINT64_C(0x9e3779b97f4a7c15)) >> 32);
@@ -227,8 +216,7 @@ static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
 
 /* Adds the facets of a tetrahedron whose lowest vertex is p: three, or one
  * where p is its second vertex. */
-static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
-{
+static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet) {
     /* [corner opposite][index of p]: the others, in order seen from outside */
     static const uint8_t after[4][4][2] = {{{0, 0}, {2, 3}, {3, 1}, {1, 2}},
                                            {{3, 2}, {0, 0}, {0, 3}, {2, 0}},
@@ -250,8 +238,7 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet)
 }
 
 /* Room for twice as many facets as there may be, all slots free. */
-static int clear_slots(struct walk *w, size_t tets)
-{
+static int clear_slots(struct walk *w, size_t tets) {
     size_t wanted = TABLE_MIN;
     while (wanted < 6 * tets) {
         wanted *= 2;
@@ -270,8 +257,7 @@ static int clear_slots(struct walk *w, size_t tets)
 }
 
 /* The facets without a twin belong to the boundary. */
-static void keep_open(struct walk *w)
-{
+static void keep_open(struct walk *w) {
     struct check *c = w->c;
     for (size_t i = 0; i <= w->mask; i++) {
         if (w->slot[i].others != 0 && w->slot[i].facet != PAIRED) {
@@ -284,8 +270,7 @@ static void keep_open(struct walk *w)
     }
 }
 
-static void walk_vertex(struct walk *w, uint32_t p)
-{
+static void walk_vertex(struct walk *w, uint32_t p) {
     struct check *c = w->c;
     size_t tets = 0;
     if (c->depth == HOST_CHECK_TILING && c->hot[p] == 0) {
@@ -306,8 +291,7 @@ static void walk_vertex(struct walk *w, uint32_t p)
     keep_open(w);
 }
 
-static void walk_vertices(void *context, unsigned number)
-{
+static void walk_vertices(void *context, unsigned number) {
     (void)number;
     struct check *c = context;
     struct walk w = {.c = c};
@@ -325,8 +309,7 @@ static void walk_vertices(void *context, unsigned number)
 
 /* --- All together ----------------------------------------------------- */
 
-int check_twins(struct check *c)
-{
+int check_twins(struct check *c) {
     size_t bytes = ((size_t)c->sites->count + 1) * sizeof(uint32_t);
     bool enough = true;
     for (unsigned i = 0; i < c->parts; i++) {

@@ -5,8 +5,7 @@
 
 int host_verify(const struct host_points *points,
                 const struct host_tetrahedra *tets,
-                struct host_check_report *report, struct host_error *error)
-{
+                struct host_check_report *report, struct host_error *error) {
     size_t rows = (size_t)points->count;
     uint32_t *lowest = host_map(rows * sizeof *lowest);
     struct host_sites sites = {

@@ -9,8 +9,7 @@ enum { RESET_US = 20000000, STEP_US = 100000, RUN_WAIT_US = 100000 };
 /* --- reset ---------------------------------------------------------------- */
 
 /* Those who do not answer, by their lines; who has none stays in `left`. */
-static int pulse_lines(struct host_shell *shell, struct host_node_set *left)
-{
+static int pulse_lines(struct host_shell *shell, struct host_node_set *left) {
     const struct host_shell_place *place = shell->place;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         if (host_node_set_has(left, i) && place->has_line != NULL &&
@@ -27,8 +26,7 @@ static int pulse_lines(struct host_shell *shell, struct host_node_set *left)
 /* Until each has started since `starts`, which is the shell's own note. */
 static int await_starts(struct host_shell *shell,
                         const struct host_node_set *set,
-                        struct host_node_set *late)
-{
+                        struct host_node_set *late) {
     const struct host_machine *m = &shell->machine;
     uint64_t end = m->now_us(m->context) + RESET_US;
     do {
@@ -51,16 +49,14 @@ static int await_starts(struct host_shell *shell,
 }
 
 static void tell_reset(struct host_shell *shell, unsigned node,
-                       struct host_fold *fold, json_t *object)
-{
+                       struct host_fold *fold, json_t *object) {
     (void)shell;
     host_fold_add(fold, node, "begun anew");
     (void)json_object_set_new(object, "reset", json_true());
 }
 
 int host_shell_reset(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     struct host_visit *visit = &shell->visit;
     struct host_node_set set, there = {{0}}, left = {{0}}, late;
     (void)count;
@@ -97,8 +93,7 @@ int host_shell_reset(struct host_shell *shell, unsigned count,
 
 /* --- run, abort, wait ----------------------------------------------------- */
 
-const char *host_shell_unnamed(const char *text)
-{
+const char *host_shell_unnamed(const char *text) {
     static const char name[] = "incode: ";
     return strncmp(text, name, sizeof name - 1) == 0 ? text + sizeof name - 1
                                                      : text;
@@ -106,8 +101,7 @@ const char *host_shell_unnamed(const char *text)
 
 /* Where answers are objects, what a run says is noted but for the last line,
  * which tells why it failed, if it has. */
-static void say_text(void *context, const char *text)
-{
+static void say_text(void *context, const char *text) {
     struct host_shell *shell = context;
     if (!shell->json) {
         host_shell_say(shell, "%s", text);
@@ -119,8 +113,7 @@ static void say_text(void *context, const char *text)
     snprintf(shell->said, sizeof shell->said, "%s", host_shell_unnamed(text));
 }
 
-static int fail_run(struct host_shell *shell, int status)
-{
+static int fail_run(struct host_shell *shell, int status) {
     if (shell->said[0] != '\0') {
         return host_fail(&shell->error, status, "%s", shell->said);
     }
@@ -130,8 +123,7 @@ static int fail_run(struct host_shell *shell, int status)
                      status);
 }
 
-static int finish_run(struct host_shell *shell, int status)
-{
+static int finish_run(struct host_shell *shell, int status) {
     const struct host_shell_place *place = shell->place;
     json_t *statistics = shell->object == NULL || place->statistics == NULL
                              ? NULL
@@ -147,8 +139,7 @@ static int finish_run(struct host_shell *shell, int status)
     return code;
 }
 
-static int await_run(struct host_shell *shell)
-{
+static int await_run(struct host_shell *shell) {
     const struct host_shell_place *place = shell->place;
     const struct host_shell_sink *sink = shell->sink;
     int status = 0;
@@ -166,8 +157,7 @@ static int await_run(struct host_shell *shell)
 }
 
 /* The cube is left to the run, once all that will come has been seen. */
-static int prepare_run(struct host_shell *shell)
-{
+static int prepare_run(struct host_shell *shell) {
     const struct host_shell_place *place = shell->place;
     struct host_node_set all;
     if (host_shell_open(shell, &shell->error) != 0) {
@@ -183,8 +173,7 @@ static int prepare_run(struct host_shell *shell)
 }
 
 int host_shell_run(struct host_shell *shell, unsigned count,
-                   const char *const *words)
-{
+                   const char *const *words) {
     const struct host_shell_place *place = shell->place;
     bool behind = strcmp(words[count - 1], "&") == 0;
     if (shell->running) {
@@ -212,8 +201,7 @@ int host_shell_run(struct host_shell *shell, unsigned count,
 }
 
 int host_shell_abort(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     const struct host_shell_place *place = shell->place;
     int status = 0;
     (void)count, (void)words;
@@ -232,8 +220,7 @@ int host_shell_abort(struct host_shell *shell, unsigned count,
 }
 
 int host_shell_wait(struct host_shell *shell, unsigned count,
-                    const char *const *words)
-{
+                    const char *const *words) {
     (void)count, (void)words;
     return shell->running ? await_run(shell) : 0;
 }

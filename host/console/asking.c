@@ -8,8 +8,7 @@
 enum { BEGIN_US = 3000000 }; /* within which a cube is found */
 
 int host_shell_set(struct host_shell *shell, const char *word,
-                   struct host_node_set *set)
-{
+                   struct host_node_set *set) {
     if (word == NULL) {
         host_node_set_all(set, shell->machine.nodes);
         return 0;
@@ -17,8 +16,8 @@ int host_shell_set(struct host_shell *shell, const char *word,
     return host_node_set_parse(set, word, shell->machine.nodes, &shell->error);
 }
 
-int host_shell_node(struct host_shell *shell, const char *word, unsigned *node)
-{
+int host_shell_node(struct host_shell *shell, const char *word,
+                    unsigned *node) {
     uint64_t number;
     if (host_parse_number(word, 0, shell->machine.nodes - 1, &number) != 0) {
         return host_fail(&shell->error, HOST_USAGE,
@@ -30,15 +29,13 @@ int host_shell_node(struct host_shell *shell, const char *word, unsigned *node)
 }
 
 const void *host_shell_answer(const struct host_shell *shell, unsigned node,
-                              size_t size)
-{
+                              size_t size) {
     const struct host_visit_node *n = &shell->visit.node[node];
     return n->answered && n->size >= size ? n->answer : NULL;
 }
 
 int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
-                   enum node_question what, unsigned target)
-{
+                   enum node_question what, unsigned target) {
     struct host_visit *visit = &shell->visit;
     if (shell->looking) {
         return host_shell_look_ask(shell, set, what);
@@ -64,8 +61,7 @@ int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
 
 /* Why a node has not answered, and what to do next. */
 static const char *reason_of(const struct host_shell *shell, unsigned node,
-                             char text[HOST_SHELL_REASON])
-{
+                             char text[HOST_SHELL_REASON]) {
     return shell->looking ? "no answer while another program has the cube; "
                             "look again in a moment"
                           : host_visit_reason(&shell->visit, node, text,
@@ -73,22 +69,19 @@ static const char *reason_of(const struct host_shell *shell, unsigned node,
 }
 
 static void tell_absent(struct host_shell *shell, unsigned node,
-                        struct host_fold *fold, json_t *object)
-{
+                        struct host_fold *fold, json_t *object) {
     char reason[HOST_SHELL_REASON];
     const char *why = reason_of(shell, node, reason);
     host_fold_add(fold, node, why);
     (void)json_object_set_new(object, "error", json_string(why));
 }
 
-static void say_line(void *context, const char *text)
-{
+static void say_line(void *context, const char *text) {
     host_shell_say(context, "%s", text);
 }
 
 int host_shell_fail_absent(struct host_shell *shell,
-                           const struct host_node_set *set)
-{
+                           const struct host_node_set *set) {
     struct host_node_set absent = {{0}};
     unsigned first = CUBE_HOST;
     char names[72], reason[HOST_SHELL_REASON];
@@ -108,8 +101,7 @@ int host_shell_fail_absent(struct host_shell *shell,
 
 int host_shell_answers(struct host_shell *shell,
                        const struct host_node_set *set, const char *heading,
-                       host_shell_tell *tell)
-{
+                       host_shell_tell *tell) {
     struct host_fold fold = {0};
     json_t *list = json_array();
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
@@ -138,8 +130,7 @@ int host_shell_answers(struct host_shell *shell,
 int host_shell_ask_tell(struct host_shell *shell,
                         const struct host_node_set *set,
                         enum node_question what, const char *heading,
-                        host_shell_tell *tell)
-{
+                        host_shell_tell *tell) {
     return host_shell_ask(shell, set, what, 0) != 0
                ? shell->error.code
                : host_shell_answers(shell, set, heading, tell);

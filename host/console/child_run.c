@@ -15,8 +15,7 @@ enum { FOREGROUND_MS = 20, NO_PROGRAM = 127, BY_SIGNAL = 128 };
 /* Signals are held back until the child has its own ways with them: one that
  * came before would be lost. */
 static _Noreturn void become(const char *const *words, const int *report,
-                             pid_t host, const sigset_t *signals)
-{
+                             pid_t host, const sigset_t *signals) {
     int null = open("/dev/null", O_RDONLY | O_CLOEXEC);
     (void)setpgid(0, 0);
     for (int i = 1; i < NSIG; i++) {
@@ -39,8 +38,7 @@ static _Noreturn void become(const char *const *words, const int *report,
 }
 
 int host_child_run_begin(struct host_child_run *run, const char *const *words,
-                         bool quiet, struct host_error *error)
-{
+                         bool quiet, struct host_error *error) {
     int report[2] = {-1, -1};
     pid_t host = getpid();
     if (quiet && pipe2(report, O_CLOEXEC) != 0) {
@@ -73,8 +71,7 @@ int host_child_run_begin(struct host_child_run *run, const char *const *words,
 }
 
 static void take(struct host_child_run *run, const char *bytes, size_t size,
-                 void (*say)(void *context, const char *text), void *context)
-{
+                 void (*say)(void *context, const char *text), void *context) {
     for (size_t i = 0; i < size; i++) {
         bool end = bytes[i] == '\n';
         if (!end) {
@@ -91,8 +88,7 @@ static void take(struct host_child_run *run, const char *bytes, size_t size,
 /* True: there will be no more. */
 static bool read_said(struct host_child_run *run,
                       void (*say)(void *context, const char *text),
-                      void *context)
-{
+                      void *context) {
     char bytes[1024];
     for (;;) {
         ssize_t n = read(run->said, bytes, sizeof bytes);
@@ -105,8 +101,7 @@ static bool read_said(struct host_child_run *run,
 
 bool host_child_run_look(struct host_child_run *run, int *status,
                          void (*say)(void *context, const char *text),
-                         void *context, uint64_t wait_us)
-{
+                         void *context, uint64_t wait_us) {
     struct pollfd said = {run->said, POLLIN, 0};
     int found, wait_ms = (int)(wait_us / 1000);
     bool over = false;
@@ -133,8 +128,7 @@ bool host_child_run_look(struct host_child_run *run, int *status,
     return true;
 }
 
-void host_child_run_interrupt(const struct host_child_run *run)
-{
+void host_child_run_interrupt(const struct host_child_run *run) {
     if (run->pid > 0) {
         (void)kill(run->pid, SIGINT);
     }

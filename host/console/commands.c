@@ -11,8 +11,7 @@ static int help(struct host_shell *shell, unsigned count,
                 const char *const *words);
 
 static int leave(struct host_shell *shell, unsigned count,
-                 const char *const *words)
-{
+                 const char *const *words) {
     (void)count, (void)words;
     shell->leaves = true;
     return 0;
@@ -161,13 +160,11 @@ static const struct host_shell_command commands[] = {
 
 enum { COMMANDS = sizeof commands / sizeof commands[0], COLUMN = 28 };
 
-const struct host_shell_command *host_shell_command_row(unsigned i)
-{
+const struct host_shell_command *host_shell_command_row(unsigned i) {
     return i < COMMANDS ? &commands[i] : NULL;
 }
 
-const struct host_shell_command *host_shell_command(const char *name)
-{
+const struct host_shell_command *host_shell_command(const char *name) {
     for (unsigned i = 0; i < COMMANDS; i++) {
         if (strcmp(commands[i].name, name) == 0) {
             return &commands[i];
@@ -177,16 +174,14 @@ const struct host_shell_command *host_shell_command(const char *name)
 }
 
 static void tell_help(struct host_shell *shell,
-                      const struct host_shell_command *command)
-{
+                      const struct host_shell_command *command) {
     char usage[64];
     snprintf(usage, sizeof usage, "%s %s", command->name, command->arguments);
     host_shell_say(shell, "  %-*s%s", COLUMN, usage, command->help);
 }
 
 static int help(struct host_shell *shell, unsigned count,
-                const char *const *words)
-{
+                const char *const *words) {
     const struct host_shell_command *one =
         count == 0 ? NULL : host_shell_command(words[0]);
     if (count == 1 && one == NULL) {
@@ -225,8 +220,7 @@ struct completion {
     unsigned count, room;
 };
 
-static void offer(struct completion *c, const char *candidate)
-{
+static void offer(struct completion *c, const char *candidate) {
     if (c->count < c->room &&
         strncmp(candidate, c->word, strlen(c->word)) == 0) {
         c->words[c->count] = strdup(candidate);
@@ -234,16 +228,14 @@ static void offer(struct completion *c, const char *candidate)
     }
 }
 
-static void offer_commands(struct completion *c)
-{
+static void offer_commands(struct completion *c) {
     for (unsigned i = 0; i < COMMANDS; i++) {
         offer(c, commands[i].name);
     }
 }
 
 /* The number behind the last comma or dash. */
-static void offer_nodes(struct completion *c, unsigned nodes, bool set)
-{
+static void offer_nodes(struct completion *c, unsigned nodes, bool set) {
     char text[300];
     const char *tail = c->word;
     for (const char *p = c->word; set && *p != '\0'; p++) {
@@ -264,8 +256,7 @@ static void offer_nodes(struct completion *c, unsigned nodes, bool set)
 
 /* What would have to be quoted, or does something to a terminal, is not
  * offered. */
-static void offer_file(struct completion *c, const char *name)
-{
+static void offer_file(struct completion *c, const char *name) {
     char text[1024];
     host_text_printable(text, sizeof text, name);
     if (strcmp(text, name) == 0 && strpbrk(name, " '\"\\#") == NULL) {
@@ -273,8 +264,7 @@ static void offer_file(struct completion *c, const char *name)
     }
 }
 
-static void offer_files(struct completion *c)
-{
+static void offer_files(struct completion *c) {
     char pattern[1024];
     size_t used = 0;
     glob_t found;
@@ -296,8 +286,7 @@ static void offer_files(struct completion *c)
 }
 
 static void offer_argument(struct host_shell *shell, struct completion *c,
-                           const char *name, unsigned place)
-{
+                           const char *name, unsigned place) {
     const struct host_shell_command *command = host_shell_command(name);
     unsigned nodes = shell->open ? shell->machine.nodes : 0;
     if (command == NULL || place >= command->most) {
@@ -319,8 +308,7 @@ static void offer_argument(struct host_shell *shell, struct completion *c,
 /* The word at the end of the line, as it is typed: what is quoted is not
  * completed. */
 unsigned host_shell_complete(struct host_shell *shell, const char *line,
-                             size_t *from, char **words, unsigned room)
-{
+                             size_t *from, char **words, unsigned room) {
     size_t size = strlen(line);
     size_t begin = size;
     while (begin > 0 && strchr(" \t", line[begin - 1]) == NULL) {

@@ -31,8 +31,7 @@ static const struct argp_option own_rows[] = {
     {"json", KEY_JSON, NULL, 0, "Answer with an object of JSON a command", 3},
     {0}};
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct options *o = state->input;
     switch (key) {
     case 'c':
@@ -62,8 +61,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 }
 
 static int read_file(struct host_shell *shell, const char *path,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     int file = open(path, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
         return host_fail(error, HOST_INPUT, "%s: %s; give a file of commands",
@@ -75,8 +73,7 @@ static int read_file(struct host_shell *shell, const char *path,
 }
 
 static int do_script(struct host_shell *shell, const struct options *o,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     for (unsigned i = 0;
          i < o->lines && !shell->leaves && host_script_ending() == 0; i++) {
         (void)host_shell_line(shell, o->line[i]);
@@ -89,8 +86,7 @@ static int do_script(struct host_shell *shell, const struct options *o,
                : host_script_read(shell, "standard input", STDIN_FILENO, error);
 }
 
-int host_console_command(int argc, char **argv, struct host_error *error)
-{
+int host_console_command(int argc, char **argv, struct host_error *error) {
     static struct host_console_place place;
     static struct host_shell shell;
     struct options options = {.error = error};

@@ -22,30 +22,26 @@ struct place {
     int x, y;
 };
 
-static char mark_of(enum host_wire_state state)
-{
+static char mark_of(enum host_wire_state state) {
     static const char marks[] = {'+', '.', '!', 'x', '?'};
     return marks[state];
 }
 
-static struct place place_of(unsigned node)
-{
+static struct place place_of(unsigned node) {
     return (struct place){
         LEFT + (int)(node & 1) * RIGHT + (int)(node >> 2 & 1) * BACK_X +
             (int)(node >> 3 & 1) * CUBES_APART,
         ROWS - 1 - (int)(node >> 1 & 1) * UP - (int)(node >> 2 & 1) * BACK_Y};
 }
 
-static void put(struct canvas *c, int x, int y, char letter)
-{
+static void put(struct canvas *c, int x, int y, char letter) {
     c->cell[y][x] = letter;
 }
 
 /* Along a wire, with its mark in the middle, or a little before it, where no
  * other wire passes; what does not work is dotted. */
 static void draw_wire(struct canvas *c, unsigned node, unsigned d,
-                      enum host_wire_state state)
-{
+                      enum host_wire_state state) {
     struct place a = place_of(node), b = place_of(node | 1u << d);
     int steps = d == 0 ? RIGHT : d == 1 ? UP : BACK_Y;
     int at = d == 0 ? RIGHT / 2 - 2 : d == 1 ? UP - 1 : 1;
@@ -62,8 +58,7 @@ static void draw_wire(struct canvas *c, unsigned node, unsigned d,
     }
 }
 
-static void draw_node(struct canvas *c, unsigned node, bool absent)
-{
+static void draw_node(struct canvas *c, unsigned node, bool absent) {
     char text[16];
     struct place at = place_of(node);
     int length = snprintf(text, sizeof text, absent ? "(%u)" : "%u", node);
@@ -72,8 +67,7 @@ static void draw_node(struct canvas *c, unsigned node, bool absent)
 }
 
 /* Wires of dimension 3 join what stands in the same place of both cubes. */
-static void draw_between(const struct host_drawing *drawing, FILE *out)
-{
+static void draw_between(const struct host_drawing *drawing, FILE *out) {
     fprintf(out, "\n    each node of the left to its counterpart:\n   ");
     for (unsigned i = 0; i < 8; i++) {
         enum host_wire_state state = drawing->wire[i][3];
@@ -83,8 +77,8 @@ static void draw_between(const struct host_drawing *drawing, FILE *out)
     fputc('\n', out);
 }
 
-static void print_canvas(const struct canvas *c, unsigned dimension, FILE *out)
-{
+static void print_canvas(const struct canvas *c, unsigned dimension,
+                         FILE *out) {
     for (int y = 0; y < ROWS; y++) {
         int used = (int)sizeof c->cell[y];
         bool drawn = dimension > 2 || y >= ROWS - 1 - UP;
@@ -98,8 +92,7 @@ static void print_canvas(const struct canvas *c, unsigned dimension, FILE *out)
     }
 }
 
-void host_drawing_draw(const struct host_drawing *drawing, FILE *out)
-{
+void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
     struct canvas c;
     unsigned nodes = 1u << drawing->dimension;
     unsigned dimensions = drawing->dimension < 3 ? drawing->dimension : 3;
@@ -124,8 +117,7 @@ void host_drawing_draw(const struct host_drawing *drawing, FILE *out)
 }
 
 void host_drawing_row(const struct host_drawing *drawing, unsigned node,
-                      char text[CUBE_LINKS_MAX + 1])
-{
+                      char text[CUBE_LINKS_MAX + 1]) {
     for (unsigned d = 0; d < drawing->dimension; d++) {
         text[d] = mark_of(drawing->wire[node & ~(1u << d)][d]);
     }

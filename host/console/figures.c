@@ -4,8 +4,7 @@
 #include "commands.h"
 
 static const char *scaled(double value, double unit, const char *names,
-                          char text[HOST_SHELL_FIGURE])
-{
+                          char text[HOST_SHELL_FIGURE]) {
     unsigned power = 0;
     while (value >= 999.5 && names[power + 1] != '\0') {
         value /= unit;
@@ -17,18 +16,15 @@ static const char *scaled(double value, double unit, const char *names,
     return text;
 }
 
-const char *host_shell_bytes(uint64_t bytes, char text[HOST_SHELL_FIGURE])
-{
+const char *host_shell_bytes(uint64_t bytes, char text[HOST_SHELL_FIGURE]) {
     return scaled((double)bytes, 1024, " KMGTPE", text);
 }
 
-const char *host_shell_count(uint64_t count, char text[HOST_SHELL_FIGURE])
-{
+const char *host_shell_count(uint64_t count, char text[HOST_SHELL_FIGURE]) {
     return scaled((double)count, 1000, " kMGTPE", text);
 }
 
-const char *host_shell_time(uint64_t us, char text[HOST_SHELL_FIGURE])
-{
+const char *host_shell_time(uint64_t us, char text[HOST_SHELL_FIGURE]) {
     if (us < 1000) {
         snprintf(text, HOST_SHELL_FIGURE, "%u us", (unsigned)us);
     } else if (us < 1000000) {
@@ -44,8 +40,7 @@ const char *host_shell_time(uint64_t us, char text[HOST_SHELL_FIGURE])
 }
 
 const char *host_shell_bar(double part, unsigned cells,
-                           char text[HOST_SHELL_BAR])
-{
+                           char text[HOST_SHELL_BAR]) {
     cells = cells + 3 < HOST_SHELL_BAR ? cells : HOST_SHELL_BAR - 3;
     part = part < 0.0 ? 0.0 : part < 1.0 ? part : 1.0;
     unsigned full = (unsigned)(part * cells + 0.5);

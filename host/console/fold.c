@@ -8,8 +8,7 @@
 enum { SET_TEXT = 48, LINE = 1024, ROWS_FIRST = 16, TIME_TEXT = 32 };
 
 /* Whether a time is of those of a row: all within 2 s and a tenth. */
-static bool is_near(const struct host_fold_row *row, const uint32_t *time_s)
-{
+static bool is_near(const struct host_fold_row *row, const uint32_t *time_s) {
     if (time_s == NULL || !row->timed) {
         return time_s == NULL && !row->timed;
     }
@@ -19,8 +18,7 @@ static bool is_near(const struct host_fold_row *row, const uint32_t *time_s)
 }
 
 static struct host_fold_row *row_of(struct host_fold *fold, bool of_host,
-                                    const char *text, const uint32_t *time_s)
-{
+                                    const char *text, const uint32_t *time_s) {
     for (unsigned i = 0; i < fold->count; i++) {
         struct host_fold_row *row = &fold->row[i];
         if (row->of_host == of_host && strcmp(row->text, text) == 0 &&
@@ -47,8 +45,7 @@ static struct host_fold_row *row_of(struct host_fold *fold, bool of_host,
 }
 
 static struct host_fold_row *add(struct host_fold *fold, unsigned node,
-                                 const char *text, const uint32_t *time_s)
-{
+                                 const char *text, const uint32_t *time_s) {
     bool of_host = node == CUBE_HOST;
     struct host_fold_row *row = row_of(fold, of_host, text, time_s);
     fold->broken = fold->broken || row == NULL;
@@ -58,14 +55,12 @@ static struct host_fold_row *add(struct host_fold *fold, unsigned node,
     return row;
 }
 
-void host_fold_add(struct host_fold *fold, unsigned node, const char *text)
-{
+void host_fold_add(struct host_fold *fold, unsigned node, const char *text) {
     (void)add(fold, node, text, NULL);
 }
 
 void host_fold_add_timed(struct host_fold *fold, unsigned node,
-                         const char *text, uint32_t time_s)
-{
+                         const char *text, uint32_t time_s) {
     struct host_fold_row *row = add(fold, node, text, &time_s);
     if (row == NULL) {
         return;
@@ -76,8 +71,7 @@ void host_fold_add_timed(struct host_fold *fold, unsigned node,
 }
 
 /* "61-64 s", "2 min": in the unit that suits the least. */
-static void put_times(const struct host_fold_row *row, char text[TIME_TEXT])
-{
+static void put_times(const struct host_fold_row *row, char text[TIME_TEXT]) {
     uint32_t s = row->least < 60 ? 1 : row->least < 3600 ? 60 : 3600;
     const char *unit = s == 1 ? "s" : s == 60 ? "min" : "h";
     if (row->least / s == row->most / s) {
@@ -88,8 +82,7 @@ static void put_times(const struct host_fold_row *row, char text[TIME_TEXT])
     }
 }
 
-static void name_row(const struct host_fold_row *row, char text[SET_TEXT])
-{
+static void name_row(const struct host_fold_row *row, char text[SET_TEXT]) {
     if (row->of_host) {
         snprintf(text, SET_TEXT, "host");
     } else {
@@ -100,8 +93,7 @@ static void name_row(const struct host_fold_row *row, char text[SET_TEXT])
 /* Its lines, each behind four blanks. */
 static void print_lines(const char *text,
                         void (*line)(void *context, const char *text),
-                        void *context)
-{
+                        void *context) {
     char whole[LINE];
     while (*text != '\0') {
         const char *end = strchrnul(text, '\n');
@@ -112,8 +104,7 @@ static void print_lines(const char *text,
 }
 
 static void print_row(const struct host_fold_row *row, const char *set,
-                      int width, char whole[LINE])
-{
+                      int width, char whole[LINE]) {
     char times[TIME_TEXT];
     const char *mark = row->timed ? strchr(row->text, HOST_FOLD_TIME) : NULL;
     if (mark == NULL) {
@@ -128,8 +119,7 @@ static void print_row(const struct host_fold_row *row, const char *set,
 
 void host_fold_print(const struct host_fold *fold, const char *heading,
                      void (*line)(void *context, const char *text),
-                     void *context)
-{
+                     void *context) {
     char set[SET_TEXT], whole[LINE];
     int width = heading == NULL ? 0 : (int)strlen("NODES");
     for (unsigned i = 0; i < fold->count; i++) {
@@ -154,8 +144,7 @@ void host_fold_print(const struct host_fold *fold, const char *heading,
     }
 }
 
-void host_fold_free(struct host_fold *fold)
-{
+void host_fold_free(struct host_fold *fold) {
     for (unsigned i = 0; i < fold->count; i++) {
         free(fold->row[i].text);
     }

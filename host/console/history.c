@@ -15,8 +15,7 @@
 
 static int folder = -1; /* -1: there is none */
 
-static void find_folder(void)
-{
+static void find_folder(void) {
     const char *state = getenv("XDG_STATE_HOME"), *home = getenv("HOME");
     struct host_error error = {0};
     char path[PATH_MAX];
@@ -35,8 +34,7 @@ static void find_folder(void)
 }
 
 /* The newest lines alone, in place of all, once there are too many. */
-static void shorten(FILE *file, size_t lines)
-{
+static void shorten(FILE *file, size_t lines) {
     char other[64], *line = NULL;
     size_t room = 0, at = 0;
     snprintf(other, sizeof other, NAME ".%ld", (long)getpid());
@@ -57,8 +55,7 @@ static void shorten(FILE *file, size_t lines)
     }
 }
 
-static void load(History *list)
-{
+static void load(History *list) {
     HistEvent event;
     char *line = NULL;
     size_t room = 0, lines = 0;
@@ -78,8 +75,7 @@ static void load(History *list)
     (void)fclose(file);
 }
 
-History *host_history_open(void)
-{
+History *host_history_open(void) {
     HistEvent event;
     History *list = history_init();
     if (list == NULL) {
@@ -92,8 +88,7 @@ History *host_history_open(void)
     return list;
 }
 
-void host_history_add(History *list, const char *line)
-{
+void host_history_add(History *list, const char *line) {
     HistEvent event;
     bool same =
         history(list, &event, H_FIRST) == 0 && strcmp(event.str, line) == 0;
@@ -110,8 +105,7 @@ void host_history_add(History *list, const char *line)
     }
 }
 
-void host_history_close(History *list)
-{
+void host_history_close(History *list) {
     history_end(list);
     if (folder >= 0) {
         (void)close(folder);

@@ -8,14 +8,13 @@
 /* How long a run that has just begun may take to have the cube's wires. */
 enum { HELD_US = 10000000, STEP_US = 50000 };
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return host_now_us();
 }
 
-static int fail_held(struct host_shell *shell, const struct host_holder *holder)
-{
+static int fail_held(struct host_shell *shell,
+                     const struct host_holder *holder) {
     char text[HOST_HOLDER_TEXT];
     if (shell->running) {
         return host_fail(&shell->error, HOST_CUBE,
@@ -30,8 +29,7 @@ static int fail_held(struct host_shell *shell, const struct host_holder *holder)
                      host_holder_text(holder, text, sizeof text));
 }
 
-static int begin_look(struct host_shell *shell, const char *wire)
-{
+static int begin_look(struct host_shell *shell, const char *wire) {
     struct host_look *look = &shell->look;
     if (host_look_open(look, wire, &shell->error) != 0) {
         host_look_close(look);
@@ -52,8 +50,7 @@ static int begin_look(struct host_shell *shell, const char *wire)
     return 0;
 }
 
-void host_shell_look_end(struct host_shell *shell)
-{
+void host_shell_look_end(struct host_shell *shell) {
     free(shell->visit.node);
     memset(&shell->visit, 0, sizeof shell->visit);
     host_look_close(&shell->look);
@@ -62,24 +59,21 @@ void host_shell_look_end(struct host_shell *shell)
 
 /* The wire, and who has it. */
 static bool is_held(const struct host_shell *shell, char wire[HOST_WIRE_NAME],
-                    struct host_holder *holder)
-{
+                    struct host_holder *holder) {
     const struct host_shell_place *place = shell->place;
     return place->wire != NULL && place->wire(place->context, wire) &&
            host_holder_find(holder, wire);
 }
 
 bool host_shell_is_held(const struct host_shell *shell,
-                        struct host_holder *holder)
-{
+                        struct host_holder *holder) {
     char wire[HOST_WIRE_NAME];
     return is_held(shell, wire, holder);
 }
 
 /* The same, once a run that has just begun has the wire, or has ended. */
 static bool await_held(struct host_shell *shell, char wire[HOST_WIRE_NAME],
-                       struct host_holder *holder)
-{
+                       struct host_holder *holder) {
     const struct host_shell_sink *sink = shell->sink;
     uint64_t end_us = host_now_us() + HELD_US;
     bool held;
@@ -91,8 +85,7 @@ static bool await_held(struct host_shell *shell, char wire[HOST_WIRE_NAME],
     return held;
 }
 
-int host_shell_reach(struct host_shell *shell)
-{
+int host_shell_reach(struct host_shell *shell) {
     char wire[HOST_WIRE_NAME];
     struct host_holder holder;
     if (shell->open) {
@@ -113,8 +106,7 @@ int host_shell_reach(struct host_shell *shell)
 
 int host_shell_look_ask(struct host_shell *shell,
                         const struct host_node_set *set,
-                        enum node_question what)
-{
+                        enum node_question what) {
     const struct host_shell_sink *sink = shell->sink;
     if (host_look_ask(&shell->look, set, what, HOST_SHELL_ANSWER_US,
                       &shell->error) != 0) {

@@ -18,8 +18,7 @@ static const struct argp_option own_rows[] = {
     {"json", KEY_JSON, NULL, 0, "Print an object of JSON", 3},
     {0}};
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct options *o = state->input;
     switch (key) {
     case KEY_JSON:
@@ -36,16 +35,14 @@ static error_t parse(int key, char *value, struct argp_state *state)
 }
 
 /* Those that begin may need a moment. */
-static int wait_for_all(struct host_shell *shell, struct host_error *error)
-{
+static int wait_for_all(struct host_shell *shell, struct host_error *error) {
     struct host_node_set all;
     host_node_set_all(&all, shell->machine.nodes);
     return host_visit_settle(&shell->visit, &all, SETTLE_US, error);
 }
 
 /* Beside another program it looks on, and says beside whom. */
-static int reach(struct host_shell *shell, struct host_error *error)
-{
+static int reach(struct host_shell *shell, struct host_error *error) {
     struct host_holder holder;
     char text[HOST_HOLDER_TEXT];
     if (host_shell_is_held(shell, &holder)) {
@@ -57,8 +54,7 @@ static int reach(struct host_shell *shell, struct host_error *error)
                                               : wait_for_all(shell, error);
 }
 
-int host_nodes_command(int argc, char **argv, struct host_error *error)
-{
+int host_nodes_command(int argc, char **argv, struct host_error *error) {
     static struct host_console_place place;
     static struct host_shell shell;
     struct options options = {.error = error};

@@ -11,8 +11,7 @@
 #include "host/base/create.h"
 
 static int open_site(void *context, struct host_machine *machine,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_console_place *p = context;
     if (host_site_open(&p->site, &p->options, error) != 0) {
         return error->code;
@@ -23,8 +22,7 @@ static int open_site(void *context, struct host_machine *machine,
 }
 
 /* As the file has it; of one wire, as it was when it was open. */
-static bool find_wire(void *context, char *name)
-{
+static bool find_wire(void *context, char *name) {
     static struct host_cube_file file;
     const struct host_console_place *p = context;
     struct host_error error = {0};
@@ -41,23 +39,20 @@ static bool find_wire(void *context, char *name)
     return name[0] != '\0';
 }
 
-static void close_site(void *context)
-{
+static void close_site(void *context) {
     struct host_console_place *p = context;
     host_site_close(&p->site);
 }
 
 /* --- lines ---------------------------------------------------------------- */
 
-static bool has_line(void *context, unsigned node)
-{
+static bool has_line(void *context, unsigned node) {
     const struct host_console_place *p = context;
     return host_lines_has(&p->site.file, node, HOST_LINE_RESET);
 }
 
 /* Opened for one pulse: nothing is held that another program may want. */
-static int pulse(void *context, unsigned node, struct host_error *error)
-{
+static int pulse(void *context, unsigned node, struct host_error *error) {
     struct host_console_place *p = context;
     struct host_lines lines;
     if (host_lines_open(&lines, &p->site.file, &p->site.remote, error) != 0) {
@@ -70,8 +65,7 @@ static int pulse(void *context, unsigned node, struct host_error *error)
 
 /* --- runs ----------------------------------------------------------------- */
 
-static int make_folder(struct host_console_place *p, struct host_error *error)
-{
+static int make_folder(struct host_console_place *p, struct host_error *error) {
     const char *above = getenv("XDG_RUNTIME_DIR");
     if (p->folder[0] != '\0') {
         return 0;
@@ -92,8 +86,7 @@ static int make_folder(struct host_console_place *p, struct host_error *error)
 }
 
 /* A text in quotation marks, as libconfig reads it. */
-static void write_text(FILE *out, const char *text)
-{
+static void write_text(FILE *out, const char *text) {
     (void)fputc('"', out);
     for (; *text != '\0'; text++) {
         (void)fprintf(out, *text == '"' || *text == '\\' ? "\\%c" : "%c",
@@ -102,8 +95,7 @@ static void write_text(FILE *out, const char *text)
     (void)fputc('"', out);
 }
 
-static void write_host_wire(const struct host_console_place *p, FILE *out)
-{
+static void write_host_wire(const struct host_console_place *p, FILE *out) {
     const struct host_site_options *o = &p->options;
     const char *name = o->port != NULL  ? o->port
                        : o->tcp != NULL ? o->tcp
@@ -131,8 +123,7 @@ static void write_host_wire(const struct host_console_place *p, FILE *out)
 }
 
 static const struct host_board *board_of(const struct host_visit *visit,
-                                         unsigned node)
-{
+                                         unsigned node) {
     char name[NODE_BOARD_BYTES + 1] = "";
     memcpy(name, visit->node[node].who.board, NODE_BOARD_BYTES);
     const struct host_board *board = host_board_named(name);
@@ -142,8 +133,7 @@ static const struct host_board *board_of(const struct host_visit *visit,
 /* How nodes with a system are wired among themselves the host need not know,
  * but a cube file has a wire for each pair. */
 static void write_cube(const struct host_console_place *p,
-                       const struct host_visit *visit, FILE *out)
-{
+                       const struct host_visit *visit, FILE *out) {
     const struct host_machine *m = visit->machine;
     char path[PATH_MAX];
     (void)fprintf(out, "dimension = %u;\nnodes = (", m->dimension);
@@ -183,8 +173,7 @@ static void write_cube(const struct host_console_place *p,
 
 /* Without a cube file, what was found stands for one. */
 static int prepare(void *context, const struct host_visit *visit,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct host_console_place *p = context;
     if (make_folder(p, error) != 0 || p->options.cube != NULL) {
         return error->code;
@@ -204,8 +193,7 @@ static int prepare(void *context, const struct host_visit *visit,
 }
 
 static int begin_run(void *context, int count, const char *const *words,
-                     bool behind, bool json, struct host_error *error)
-{
+                     bool behind, bool json, struct host_error *error) {
     struct host_console_place *p = context;
     const char *all[HOST_SHELL_WORDS + 10] = {"incode", "run"};
     unsigned n = 2;
@@ -230,20 +218,17 @@ static int begin_run(void *context, int count, const char *const *words,
 
 static bool look_at_run(void *context, int *status,
                         void (*say)(void *context, const char *text),
-                        void *say_to, uint64_t wait_us)
-{
+                        void *say_to, uint64_t wait_us) {
     struct host_console_place *p = context;
     return host_child_run_look(&p->run, status, say, say_to, wait_us);
 }
 
-static void interrupt_run(void *context)
-{
+static void interrupt_run(void *context) {
     struct host_console_place *p = context;
     host_child_run_interrupt(&p->run);
 }
 
-static json_t *statistics(void *context)
-{
+static json_t *statistics(void *context) {
     struct host_console_place *p = context;
     json_t *object = json_load_file(p->stats, 0, NULL);
     (void)unlink(p->stats);
@@ -251,8 +236,7 @@ static json_t *statistics(void *context)
 }
 
 void host_console_place_init(struct host_console_place *place,
-                             const struct host_site_options *options)
-{
+                             const struct host_site_options *options) {
     memset(place, 0, sizeof *place);
     place->options = *options;
     place->place = (struct host_shell_place){
@@ -270,8 +254,7 @@ void host_console_place_init(struct host_console_place *place,
     };
 }
 
-void host_console_place_end(struct host_console_place *place)
-{
+void host_console_place_end(struct host_console_place *place) {
     if (place->folder[0] != '\0') {
         (void)unlink(place->cube);
         (void)unlink(place->stats);

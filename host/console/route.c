@@ -18,8 +18,7 @@ struct pings {
 
 /* A node after the other, so that no answer waits for another's. */
 static int ping_node(struct host_shell *shell, unsigned node, unsigned times,
-                     struct pings *p)
-{
+                     struct pings *p) {
     struct host_node_set one = {{0}};
     host_node_set_add(&one, node);
     for (unsigned i = 0; i < times; i++) {
@@ -40,15 +39,13 @@ static int ping_node(struct host_shell *shell, unsigned node, unsigned times,
     return 0;
 }
 
-static void say_row(void *context, const char *text)
-{
+static void say_row(void *context, const char *text) {
     host_shell_say(context, "%s", text);
 }
 
 static void tell_pings(struct host_shell *shell, unsigned node,
                        const struct pings *p, struct host_fold *fold,
-                       json_t *list)
-{
+                       json_t *list) {
     char row[HOST_SHELL_REASON], least[HOST_SHELL_FIGURE],
         mean[HOST_SHELL_FIGURE], most[HOST_SHELL_FIGURE];
     json_t *object = json_pack("{si si si}", "node", (int)node, "sent",
@@ -72,8 +69,7 @@ static void tell_pings(struct host_shell *shell, unsigned node,
 }
 
 int host_shell_ping(struct host_shell *shell, unsigned count,
-                    const char *const *words)
-{
+                    const char *const *words) {
     struct host_node_set set, all_came = {{0}};
     struct host_fold fold = {0};
     uint64_t times = PINGS;
@@ -114,8 +110,7 @@ int host_shell_ping(struct host_shell *shell, unsigned count,
 
 /* Asks `from` how long the way to `to` takes; UINT32_MAX: no answer. */
 static int probe(struct host_shell *shell, unsigned from, unsigned to,
-                 uint32_t *rtt_us)
-{
+                 uint32_t *rtt_us) {
     struct host_node_set one = {{0}};
     struct node_probe answer;
     host_node_set_add(&one, from);
@@ -133,8 +128,7 @@ static int probe(struct host_shell *shell, unsigned from, unsigned to,
 
 static void tell_hop(struct host_shell *shell, unsigned hop, unsigned node,
                      unsigned link, uint32_t rtt_us, uint32_t before,
-                     json_t *list)
-{
+                     json_t *list) {
     char all[HOST_SHELL_FIGURE], more[HOST_SHELL_FIGURE];
     if (rtt_us == UINT32_MAX) {
         host_shell_say(shell, "%3u  link %u  node %-4u  no answer", hop, link,
@@ -156,8 +150,7 @@ static void tell_hop(struct host_shell *shell, unsigned hop, unsigned node,
 
 /* Hop by hop, each timed from A to there and back. */
 static int walk(struct host_shell *shell, const struct routes *routes,
-                unsigned a, unsigned b, json_t *list)
-{
+                unsigned a, unsigned b, json_t *list) {
     uint32_t before = 0, rtt_us = 0;
     unsigned at = a, hops = 0;
     while (at != b && hops < 2 * shell->machine.dimension + 2) {
@@ -184,8 +177,7 @@ static int walk(struct host_shell *shell, const struct routes *routes,
 }
 
 int host_shell_trace(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     struct routes routes;
     unsigned a, b;
     (void)count;

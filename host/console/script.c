@@ -14,44 +14,37 @@ enum { TEND_US = 20000, IDLE_MS = 1000 };
 static volatile sig_atomic_t ending;
 
 /* A second one finds the default action. */
-static void interrupt(int number)
-{
+static void interrupt(int number) {
     ending = number;
 }
 
-int host_script_ending(void)
-{
+int host_script_ending(void) {
     return ending;
 }
 
-static void show_line(void *context, const char *text)
-{
+static void show_line(void *context, const char *text) {
     (void)context;
     (void)printf("%s\n", text);
 }
 
-static void show_note(void *context, const char *text)
-{
+static void show_note(void *context, const char *text) {
     (void)context;
     (void)fflush(stdout);
     host_note("%s", text);
 }
 
-static void show_failed(void *context, const char *text)
-{
+static void show_failed(void *context, const char *text) {
     (void)context;
     (void)fflush(stdout);
     (void)fprintf(stderr, "incode: %s\n", text);
 }
 
-static bool interrupted(void *context)
-{
+static bool interrupted(void *context) {
     (void)context;
     return ending != 0;
 }
 
-const struct host_shell_sink *host_script_sink(void)
-{
+const struct host_shell_sink *host_script_sink(void) {
     static const struct host_shell_sink sink = {
         NULL, show_line, show_note, show_failed, NULL, NULL, interrupted};
     const struct sigaction action = {.sa_handler = interrupt,
@@ -67,8 +60,7 @@ const struct host_shell_sink *host_script_sink(void)
 }
 
 /* Waits for bytes, and tends the cube; false: it was interrupted. */
-static bool await_bytes(struct host_shell *shell, int file)
-{
+static bool await_bytes(struct host_shell *shell, int file) {
     struct pollfd input = {file, POLLIN, 0};
     for (;;) {
         bool tended = shell->open || shell->running;
@@ -86,8 +78,7 @@ static bool await_bytes(struct host_shell *shell, int file)
 }
 
 /* Each whole line of the buffer; what is left of it is moved to its start. */
-static size_t do_lines(struct host_shell *shell, char *text, size_t used)
-{
+static size_t do_lines(struct host_shell *shell, char *text, size_t used) {
     char *at = text, *end;
     while (!shell->leaves && ending == 0 &&
            (end = memchr(at, '\n', used - (size_t)(at - text))) != NULL) {
@@ -102,8 +93,7 @@ static size_t do_lines(struct host_shell *shell, char *text, size_t used)
 }
 
 int host_script_read(struct host_shell *shell, const char *name, int file,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     static char text[HOST_SCRIPT_LINE];
     size_t used = 0;
     while (!shell->leaves && await_bytes(shell, file)) {

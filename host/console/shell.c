@@ -14,23 +14,20 @@ enum { LINE = 1024, RUN_WAIT_US = 100000 };
 
 void host_shell_init(struct host_shell *shell,
                      const struct host_shell_place *place,
-                     const struct host_shell_sink *sink, bool json)
-{
+                     const struct host_shell_sink *sink, bool json) {
     memset(shell, 0, sizeof *shell);
     shell->place = place;
     shell->sink = sink;
     shell->json = json;
 }
 
-static void fill_in(char text[LINE], const char *format, va_list list)
-{
+static void fill_in(char text[LINE], const char *format, va_list list) {
     char raw[LINE];
     (void)vsnprintf(raw, sizeof raw, format, list);
     host_text_printable(text, LINE, raw);
 }
 
-void host_shell_say(struct host_shell *shell, const char *format, ...)
-{
+void host_shell_say(struct host_shell *shell, const char *format, ...) {
     char text[LINE];
     va_list list;
     if (shell->json) {
@@ -42,8 +39,7 @@ void host_shell_say(struct host_shell *shell, const char *format, ...)
     shell->sink->line(shell->sink->context, text);
 }
 
-void host_shell_note(struct host_shell *shell, const char *format, ...)
-{
+void host_shell_note(struct host_shell *shell, const char *format, ...) {
     char text[LINE];
     va_list list;
     va_start(list, format);
@@ -54,8 +50,7 @@ void host_shell_note(struct host_shell *shell, const char *format, ...)
 
 /* --- the cube ------------------------------------------------------------- */
 
-void host_shell_leave_cube(struct host_shell *shell)
-{
+void host_shell_leave_cube(struct host_shell *shell) {
     if (!shell->open) {
         return;
     }
@@ -68,8 +63,7 @@ void host_shell_leave_cube(struct host_shell *shell)
     shell->open = false;
 }
 
-int host_shell_open(struct host_shell *shell, struct host_error *error)
-{
+int host_shell_open(struct host_shell *shell, struct host_error *error) {
     struct host_machine machine;
     if (shell->open) {
         return 0;
@@ -99,15 +93,13 @@ int host_shell_open(struct host_shell *shell, struct host_error *error)
 }
 
 /* Frames that came on the host's own wire and were none. */
-static uint64_t noise_of(const struct host_shell *shell)
-{
+static uint64_t noise_of(const struct host_shell *shell) {
     const struct link_statistics *s =
         cube_link_statistics(shell->visit.cube, 0);
     return s->bad_header + s->bad_crc + s->bad_code + s->resynchronised;
 }
 
-static void note_wire(struct host_shell *shell, uint64_t now_us)
-{
+static void note_wire(struct host_shell *shell, uint64_t now_us) {
     enum link_state state = cube_link_state(shell->visit.cube, 0);
     const struct host_machine *m = &shell->machine;
     bool up = state == LINK_UP;
@@ -146,8 +138,7 @@ static void note_wire(struct host_shell *shell, uint64_t now_us)
 }
 
 /* What has happened to the cube since the last look at it. */
-static void note_events(struct host_shell *shell)
-{
+static void note_events(struct host_shell *shell) {
     uint64_t now_us = shell->machine.now_us(shell->machine.context);
     note_wire(shell, now_us);
     struct host_node_set again = {{0}};
@@ -166,8 +157,8 @@ static void note_events(struct host_shell *shell)
 }
 
 /* The visit has ended by itself. */
-static void lose_cube(struct host_shell *shell, const struct host_error *error)
-{
+static void lose_cube(struct host_shell *shell,
+                      const struct host_error *error) {
     bool cut = shell->watch.cut;
     shell->watch.cut = false;
     if (cut) {
@@ -178,14 +169,12 @@ static void lose_cube(struct host_shell *shell, const struct host_error *error)
     host_shell_leave_cube(shell);
 }
 
-static void note_line(void *context, const char *text)
-{
+static void note_line(void *context, const char *text) {
     host_shell_note(context, "%s", host_shell_unnamed(text));
 }
 
 /* Whether a run behind goes on. */
-static bool tend_run(struct host_shell *shell, uint64_t wait_us)
-{
+static bool tend_run(struct host_shell *shell, uint64_t wait_us) {
     const struct host_shell_place *place = shell->place;
     int status = 0;
     if (!place->look(place->context, &status, note_line, shell, wait_us)) {
@@ -199,8 +188,7 @@ static bool tend_run(struct host_shell *shell, uint64_t wait_us)
     return false;
 }
 
-void host_shell_tend(struct host_shell *shell, uint64_t wait_us)
-{
+void host_shell_tend(struct host_shell *shell, uint64_t wait_us) {
     struct host_error error = {0};
     if (shell->running) {
         (void)tend_run(shell, wait_us);
@@ -218,16 +206,14 @@ void host_shell_tend(struct host_shell *shell, uint64_t wait_us)
 
 /* --- lines ---------------------------------------------------------------- */
 
-static const char *command_name(const void *unused, unsigned i)
-{
+static const char *command_name(const void *unused, unsigned i) {
     const struct host_shell_command *row = host_shell_command_row(i);
     (void)unused;
     return row == NULL ? NULL : row->name;
 }
 
 static int do_command(struct host_shell *shell, unsigned count,
-                      const char *const *words)
-{
+                      const char *const *words) {
     const struct host_shell_command *command = shell->command;
     if (count < command->least || count > command->most) {
         return host_fail(&shell->error, HOST_USAGE, "%s: %s; give %s%s%s",
@@ -250,8 +236,7 @@ static int do_command(struct host_shell *shell, unsigned count,
     return status;
 }
 
-static void tell_status(struct host_shell *shell, int status)
-{
+static void tell_status(struct host_shell *shell, int status) {
     const struct host_shell_sink *sink = shell->sink;
     if (shell->object != NULL) {
         (void)json_object_set_new(shell->object, "status",
@@ -278,8 +263,7 @@ static void tell_status(struct host_shell *shell, int status)
 }
 
 int host_shell_fail(struct host_shell *shell, const char *command,
-                    const struct host_error *error)
-{
+                    const struct host_error *error) {
     shell->error = *error;
     if (shell->json) {
         shell->object = json_pack("{ss*}", "command", command);
@@ -289,8 +273,7 @@ int host_shell_fail(struct host_shell *shell, const char *command,
 }
 
 static int do_words(struct host_shell *shell, int count,
-                    const char *const *words)
-{
+                    const char *const *words) {
     int status;
     memset(&shell->error, 0, sizeof shell->error);
     shell->watch.cut = false;
@@ -321,8 +304,7 @@ static int do_words(struct host_shell *shell, int count,
     return status;
 }
 
-int host_shell_line(struct host_shell *shell, const char *line)
-{
+int host_shell_line(struct host_shell *shell, const char *line) {
     int count = 0, status = 0;
     const char **words = NULL;
     Tokenizer *tokens = tok_init(NULL);
@@ -348,8 +330,7 @@ int host_shell_line(struct host_shell *shell, const char *line)
     return status;
 }
 
-void host_shell_close(struct host_shell *shell)
-{
+void host_shell_close(struct host_shell *shell) {
     bool told = false;
     while (shell->running && tend_run(shell, RUN_WAIT_US)) {
         if (!told && shell->sink->interrupted != NULL &&

@@ -5,8 +5,7 @@
 #include "commands.h"
 
 const char *host_shell_state(const struct node_link_state *link, char *text,
-                             size_t size)
-{
+                             size_t size) {
     static const char *const states[] = {"down",   "opening", "up",   "silent",
                                          "closed", "closed",  "wrong"};
     static const char *const refusals[] = {"",           "another version",
@@ -31,8 +30,7 @@ const char *host_shell_state(const struct node_link_state *link, char *text,
     return text;
 }
 
-struct node_link_state host_shell_own_link(const struct host_shell *shell)
-{
+struct node_link_state host_shell_own_link(const struct host_shell *shell) {
     const struct cube *cube = shell->visit.cube;
     const struct link_statistics *s = cube_link_statistics(cube, 0);
     const struct link_peer *peer = cube_link_peer(cube, 0);
@@ -54,8 +52,7 @@ struct node_link_state host_shell_own_link(const struct host_shell *shell)
     };
 }
 
-void host_shell_note_lost(struct host_shell *shell, unsigned node)
-{
+void host_shell_note_lost(struct host_shell *shell, unsigned node) {
     const struct host_visit_node *n = &shell->visit.node[node];
     struct node_link_state link;
     for (unsigned d = 0; !shell->looking && d < CUBE_LINKS_MAX &&
@@ -83,8 +80,7 @@ void host_shell_note_lost(struct host_shell *shell, unsigned node)
 
 static void tell_link(struct host_shell *shell, unsigned node, unsigned d,
                       const struct node_link_state *link,
-                      struct host_fold *fold, json_t *list)
-{
+                      struct host_fold *fold, json_t *list) {
     char text[160], state[48], rtt[HOST_SHELL_FIGURE], lost[HOST_SHELL_FIGURE];
     char in[HOST_SHELL_FIGURE], out[HOST_SHELL_FIGURE], to[8];
     bool known = link->lost != UINT32_MAX;
@@ -114,8 +110,7 @@ static void tell_link(struct host_shell *shell, unsigned node, unsigned d,
 }
 
 static void tell(struct host_shell *shell, unsigned node,
-                 struct host_fold *fold, json_t *object)
-{
+                 struct host_fold *fold, json_t *object) {
     const struct host_visit_node *n = &shell->visit.node[node];
     struct node_link_state link;
     json_t *list = json_array();
@@ -129,8 +124,7 @@ static void tell(struct host_shell *shell, unsigned node,
 }
 
 int host_shell_links(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     struct host_node_set set;
     struct host_fold own = {0};
     static const char heading[] =

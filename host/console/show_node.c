@@ -10,16 +10,14 @@ enum { BAR_CELLS = 20, TEXT = 2048 };
 
 static int ask_words(struct host_shell *shell, unsigned count,
                      const char *const *words, enum node_question what,
-                     const char *heading, host_shell_tell *tell)
-{
+                     const char *heading, host_shell_tell *tell) {
     struct host_node_set set;
     return host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0
                ? shell->error.code
                : host_shell_ask_tell(shell, &set, what, heading, tell);
 }
 
-static void tell_short(unsigned node, struct host_fold *fold, json_t *object)
-{
+static void tell_short(unsigned node, struct host_fold *fold, json_t *object) {
     host_fold_add(fold, node, "an answer of another version");
     (void)json_object_set_new(object, "error",
                               json_string("an answer of another version"));
@@ -28,8 +26,7 @@ static void tell_short(unsigned node, struct host_fold *fold, json_t *object)
 /* --- stat ----------------------------------------------------------------- */
 
 static void tell_totals(struct host_shell *shell, unsigned node,
-                        struct host_fold *fold, json_t *object)
-{
+                        struct host_fold *fold, json_t *object) {
     struct node_finished_message t;
     const void *answer = host_shell_answer(shell, node, sizeof t);
     char row[160], built[HOST_SHELL_FIGURE], kept[HOST_SHELL_FIGURE];
@@ -69,8 +66,7 @@ static void tell_totals(struct host_shell *shell, unsigned node,
 }
 
 int host_shell_stat(struct host_shell *shell, unsigned count,
-                    const char *const *words)
-{
+                    const char *const *words) {
     return ask_words(shell, count, words, NODE_TOTALS,
                      "  BUILT    KEPT      BUSY  PAGES EVICTED      IN     OUT "
                      " MEMORY  AGAIN",
@@ -87,8 +83,7 @@ struct map_text {
 };
 
 static void add_part(struct map_text *m, const char *name, uint32_t bytes,
-                     uint32_t count, const char *unit)
-{
+                     uint32_t count, const char *unit) {
     char figure[HOST_SHELL_FIGURE], bar[HOST_SHELL_BAR], more[48] = "";
     if (m->used >= sizeof m->text - 1) {
         return;
@@ -107,8 +102,7 @@ static void add_part(struct map_text *m, const char *name, uint32_t bytes,
 }
 
 static void tell_map(struct host_shell *shell, unsigned node,
-                     struct host_fold *fold, json_t *object)
-{
+                     struct host_fold *fold, json_t *object) {
     struct node_ready_message ready;
     const void *answer = host_shell_answer(shell, node, sizeof ready);
     if (answer == NULL) {
@@ -147,8 +141,7 @@ static void tell_map(struct host_shell *shell, unsigned node,
 }
 
 int host_shell_memory(struct host_shell *shell, unsigned count,
-                      const char *const *words)
-{
+                      const char *const *words) {
     return ask_words(shell, count, words, NODE_MEMORY, NULL, tell_map);
 }
 
@@ -157,8 +150,7 @@ int host_shell_memory(struct host_shell *shell, unsigned count,
 /* As a person can read it: lines stay lines, what a terminal would obey is
  * escaped. */
 static void tell_log(struct host_shell *shell, unsigned node,
-                     struct host_fold *fold, json_t *object)
-{
+                     struct host_fold *fold, json_t *object) {
     const struct host_visit_node *n = &shell->visit.node[node];
     char text[4 * HOST_VISIT_ANSWER_BYTES + 1];
     size_t used = 0;
@@ -177,7 +169,6 @@ static void tell_log(struct host_shell *shell, unsigned node,
 }
 
 int host_shell_log(struct host_shell *shell, unsigned count,
-                   const char *const *words)
-{
+                   const char *const *words) {
     return ask_words(shell, count, words, NODE_LOG, NULL, tell_log);
 }

@@ -11,8 +11,7 @@
 enum { WIRES_US = 10000000 }; /* for those of nodes that have just begun */
 
 /* A field of fixed length, as a text that a terminal can be given. */
-static const char *field(const uint8_t *bytes, size_t size, char *text)
-{
+static const char *field(const uint8_t *bytes, size_t size, char *text) {
     size_t i = 0;
     for (; i < size && bytes[i] != 0; i++) {
         text[i] = (char)(bytes[i] >= ' ' && bytes[i] <= '~' ? bytes[i] : '?');
@@ -21,8 +20,7 @@ static const char *field(const uint8_t *bytes, size_t size, char *text)
     return text;
 }
 
-static bool is_zero(const uint8_t *bytes, size_t size)
-{
+static bool is_zero(const uint8_t *bytes, size_t size) {
     bool zero = true;
     for (size_t i = 0; i < size; i++) {
         zero = zero && bytes[i] == 0;
@@ -30,8 +28,7 @@ static bool is_zero(const uint8_t *bytes, size_t size)
     return zero;
 }
 
-static const char *hex(const uint8_t *bytes, size_t size, char *text)
-{
+static const char *hex(const uint8_t *bytes, size_t size, char *text) {
     for (size_t i = 0; i < size; i++) {
         snprintf(text + 2 * i, 3, "%02x", bytes[i]);
     }
@@ -39,8 +36,7 @@ static const char *hex(const uint8_t *bytes, size_t size, char *text)
 }
 
 static void tell_who(struct host_shell *shell, unsigned node,
-                     struct host_fold *fold, json_t *object)
-{
+                     struct host_fold *fold, json_t *object) {
     static const char *const kinds[] = {"?", "process", "program", "loader"};
     const struct node_who *w = &shell->visit.node[node].who;
     const struct node_role *role = node_role_named(w->role);
@@ -97,8 +93,7 @@ struct faults {
 };
 
 static void tell_fault(void *context, unsigned node, unsigned link,
-                       const char *text)
-{
+                       const char *text) {
     struct faults *faults = context;
     host_shell_say(faults->shell, "%s", text);
     (void)json_array_append_new(faults->list,
@@ -106,8 +101,7 @@ static void tell_fault(void *context, unsigned node, unsigned link,
                                           "link", (int)link, "error", text));
 }
 
-static unsigned tell_faults(struct host_shell *shell)
-{
+static unsigned tell_faults(struct host_shell *shell) {
     struct faults faults = {shell, json_array()};
     unsigned count = host_visit_faults(&shell->visit, tell_fault, &faults);
     if (shell->object != NULL) {
@@ -121,8 +115,7 @@ static unsigned tell_faults(struct host_shell *shell)
  * was built; what to put there, else. */
 static const char *name_image(const struct host_shell *shell,
                               const struct host_node_set *set,
-                              char path[PATH_MAX])
-{
+                              char path[PATH_MAX]) {
     char board[NODE_BOARD_BYTES + 1] = "", quoted[PATH_MAX];
     bool alike = true;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
@@ -142,8 +135,7 @@ static const char *name_image(const struct host_shell *shell,
 }
 
 /* Nodes that are there, and would not run as they are. */
-static void tell_next(struct host_shell *shell)
-{
+static void tell_next(struct host_shell *shell) {
     struct host_node_set loaders = {{0}}, worn = {{0}}, programs = {{0}};
     const struct node_who *first = NULL;
     bool mixed = false, process = false;
@@ -192,8 +184,7 @@ static void tell_next(struct host_shell *shell)
 }
 
 int host_shell_nodes(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     struct host_node_set set;
     if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0) {
         return shell->error.code;

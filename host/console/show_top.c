@@ -34,21 +34,18 @@ struct top {
     unsigned cells;
 };
 
-static double rate(const struct look *look, uint64_t now, uint64_t before)
-{
+static double rate(const struct look *look, uint64_t now, uint64_t before) {
     uint64_t us = look->us - look->before_us;
     return !look->before_there || us == 0 || now < before
                ? 0.0
                : 1e6 * (double)(now - before) / (double)us;
 }
 
-static double part(uint64_t used, uint64_t all)
-{
+static double part(uint64_t used, uint64_t all) {
     return all == 0 ? 0.0 : (double)used / (double)all;
 }
 
-static double wire_rate(const struct look *look)
-{
+static double wire_rate(const struct look *look) {
     return rate(look, look->now.bytes_in + look->now.bytes_out,
                 look->before.bytes_in + look->before.bytes_out);
 }
@@ -56,8 +53,7 @@ static double wire_rate(const struct look *look)
 /* Of what its wires could carry both ways, where their rate is known; else of
  * the most that was seen. */
 static double wire_part(const struct host_shell *shell, const struct top *top,
-                        const struct look *look)
-{
+                        const struct look *look) {
     double could =
         2.0 * shell->machine.serial_baud / UART_BITS *
         (shell->machine.dimension > 0 ? shell->machine.dimension : 1);
@@ -66,8 +62,7 @@ static double wire_part(const struct host_shell *shell, const struct top *top,
 }
 
 static void write_row(const struct host_shell *shell, struct top *top,
-                      unsigned node, char *row, size_t size)
-{
+                      unsigned node, char *row, size_t size) {
     const struct look *l = &top->look[node];
     const struct node_top *t = &l->now;
     const struct node_role *role = node_role_named(t->role);
@@ -89,8 +84,7 @@ static void write_row(const struct host_shell *shell, struct top *top,
 }
 
 static void draw(struct host_shell *shell, struct top *top,
-                 const struct host_node_set *set)
-{
+                 const struct host_node_set *set) {
     int width = (int)top->cells + 2;
     top->used = (size_t)snprintf(
         top->text, top->room, "NODE %-12s %4s %-*s %-*s %-*s %-*s %8s %7s\n",
@@ -107,8 +101,7 @@ static void draw(struct host_shell *shell, struct top *top,
 }
 
 static int look(struct host_shell *shell, struct top *top,
-                const struct host_node_set *set)
-{
+                const struct host_node_set *set) {
     if (host_shell_ask(shell, set, NODE_TOP, 0) != 0) {
         return shell->error.code;
     }
@@ -129,8 +122,7 @@ static int look(struct host_shell *shell, struct top *top,
     return 0;
 }
 
-static int pause_for(struct host_shell *shell, uint64_t us)
-{
+static int pause_for(struct host_shell *shell, uint64_t us) {
     const struct host_machine *m = &shell->machine;
     const struct host_shell_sink *sink = shell->sink;
     if (shell->looking) {
@@ -153,8 +145,7 @@ static int pause_for(struct host_shell *shell, uint64_t us)
 }
 
 static void tell_object(struct host_shell *shell, const struct top *top,
-                        const struct host_node_set *set)
-{
+                        const struct host_node_set *set) {
     json_t *list = json_array();
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         const struct look *l = &top->look[i];
@@ -186,8 +177,7 @@ static void tell_object(struct host_shell *shell, const struct top *top,
     json_decref(list);
 }
 
-static void say_text(struct host_shell *shell, char *text)
-{
+static void say_text(struct host_shell *shell, char *text) {
     for (char *line = strtok(text, "\n"); line != NULL;
          line = strtok(NULL, "\n")) {
         host_shell_say(shell, "%s", line);
@@ -195,8 +185,7 @@ static void say_text(struct host_shell *shell, char *text)
 }
 
 static int show(struct host_shell *shell, struct top *top,
-                const struct host_node_set *set)
-{
+                const struct host_node_set *set) {
     const struct host_shell_sink *sink = shell->sink;
     bool live = sink->picture != NULL && !shell->json;
     int status = look(shell, top, set);
@@ -237,8 +226,7 @@ static int show(struct host_shell *shell, struct top *top,
 }
 
 int host_shell_top(struct host_shell *shell, unsigned count,
-                   const char *const *words)
-{
+                   const char *const *words) {
     struct host_node_set set;
     if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0) {
         return shell->error.code;

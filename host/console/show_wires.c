@@ -5,8 +5,7 @@
 #include "commands.h"
 #include "drawing.h"
 
-static enum host_wire_state state_of(const struct node_link_state *link)
-{
+static enum host_wire_state state_of(const struct node_link_state *link) {
     return link->dead                    ? HOST_WIRE_DEAD
            : link->state == LINK_REFUSED ? HOST_WIRE_WRONG
            : link->state == LINK_UP || link->state == LINK_SILENT
@@ -15,8 +14,7 @@ static enum host_wire_state state_of(const struct node_link_state *link)
 }
 
 static void add_end(struct host_drawing *drawing, unsigned node, unsigned d,
-                    const struct node_link_state *link)
-{
+                    const struct node_link_state *link) {
     unsigned lower = d < drawing->dimension ? node & ~(1u << d) : node;
     uint8_t *wire = &drawing->wire[lower][d];
     enum host_wire_state state = state_of(link);
@@ -25,8 +23,7 @@ static void add_end(struct host_drawing *drawing, unsigned node, unsigned d,
     }
 }
 
-static void gather(struct host_shell *shell, struct host_drawing *drawing)
-{
+static void gather(struct host_shell *shell, struct host_drawing *drawing) {
     struct node_link_state link = host_shell_own_link(shell);
     drawing->dimension = shell->machine.dimension;
     memset(drawing->wire, HOST_WIRE_UNKNOWN, sizeof drawing->wire);
@@ -46,15 +43,13 @@ static void gather(struct host_shell *shell, struct host_drawing *drawing)
     }
 }
 
-static void say_line(void *context, const char *text)
-{
+static void say_line(void *context, const char *text) {
     host_shell_say(context, "%s", text);
 }
 
 /* Beyond what a person can see: a row a node, equal ones folded. */
 static void tell_matrix(struct host_shell *shell,
-                        const struct host_drawing *drawing)
-{
+                        const struct host_drawing *drawing) {
     struct host_fold fold = {0};
     char text[CUBE_LINKS_MAX + 1], heading[] = "0123456789";
     heading[drawing->dimension] = '\0';
@@ -67,8 +62,7 @@ static void tell_matrix(struct host_shell *shell,
 }
 
 static void tell_drawing(struct host_shell *shell,
-                         const struct host_drawing *drawing)
-{
+                         const struct host_drawing *drawing) {
     char *text = NULL;
     size_t size;
     FILE *out = open_memstream(&text, &size);
@@ -87,8 +81,7 @@ static void tell_drawing(struct host_shell *shell,
 
 /* "wrong wire: node 3 link 1" of an end of the wire that says so, or NULL. */
 static const char *said_by_end(const struct host_shell *shell, unsigned node,
-                               unsigned d, char *text, size_t size)
-{
+                               unsigned d, char *text, size_t size) {
     const struct host_visit_node *n = &shell->visit.node[node];
     struct node_link_state link;
     if (d == shell->machine.dimension) {
@@ -106,8 +99,7 @@ static const char *said_by_end(const struct host_shell *shell, unsigned node,
 
 /* Each wire that is not up; their number. */
 static unsigned tell_faults(struct host_shell *shell,
-                            const struct host_drawing *drawing, json_t *list)
-{
+                            const struct host_drawing *drawing, json_t *list) {
     unsigned faults = 0;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         for (unsigned d = 0; d <= drawing->dimension; d++) {
@@ -137,8 +129,7 @@ static unsigned tell_faults(struct host_shell *shell,
     return faults;
 }
 
-static int tell(struct host_shell *shell, const struct host_drawing *drawing)
-{
+static int tell(struct host_shell *shell, const struct host_drawing *drawing) {
     json_t *list = json_array();
     char wrong[CUBE_FAULT_BYTES];
     if (drawing->dimension <= HOST_DRAWING_MAX) {
@@ -169,8 +160,7 @@ static int tell(struct host_shell *shell, const struct host_drawing *drawing)
 }
 
 int host_shell_wires(struct host_shell *shell, unsigned count,
-                     const char *const *words)
-{
+                     const char *const *words) {
     struct host_node_set all;
     (void)count, (void)words;
     host_node_set_all(&all, shell->machine.nodes);

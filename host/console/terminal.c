@@ -43,8 +43,7 @@ static struct {
 
 /* --- signals -------------------------------------------------------------- */
 
-static void restore_terminal(void)
-{
+static void restore_terminal(void) {
     static const char gone[] = "\033[?1049l";
     if (t.pictured) {
         (void)!write(STDOUT_FILENO, gone, sizeof gone - 1);
@@ -52,8 +51,7 @@ static void restore_terminal(void)
     (void)tcsetattr(STDIN_FILENO, TCSADRAIN, &t.before);
 }
 
-static void take_signal(int number)
-{
+static void take_signal(int number) {
     if (number == SIGWINCH) {
         t.resized = 1;
         return;
@@ -71,8 +69,7 @@ static void take_signal(int number)
 static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGWINCH};
 enum { SIGNALS = sizeof signals / sizeof signals[0] };
 
-static void take_signals(struct sigaction before[SIGNALS])
-{
+static void take_signals(struct sigaction before[SIGNALS]) {
     struct sigaction action = {.sa_handler = take_signal};
     for (unsigned i = 0; i < SIGNALS; i++) {
         (void)sigaction(signals[i], &action, &before[i]);
@@ -81,30 +78,26 @@ static void take_signals(struct sigaction before[SIGNALS])
 
 /* --- what is shown -------------------------------------------------------- */
 
-static unsigned columns(void *context)
-{
+static unsigned columns(void *context) {
     struct winsize size;
     (void)context;
     bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col;
     return known ? size.ws_col : COLUMNS;
 }
 
-static unsigned rows(void)
-{
+static unsigned rows(void) {
     struct winsize size;
     bool known = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row;
     return known ? size.ws_row : 24;
 }
 
-static void show_line(void *context, const char *text)
-{
+static void show_line(void *context, const char *text) {
     (void)context;
     (void)printf("%s\n", text);
 }
 
 /* Above the line that is being edited, if there is one. */
-static void show_note(void *context, const char *text)
-{
+static void show_note(void *context, const char *text) {
     (void)context;
     if (t.pictured) {
         return; /* the next picture would cover it */
@@ -120,20 +113,17 @@ static void show_note(void *context, const char *text)
     }
 }
 
-static void show_host_note(const char *text)
-{
+static void show_host_note(const char *text) {
     show_note(NULL, text);
 }
 
-static void show_failed(void *context, const char *text)
-{
+static void show_failed(void *context, const char *text) {
     (void)context;
     (void)fflush(stdout);
     (void)fprintf(stderr, "incode: %s\n", text);
 }
 
-static void end_pictures(void)
-{
+static void end_pictures(void) {
     if (t.pictured) {
         (void)printf("\033[?1049l");
         (void)fflush(stdout);
@@ -141,8 +131,7 @@ static void end_pictures(void)
     }
 }
 
-static bool show_picture(void *context, const char *text)
-{
+static bool show_picture(void *context, const char *text) {
     unsigned width = columns(NULL), left = rows() - 1;
     (void)context;
     if (text == NULL) {
@@ -163,15 +152,13 @@ static bool show_picture(void *context, const char *text)
     return true;
 }
 
-static bool key_waits(int wait_ms)
-{
+static bool key_waits(int wait_ms) {
     struct pollfd keys = {STDIN_FILENO, POLLIN, 0};
     return poll(&keys, 1, wait_ms) > 0;
 }
 
 /* While pictures are shown, q is as good as Ctrl-C. */
-static bool interrupted(void *context)
-{
+static bool interrupted(void *context) {
     char key;
     (void)context;
     while (t.pictured && key_waits(0) && read(STDIN_FILENO, &key, 1) == 1) {
@@ -186,16 +173,14 @@ static const struct host_shell_sink sink = {
     NULL,         show_line, show_note,  show_failed,
     show_picture, columns,   interrupted};
 
-const struct host_shell_sink *host_terminal_sink(void)
-{
+const struct host_shell_sink *host_terminal_sink(void) {
     return &sink;
 }
 
 /* --- what is typed -------------------------------------------------------- */
 
 /* A letter from the next byte; false: it takes more of them. */
-static bool letter_of(char byte, wchar_t *letter)
-{
+static bool letter_of(char byte, wchar_t *letter) {
     size_t n = mbrtowc(letter, &byte, 1, &t.letters);
     if (n == (size_t)-2) {
         return false;
@@ -209,21 +194,18 @@ static bool letter_of(char byte, wchar_t *letter)
     return true;
 }
 
-static bool has_typed(void)
-{
+static bool has_typed(void) {
     const LineInfo *line = el_line(t.line);
     return line->lastchar > line->buffer;
 }
 
-static void tend(void)
-{
+static void tend(void) {
     host_shell_tend(t.shell, TEND_US);
     t.tended_us = host_now_us();
 }
 
 /* libedit's next letter: 1, 0 at the end, -1 for a line that is abandoned. */
-static int next_letter(EditLine *line, wchar_t *letter)
-{
+static int next_letter(EditLine *line, wchar_t *letter) {
     char byte;
     for (;;) {
         if (t.interrupts > 0) {
@@ -256,8 +238,7 @@ static int next_letter(EditLine *line, wchar_t *letter)
     }
 }
 
-static void list_choices(char **words, unsigned count, size_t from)
-{
+static void list_choices(char **words, unsigned count, size_t from) {
     unsigned widest = 0, width = columns(NULL), across, shown = 0;
     for (unsigned i = 0; i < count; i++) {
         unsigned length = (unsigned)strlen(words[i]);
@@ -275,8 +256,7 @@ static void list_choices(char **words, unsigned count, size_t from)
     (void)fflush(stdout);
 }
 
-static size_t common(char **words, unsigned count)
-{
+static size_t common(char **words, unsigned count) {
     size_t length = strlen(words[0]);
     for (unsigned i = 1; i < count; i++) {
         size_t same = 0;
@@ -288,8 +268,7 @@ static size_t common(char **words, unsigned count)
     return length;
 }
 
-static unsigned char complete(EditLine *line, int key)
-{
+static unsigned char complete(EditLine *line, int key) {
     static char *words[CHOICES];
     char text[1024], more[1024];
     const LineInfo *info = el_line(line);
@@ -320,8 +299,7 @@ static unsigned char complete(EditLine *line, int key)
     return result;
 }
 
-static char *prompt(EditLine *line)
-{
+static char *prompt(EditLine *line) {
     static char plain[] = "incode> ", running[] = "incode (run)> ",
                 in_use[] = "incode (in use)> ";
     (void)line;
@@ -330,8 +308,7 @@ static char *prompt(EditLine *line)
 
 /* --- lines ---------------------------------------------------------------- */
 
-static bool begin(struct host_shell *shell)
-{
+static bool begin(struct host_shell *shell) {
     const char *name = getenv("TERM");
     (void)setlocale(LC_CTYPE, "");
     memset(&t, 0, sizeof t);
@@ -358,8 +335,7 @@ static bool begin(struct host_shell *shell)
 }
 
 /* False: the person leaves. */
-static bool abandon_line(void)
-{
+static bool abandon_line(void) {
     bool again = t.warned && !t.typed;
     (void)printf("^C\n");
     if (!t.typed && !again) {
@@ -370,8 +346,7 @@ static bool abandon_line(void)
     return !again;
 }
 
-static void do_lines(void)
-{
+static void do_lines(void) {
     while (!t.shell->leaves && !t.ending) {
         int count = 0;
         t.editing = true;
@@ -405,8 +380,7 @@ static void do_lines(void)
 }
 
 /* A run behind is waited for, so that its end is seen. */
-static void leave(void)
-{
+static void leave(void) {
     if (t.shell->running && !t.ending) {
         (void)printf("the run goes on; Ctrl-C ends it\n");
         (void)fflush(stdout);
@@ -414,8 +388,7 @@ static void leave(void)
     host_shell_close(t.shell);
 }
 
-static void end(void)
-{
+static void end(void) {
     if (t.line != NULL) {
         el_end(t.line);
     }
@@ -426,8 +399,7 @@ static void end(void)
 }
 
 int host_terminal_run(struct host_shell *shell, int *ending,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct sigaction before[SIGNALS];
     struct host_error first = {0};
     *ending = 0;

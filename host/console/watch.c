@@ -7,15 +7,13 @@
 
 void host_watch_init(struct host_watch *watch,
                      const struct host_machine *machine,
-                     const struct host_shell_sink *sink)
-{
+                     const struct host_shell_sink *sink) {
     memset(watch, 0, sizeof *watch);
     watch->beneath = *machine;
     watch->sink = sink;
 }
 
-static void keep(struct host_watch *w, const uint8_t *bytes, size_t size)
-{
+static void keep(struct host_watch *w, const uint8_t *bytes, size_t size) {
     if (size > HOST_WATCH_BYTES) {
         bytes += size - HOST_WATCH_BYTES;
         size = HOST_WATCH_BYTES;
@@ -27,8 +25,7 @@ static void keep(struct host_watch *w, const uint8_t *bytes, size_t size)
     w->used = stay + (unsigned)size;
 }
 
-void host_watch_noise(const struct host_watch *watch, char *text, size_t size)
-{
+void host_watch_noise(const struct host_watch *watch, char *text, size_t size) {
     size_t used = 0;
     text[0] = '\0';
     for (unsigned i = 0; i < watch->used && used + 5 < size; i++) {
@@ -42,14 +39,12 @@ void host_watch_noise(const struct host_watch *watch, char *text, size_t size)
     }
 }
 
-static int pipe_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     const struct host_watch *w = context;
     return w->beneath.pipe.send(w->beneath.pipe.context, bytes, size);
 }
 
-static int pipe_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct host_watch *w = context;
     int got = w->beneath.pipe.receive(w->beneath.pipe.context, bytes, size);
     if (got > 0) {
@@ -61,20 +56,17 @@ static int pipe_receive(void *context, uint8_t *bytes, size_t size)
 
 /* --- as a machine --------------------------------------------------------- */
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     const struct host_watch *w = context;
     return w->beneath.now_us(w->beneath.context);
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     const struct host_watch *w = context;
     w->beneath.idle(w->beneath.context, wait_us);
 }
 
-static int check(void *context, struct host_error *error)
-{
+static int check(void *context, struct host_error *error) {
     struct host_watch *w = context;
     if (w->sink->interrupted != NULL &&
         w->sink->interrupted(w->sink->context)) {
@@ -84,68 +76,57 @@ static int check(void *context, struct host_error *error)
     return w->beneath.check(w->beneath.context, error);
 }
 
-static unsigned restarts(void *context)
-{
+static unsigned restarts(void *context) {
     const struct host_watch *w = context;
     return w->beneath.restarts(w->beneath.context);
 }
 
-static bool kill_node(void *context, unsigned node)
-{
+static bool kill_node(void *context, unsigned node) {
     const struct host_watch *w = context;
     return w->beneath.kill(w->beneath.context, node);
 }
 
-static const char *doubt(void *context, unsigned node)
-{
+static const char *doubt(void *context, unsigned node) {
     const struct host_watch *w = context;
     return w->beneath.doubt(w->beneath.context, node);
 }
 
-static const char *start_line(void *context, unsigned node)
-{
+static const char *start_line(void *context, unsigned node) {
     const struct host_watch *w = context;
     return w->beneath.start_line(w->beneath.context, node);
 }
 
-static const char *address(void *context, unsigned node)
-{
+static const char *address(void *context, unsigned node) {
     const struct host_watch *w = context;
     return w->beneath.address(w->beneath.context, node);
 }
 
-static void rest(void *context, uint64_t rest_us)
-{
+static void rest(void *context, uint64_t rest_us) {
     const struct host_watch *w = context;
     w->beneath.rest(w->beneath.context, rest_us);
 }
 
-static bool ended(void *context)
-{
+static bool ended(void *context) {
     const struct host_watch *w = context;
     return w->beneath.ended(w->beneath.context);
 }
 
-static void stop(void *context)
-{
+static void stop(void *context) {
     const struct host_watch *w = context;
     w->beneath.stop(w->beneath.context);
 }
 
 /* Links that are missing are shown where they are asked for. */
-static void missing(void *context, unsigned node, unsigned link)
-{
+static void missing(void *context, unsigned node, unsigned link) {
     (void)context, (void)node, (void)link;
 }
 
-static void told(void *context, const char *line)
-{
+static void told(void *context, const char *line) {
     const struct host_watch *w = context;
     w->sink->note(w->sink->context, line);
 }
 
-struct host_machine host_watch_machine(struct host_watch *watch)
-{
+struct host_machine host_watch_machine(struct host_watch *watch) {
     struct host_machine machine = watch->beneath;
     const struct host_machine *b = &watch->beneath;
     machine.context = watch;

@@ -11,21 +11,18 @@
 enum { KEY_DIGITS = 2 * SECURE_KEY_BYTES };
 
 static const char *fact(const struct host_deploy_board *board,
-                        enum host_fact which)
-{
+                        enum host_fact which) {
     return board->fact[which];
 }
 
-static bool is_there(const struct host_deploy_board *board)
-{
+static bool is_there(const struct host_deploy_board *board) {
     return strcmp(fact(board, HOST_FACT_UNIT), "-") != 0;
 }
 
 /* Behind what is there; what does not fit is cut. */
 static void say(struct host_deploy_board *board, const char *format, ...)
     __attribute__((format(printf, 2, 3)));
-static void say(struct host_deploy_board *board, const char *format, ...)
-{
+static void say(struct host_deploy_board *board, const char *format, ...) {
     size_t used = strlen(board->result);
     va_list list;
     va_start(list, format);
@@ -35,8 +32,7 @@ static void say(struct host_deploy_board *board, const char *format, ...)
 }
 
 /* "running under systemd" */
-static void say_running(struct host_deploy_board *board)
-{
+static void say_running(struct host_deploy_board *board) {
     const char *manager = fact(board, HOST_FACT_MANAGER);
     if (strcmp(manager, "none") == 0) {
         say(board, "running by itself, and not again at boot");
@@ -49,8 +45,7 @@ static void say_running(struct host_deploy_board *board)
 }
 
 static void print_key(const struct host_cube_file *file,
-                      char digits[KEY_DIGITS + 2])
-{
+                      char digits[KEY_DIGITS + 2]) {
     for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
         snprintf(digits + 2 * i, 3, "%02x", file->key[i]);
     }
@@ -63,16 +58,14 @@ struct lacks {
 };
 
 static bool differs(const struct host_deploy_board *board, enum host_fact which,
-                    const void *bytes, size_t size)
-{
+                    const void *bytes, size_t size) {
     char digest[HOST_SHA256_DIGITS + 1];
     host_digest_bytes(bytes, size, digest);
     return strcmp(digest, fact(board, which)) != 0;
 }
 
 static int compare(struct host_deploy_board *board,
-                   const struct host_deploy_job *job, struct lacks *lacks)
-{
+                   const struct host_deploy_job *job, struct lacks *lacks) {
     const struct host_unit unit = {.file = job->file,
                                    .node = board->node,
                                    .folder = fact(board, HOST_FACT_FOLDER),
@@ -100,8 +93,7 @@ static int compare(struct host_deploy_board *board,
     return 0;
 }
 
-static unsigned count_lines(const char *text)
-{
+static unsigned count_lines(const char *text) {
     unsigned count = 0;
     for (; *text != '\0'; text++) {
         count += *text == '\n';
@@ -112,8 +104,7 @@ static unsigned count_lines(const char *text)
 /* As script.h says. */
 static int write_reply(struct host_deploy_board *board,
                        const struct host_deploy_job *job,
-                       const struct lacks *lacks)
-{
+                       const struct lacks *lacks) {
     char key[KEY_DIGITS + 2] = "keep\n";
     FILE *out = open_memstream(&board->reply, &board->reply_bytes);
     if (out == NULL) {
@@ -138,8 +129,7 @@ static int write_reply(struct host_deploy_board *board,
 
 /* "program, key, unit" */
 static void say_lacks(struct host_deploy_board *board,
-                      const struct lacks *lacks)
-{
+                      const struct lacks *lacks) {
     bool none = strcmp(fact(board, HOST_FACT_MANAGER), "none") == 0;
     const char *between = "";
     if (lacks->program) {
@@ -156,8 +146,7 @@ static void say_lacks(struct host_deploy_board *board,
     }
 }
 
-static void answer_status(struct host_deploy_board *board)
-{
+static void answer_status(struct host_deploy_board *board) {
     const char *state = fact(board, HOST_FACT_STATE);
     const char *since = fact(board, HOST_FACT_SINCE);
     board->running = strcmp(state, "running") == 0;
@@ -174,8 +163,7 @@ static void answer_status(struct host_deploy_board *board)
 
 static void answer_dry(struct host_deploy_board *board,
                        const struct host_deploy_job *job,
-                       const struct lacks *lacks)
-{
+                       const struct lacks *lacks) {
     const char *folder = fact(board, HOST_FACT_FOLDER);
     bool lack = lacks->program || lacks->key || lacks->unit;
     bool running = strcmp(fact(board, HOST_FACT_STATE), "running") == 0;
@@ -196,8 +184,7 @@ static void answer_dry(struct host_deploy_board *board,
 }
 
 int host_answer(struct host_deploy_board *board,
-                const struct host_deploy_job *job)
-{
+                const struct host_deploy_job *job) {
     struct lacks lacks = {.program = false};
     if (job->order == HOST_STATUS) {
         answer_status(board);
@@ -241,8 +228,7 @@ int host_answer(struct host_deploy_board *board,
     return board->error.code;
 }
 
-void host_answer_done(struct host_deploy_board *board, const char *state)
-{
+void host_answer_done(struct host_deploy_board *board, const char *state) {
     board->done = true;
     if (strcmp(state, "running") == 0) {
         board->running = true;

@@ -18,8 +18,7 @@
 
 static _Noreturn void become_ssh(const struct host_deploy_job *job,
                                  const char *to, const char *command,
-                                 int files[3], pid_t host)
-{
+                                 int files[3], pid_t host) {
     const char *argv[24] = {"ssh", "-T", "-x", "-o", "BatchMode=yes", "-o",
                             "ConnectTimeout=10", "-o", "ServerAliveInterval=5",
                             "-o", "ServerAliveCountMax=3", "-o",
@@ -46,15 +45,13 @@ static _Noreturn void become_ssh(const struct host_deploy_job *job,
     _exit(127);
 }
 
-static const char *order_of(const struct host_deploy_job *job)
-{
+static const char *order_of(const struct host_deploy_job *job) {
     return job->dry_run || job->order == HOST_STATUS ? "look"
            : job->order == HOST_REMOVE               ? "remove"
                                                      : "deploy";
 }
 
-static void close_one(int *file)
-{
+static void close_one(int *file) {
     if (*file >= 0) {
         close(*file);
     }
@@ -62,8 +59,7 @@ static void close_one(int *file)
 }
 
 /* Three pipes; false: errno says why, and none is open. */
-static bool open_pipes(int near[3], int far[3])
-{
+static bool open_pipes(int near[3], int far[3]) {
     bool good = true;
     for (int i = 0; i < 3; i++) {
         near[i] = far[i] = -1;
@@ -87,8 +83,7 @@ static bool open_pipes(int near[3], int far[3])
 }
 
 int host_board_begin(struct host_deploy_board *board,
-                     const struct host_deploy_job *job, unsigned node)
-{
+                     const struct host_deploy_job *job, unsigned node) {
     const struct host_cube_ssh *ssh = host_cube_ssh(job->file, node);
     int near[3], far[3];
     memset(board, 0, sizeof *board);
@@ -130,8 +125,7 @@ int host_board_begin(struct host_deploy_board *board,
     return 0;
 }
 
-void host_board_free(struct host_deploy_board *board)
-{
+void host_board_free(struct host_deploy_board *board) {
     close_one(&board->in);
     close_one(&board->out);
     close_one(&board->err);
@@ -146,16 +140,14 @@ void host_board_free(struct host_deploy_board *board)
 /* --- what it says --------------------------------------------------------- */
 
 /* Whether the text begins with the words, which *text is behind then. */
-static bool begins(const char **text, const char *words)
-{
+static bool begins(const char **text, const char *words) {
     size_t size = strlen(words);
     bool same = strncmp(*text, words, size) == 0;
     *text += same ? size : 0;
     return same;
 }
 
-static void take_fact(struct host_deploy_board *board, const char *text)
-{
+static void take_fact(struct host_deploy_board *board, const char *text) {
     for (int i = 0; i < HOST_FACTS; i++) {
         const char *name = host_fact_name((enum host_fact)i);
         const char *value = text;
@@ -166,8 +158,7 @@ static void take_fact(struct host_deploy_board *board, const char *text)
 }
 
 /* A board that leaves a fact out has another script's answers. */
-static bool has_all(const struct host_deploy_board *board)
-{
+static bool has_all(const struct host_deploy_board *board) {
     bool all = true;
     for (int i = 0; i < HOST_FACTS; i++) {
         all = all && board->fact[i][0] != '\0';
@@ -176,8 +167,7 @@ static bool has_all(const struct host_deploy_board *board)
 }
 
 static void take_line(struct host_deploy_board *board,
-                      const struct host_deploy_job *job, const char *text)
-{
+                      const struct host_deploy_job *job, const char *text) {
     if (!begins(&text, HOST_SCRIPT_MARK) || board->error.code != 0) {
         return;
     }
@@ -201,8 +191,7 @@ static void take_line(struct host_deploy_board *board,
 }
 
 /* Appends a byte; a line's end is passed on.  What is too long is cut. */
-static bool put_byte(char line[HOST_BOARD_TEXT], size_t *bytes, char byte)
-{
+static bool put_byte(char line[HOST_BOARD_TEXT], size_t *bytes, char byte) {
     if (byte == '\n') {
         line[*bytes] = '\0';
         *bytes = 0;
@@ -215,8 +204,7 @@ static bool put_byte(char line[HOST_BOARD_TEXT], size_t *bytes, char byte)
 }
 
 static void receive(struct host_deploy_board *board,
-                    const struct host_deploy_job *job, int *file)
-{
+                    const struct host_deploy_job *job, int *file) {
     char bytes[4096];
     ssize_t got = read(*file, bytes, sizeof bytes);
     board->heard_us = host_now_us();
@@ -236,8 +224,7 @@ static void receive(struct host_deploy_board *board,
 
 /* --- what it is sent ------------------------------------------------------ */
 
-static void send_some(struct host_deploy_board *board)
-{
+static void send_some(struct host_deploy_board *board) {
     bool head = board->reply_sent < board->reply_bytes;
     const char *from =
         head ? board->reply + board->reply_sent
@@ -266,8 +253,7 @@ static void send_some(struct host_deploy_board *board)
 /* --- its end -------------------------------------------------------------- */
 
 /* What OpenSSH says, and what helps. */
-static const char *next_step(const char *said)
-{
+static const char *next_step(const char *said) {
     static const struct {
         const char *words, *next;
     } known[] = {
@@ -290,8 +276,7 @@ static const char *next_step(const char *said)
     return "try: ssh";
 }
 
-static void end(struct host_deploy_board *board)
-{
+static void end(struct host_deploy_board *board) {
     int status = 0;
     pid_t got;
     do {
@@ -320,8 +305,7 @@ static void end(struct host_deploy_board *board)
 }
 
 unsigned host_board_files(const struct host_deploy_board *board,
-                          struct pollfd files[HOST_BOARD_FILES])
-{
+                          struct pollfd files[HOST_BOARD_FILES]) {
     unsigned n = 0;
     if (board->in >= 0 && board->reply != NULL) {
         files[n++] = (struct pollfd){.fd = board->in, .events = POLLOUT};
@@ -337,8 +321,7 @@ unsigned host_board_files(const struct host_deploy_board *board,
 
 void host_board_step(struct host_deploy_board *board,
                      const struct host_deploy_job *job,
-                     const struct pollfd *files, unsigned count)
-{
+                     const struct pollfd *files, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         if (files[i].revents == 0 || files[i].fd < 0) {
             continue;

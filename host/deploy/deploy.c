@@ -53,8 +53,7 @@ struct deploy {
     struct host_error *error;
 };
 
-static void take_order(struct deploy *d, enum host_deploy_order order)
-{
+static void take_order(struct deploy *d, enum host_deploy_order order) {
     if (d->ordered && d->job.order != order) {
         host_fail(d->error, HOST_USAGE,
                   "deploy: --status, --update and --remove are different "
@@ -64,8 +63,7 @@ static void take_order(struct deploy *d, enum host_deploy_order order)
     d->job.order = order;
 }
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct deploy *d = state->input;
     switch (key) {
     case KEY_CUBE:
@@ -114,8 +112,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
 /* --- which ---------------------------------------------------------------- */
 
 /* Whether there is a program of that name: it is a package of its own. */
-static int check_ssh(struct host_error *error)
-{
+static int check_ssh(struct host_error *error) {
     static const char usual[] = "/usr/local/bin:/usr/bin:/bin";
     const char *path = getenv("PATH");
     char name[4096];
@@ -133,8 +130,7 @@ static int check_ssh(struct host_error *error)
 
 /* The nodes that are meant and have a board to log in to. */
 static int choose(const struct deploy *d, const struct host_cube_file *file,
-                  struct host_node_set *chosen)
-{
+                  struct host_node_set *chosen) {
     struct host_node_set wanted;
     memset(chosen, 0, sizeof *chosen);
     host_node_set_all(&wanted, file->nodes);
@@ -171,8 +167,7 @@ struct boards {
 };
 
 /* Begins as many as there is room for; how many are at work. */
-static unsigned begin_more(struct boards *boards, struct deploy *d)
-{
+static unsigned begin_more(struct boards *boards, struct deploy *d) {
     unsigned at_work = 0;
     for (unsigned i = 0; i < boards->begun; i++) {
         at_work += !boards->board[i].ended;
@@ -185,8 +180,7 @@ static unsigned begin_more(struct boards *boards, struct deploy *d)
 }
 
 static void run(struct boards *boards, struct deploy *d,
-                const struct host_deploy_lines *lines)
-{
+                const struct host_deploy_lines *lines) {
     struct pollfd files[DEPLOY_AT_ONCE * HOST_BOARD_FILES];
     while (begin_more(boards, d) > 0) {
         unsigned count = 0, at = 0;
@@ -209,8 +203,7 @@ static void run(struct boards *boards, struct deploy *d,
 }
 
 /* Which failed, or do not run. */
-static int conclude(const struct boards *boards, const struct deploy *d)
-{
+static int conclude(const struct boards *boards, const struct deploy *d) {
     struct host_node_set failed = {{0}}, stopped = {{0}};
     char text[120], name[128];
     for (unsigned i = 0; i < boards->count; i++) {
@@ -243,8 +236,7 @@ static int conclude(const struct boards *boards, const struct deploy *d)
     return 0;
 }
 
-static int deploy(struct deploy *d, const struct host_node_set *chosen)
-{
+static int deploy(struct deploy *d, const struct host_node_set *chosen) {
     struct host_deploy_lines lines;
     struct boards boards = {.count = host_node_set_count(chosen)};
     boards.board = calloc(boards.count, sizeof *boards.board);
@@ -271,8 +263,7 @@ static int deploy(struct deploy *d, const struct host_node_set *chosen)
     return status;
 }
 
-int host_deploy(int argc, char **argv, struct host_error *error)
-{
+int host_deploy(int argc, char **argv, struct host_error *error) {
     static const struct argp argp = {
         options_of_deploy,
         parse,

@@ -9,8 +9,7 @@
 enum { NAME_BYTES = HOST_SSH_MAX + 32 };
 
 void host_deploy_lines_begin(struct host_deploy_lines *lines, unsigned boards,
-                             bool quiet)
-{
+                             bool quiet) {
     host_progress_begin(!quiet);
     lines->quiet = quiet;
     lines->live = boards <= host_progress_rows_max();
@@ -22,13 +21,11 @@ void host_deploy_lines_begin(struct host_deploy_lines *lines, unsigned boards,
 }
 
 static void print_name(const struct host_deploy_board *board,
-                       char name[NAME_BYTES])
-{
+                       char name[NAME_BYTES]) {
     snprintf(name, NAME_BYTES, "node %u %s:", board->node, board->to);
 }
 
-static const char *text_of(const struct host_deploy_board *board)
-{
+static const char *text_of(const struct host_deploy_board *board) {
     return !board->ended            ? board->step
            : board->error.code != 0 ? board->error.text
                                     : board->result;
@@ -36,8 +33,7 @@ static const char *text_of(const struct host_deploy_board *board)
 
 void host_deploy_lines_show(const struct host_deploy_lines *lines,
                             const struct host_deploy_board *boards,
-                            unsigned count)
-{
+                            unsigned count) {
     char text[HOST_SAY_BYTES], name[NAME_BYTES], line[sizeof text];
     for (unsigned i = 0; i < count && lines->live; i++) {
         const struct host_deploy_board *board = &boards[i];
@@ -52,8 +48,7 @@ void host_deploy_lines_show(const struct host_deploy_lines *lines,
 }
 
 /* A text of several lines, each set in. */
-static void print_text(const char *text)
-{
+static void print_text(const char *text) {
     while (*text != '\0') {
         int length = (int)strcspn(text, "\n");
         host_say(stdout, "    %.*s\n", length, text);
@@ -63,8 +58,7 @@ static void print_text(const char *text)
 
 void host_deploy_lines_end(const struct host_deploy_lines *lines,
                            const struct host_deploy_board *boards,
-                           unsigned count)
-{
+                           unsigned count) {
     char name[NAME_BYTES];
     host_progress_end();
     for (unsigned i = 0; i < count; i++) {

@@ -24,8 +24,7 @@ static const char *const processors[HOST_PROGRAMS_MAX] = {"x86_64", "aarch64",
                                                           "armhf", "riscv64"};
 
 void host_digest_bytes(const void *bytes, size_t size,
-                       char digits[HOST_SHA256_DIGITS + 1])
-{
+                       char digits[HOST_SHA256_DIGITS + 1]) {
     struct sha256_ctx sha;
     uint8_t sum[SHA256_DIGEST_SIZE];
     sha256_init(&sha);
@@ -37,8 +36,7 @@ void host_digest_bytes(const void *bytes, size_t size,
 }
 
 int host_programs_open(struct host_programs *programs, const char *folder,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     char here[PATH_MAX - 32];
     memset(programs, 0, sizeof *programs);
     for (int i = 0; i < HOST_PROGRAMS_MAX; i++) {
@@ -69,8 +67,7 @@ int host_programs_open(struct host_programs *programs, const char *folder,
     return 0;
 }
 
-void host_programs_free(struct host_programs *programs)
-{
+void host_programs_free(struct host_programs *programs) {
     for (int i = 0; i < HOST_PROGRAMS_MAX; i++) {
         free(programs->program[i].bytes);
         programs->program[i].bytes = NULL;
@@ -78,8 +75,7 @@ void host_programs_free(struct host_programs *programs)
 }
 
 static int read_program(struct host_program *program, FILE *file,
-                        const char *path, struct host_error *error)
-{
+                        const char *path, struct host_error *error) {
     struct stat about;
     bool good = fstat(fileno(file), &about) == 0 && S_ISREG(about.st_mode) &&
                 about.st_size > 0 && about.st_size <= PROGRAM_MAX;
@@ -106,8 +102,7 @@ static int read_program(struct host_program *program, FILE *file,
 
 /* That of a machine; NULL: there is none. */
 static struct host_program *program_of(struct host_programs *programs,
-                                       const char *machine)
-{
+                                       const char *machine) {
     struct host_program *program = NULL;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         for (int k = 0; k < HOST_PROGRAMS_MAX; k++) {
@@ -120,8 +115,7 @@ static struct host_program *program_of(struct host_programs *programs,
 }
 
 static bool is_own(struct host_programs *programs,
-                   const struct host_program *program)
-{
+                   const struct host_program *program) {
     struct utsname here;
     return programs->own[0] != '\0' && uname(&here) == 0 &&
            program_of(programs, here.machine) == program;
@@ -129,8 +123,7 @@ static bool is_own(struct host_programs *programs,
 
 const struct host_program *host_programs_take(struct host_programs *programs,
                                               const char *machine,
-                                              struct host_error *error)
-{
+                                              struct host_error *error) {
     struct host_program *program = program_of(programs, machine);
     char path[PATH_MAX + 64];
     if (program == NULL) {

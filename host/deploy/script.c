@@ -14,16 +14,15 @@ __asm__(".section .rodata\n"
         ".previous\n");
 extern const char host_deploy_script[] __attribute__((visibility("hidden")));
 
-const char *host_fact_name(enum host_fact fact)
-{
+const char *host_fact_name(enum host_fact fact) {
     static const char *const names[HOST_FACTS] = {
         "machine", "manager", "user", "folder", "file",
         "program", "key",     "unit", "state",  "since"};
     return names[fact];
 }
 
-char *host_script_command(const char *order, unsigned node, const char *folder)
-{
+char *host_script_command(const char *order, unsigned node,
+                          const char *folder) {
     /* A byte becomes four at most: '\'' */
     size_t size = 4 * (strlen(host_deploy_script) + strlen(folder)) + 128, used;
     char *command = malloc(size), number[16];

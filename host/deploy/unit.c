@@ -13,8 +13,7 @@
 
 /* A word of a command line of systemd (systemd.service(5), "Command lines"):
  * no escape of its shell-like quotes, no specifier, no variable. */
-static void put_word(FILE *out, const char *word)
-{
+static void put_word(FILE *out, const char *word) {
     (void)fputs(" \"", out);
     for (const char *at = word; *at != '\0'; at++) {
         unsigned char byte = (unsigned char)*at;
@@ -31,8 +30,7 @@ static void put_word(FILE *out, const char *word)
     (void)fputc('"', out);
 }
 
-static void put_quoted(FILE *out, const char *word)
-{
+static void put_quoted(FILE *out, const char *word) {
     char quoted[20 * HOST_NODE_OPTION_BYTES + 4096];
     (void)host_text_quote(quoted, sizeof quoted, word);
     (void)fprintf(out, " %s", quoted);
@@ -40,8 +38,7 @@ static void put_quoted(FILE *out, const char *word)
 
 /* The program and its arguments; the key is beside it. */
 static void put_command(FILE *out, const struct host_unit *unit,
-                        void (*put)(FILE *out, const char *word))
-{
+                        void (*put)(FILE *out, const char *word)) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     unsigned count = host_cube_node_options(unit->file, unit->node, options);
     char path[4096];
@@ -55,8 +52,7 @@ static void put_command(FILE *out, const struct host_unit *unit,
     (void)fputc('\n', out);
 }
 
-static void put_start(FILE *out, const struct host_unit *unit)
-{
+static void put_start(FILE *out, const struct host_unit *unit) {
     char path[4096];
     snprintf(path, sizeof path, "%s/pid", unit->folder);
     (void)fprintf(out, "#!/bin/sh\n# Node %u, by incode deploy.\necho $$ >",
@@ -69,8 +65,7 @@ static void put_start(FILE *out, const struct host_unit *unit)
 /* LimitDATA and LimitSTACK are the node's memory, to the byte, as the host sets
  * them for nodes that it starts; MemoryMax also counts what the kernel has for
  * it. */
-static void put_service(FILE *out, const struct host_unit *unit)
-{
+static void put_service(FILE *out, const struct host_unit *unit) {
     uint64_t memory = unit->file->memory;
     bool system = strcmp(unit->manager, "system") == 0;
     (void)fprintf(out,
@@ -98,8 +93,7 @@ static void put_service(FILE *out, const struct host_unit *unit)
                   system ? "multi-user" : "default");
 }
 
-char *host_unit_text(const struct host_unit *unit)
-{
+char *host_unit_text(const struct host_unit *unit) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);

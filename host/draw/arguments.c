@@ -13,8 +13,7 @@ struct parse_draw {
     struct host_error *error;
 };
 
-static void parse_axis(struct parse_draw *p, const char *value)
-{
+static void parse_axis(struct parse_draw *p, const char *value) {
     const char *axis = strlen(value) == 1 ? strchr("xyz", value[0]) : NULL;
     if (axis == NULL) {
         host_fail(p->error, HOST_USAGE,
@@ -24,8 +23,7 @@ static void parse_axis(struct parse_draw *p, const char *value)
     p->options->axis = value[0] - 'x';
 }
 
-static void parse_at(struct parse_draw *p, const char *value)
-{
+static void parse_at(struct parse_draw *p, const char *value) {
     char *end = NULL;
     p->options->at = strtod(value, &end);
     p->options->has_at = true;
@@ -35,16 +33,14 @@ static void parse_at(struct parse_draw *p, const char *value)
     }
 }
 
-static void parse_width(struct parse_draw *p, const char *value)
-{
+static void parse_width(struct parse_draw *p, const char *value) {
     uint64_t n = 0;
     (void)host_option_number("width", value, HOST_PICTURE_MIN, HOST_PICTURE_MAX,
                              &n, p->error);
     p->options->width = (unsigned)n;
 }
 
-static void parse_argument(struct parse_draw *p, const char *value)
-{
+static void parse_argument(struct parse_draw *p, const char *value) {
     struct host_draw_options *o = p->options;
     if (o->points == NULL) {
         o->points = value;
@@ -57,8 +53,8 @@ static void parse_argument(struct parse_draw *p, const char *value)
     }
 }
 
-static error_t parse_draw_option(int key, char *value, struct argp_state *state)
-{
+static error_t parse_draw_option(int key, char *value,
+                                 struct argp_state *state) {
     struct parse_draw *p = state->input;
     switch (key) {
     case 'o':
@@ -85,8 +81,7 @@ static error_t parse_draw_option(int key, char *value, struct argp_state *state)
 }
 
 static int check(const struct host_draw_options *options,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     char formats[64];
     host_picture_formats(formats, sizeof formats);
     if (error->code == 0 && options->tets == NULL) {
@@ -110,8 +105,7 @@ static int check(const struct host_draw_options *options,
 
 int host_draw_arguments(int argc, char **argv,
                         struct host_draw_options *options,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     static const struct argp_option options_of_draw[] = {
         {"output", 'o', "FILE", 0,
          "Write the picture to FILE, .svg or .png; - is .svg on standard "

@@ -11,8 +11,7 @@
 
 /* No output may be a file that is read. */
 static int check_claims(const struct host_draw_options *options,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_claims claims = {0};
     host_claims_read(&claims, options->points, error);
     host_claims_read(&claims, options->tets, error);
@@ -24,8 +23,8 @@ static int check_claims(const struct host_draw_options *options,
 
 /* What was drawn, where standard output does not have the picture itself. */
 static void report(const struct host_draw_options *options,
-                   const struct host_picture *picture, struct host_plane plane)
-{
+                   const struct host_picture *picture,
+                   struct host_plane plane) {
     FILE *file = strcmp(options->output, "-") == 0 ? stderr : stdout;
     host_say(file, "%s: %u x %u pixels, %llu tetrahedra cut by %c = %.9g\n",
              options->output, picture->width, picture->height,
@@ -41,8 +40,7 @@ static void report(const struct host_draw_options *options,
 
 static int draw(const struct host_draw_options *options,
                 const struct host_points *points,
-                const struct host_tetrahedra *tets, struct host_error *error)
-{
+                const struct host_tetrahedra *tets, struct host_error *error) {
     struct host_section section = {0};
     struct host_output out;
     struct host_plane plane = host_plane_through_middle(points);
@@ -67,8 +65,8 @@ static int draw(const struct host_draw_options *options,
     return error->code;
 }
 
-int host_draw(const struct host_draw_options *options, struct host_error *error)
-{
+int host_draw(const struct host_draw_options *options,
+              struct host_error *error) {
     struct host_points points = {0};
     struct host_tetrahedra tets = {0};
     host_progress_begin(!options->quiet);

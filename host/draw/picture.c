@@ -11,8 +11,7 @@ static const struct host_picture_format formats[] = {
     {".svg", host_picture_svg}, {".png", host_picture_png}};
 enum { FORMATS = sizeof formats / sizeof formats[0] };
 
-const struct host_picture_format *host_picture_format(const char *path)
-{
+const struct host_picture_format *host_picture_format(const char *path) {
     const char *dot = strrchr(path, '.');
     for (unsigned i = 0; i < FORMATS; i++) {
         if (strcmp(path, "-") == 0 ||
@@ -23,8 +22,7 @@ const struct host_picture_format *host_picture_format(const char *path)
     return NULL;
 }
 
-void host_picture_formats(char *text, size_t size)
-{
+void host_picture_formats(char *text, size_t size) {
     size_t used = 0;
     for (unsigned i = 0; i < FORMATS && used < size; i++) {
         used += (size_t)snprintf(text + used, size - used, "%s%s",
@@ -33,8 +31,7 @@ void host_picture_formats(char *text, size_t size)
 }
 
 struct host_picture host_picture_of(const struct host_section *section,
-                                    unsigned width)
-{
+                                    unsigned width) {
     struct host_picture p = {.section = section};
     double inner = (double)width - 2 * MARGIN;
     double wide = section->proportion[0], high = section->proportion[1];
@@ -48,16 +45,14 @@ struct host_picture host_picture_of(const struct host_section *section,
 }
 
 void host_picture_place(const struct host_picture *picture,
-                        const float corner[2], double at[2])
-{
+                        const float corner[2], double at[2]) {
     at[0] = MARGIN + picture->scale * (double)corner[0];
     at[1] = MARGIN + picture->scale *
                          (picture->section->proportion[1] - (double)corner[1]);
 }
 
 unsigned host_picture_colour(const struct host_picture *picture,
-                             const struct host_cell *cell)
-{
+                             const struct host_cell *cell) {
     double less = picture->section->size_mean - (double)cell->size;
     double colour = 22.0 - 11.0 * less;
     return colour < 0.0                ? 0
@@ -66,8 +61,7 @@ unsigned host_picture_colour(const struct host_picture *picture,
 }
 
 /* Hue, of which 60 % are saturated, and lightness, as CSS has them. */
-uint32_t host_picture_rgb(unsigned colour)
-{
+uint32_t host_picture_rgb(unsigned colour) {
     double hue = (225.0 - 4.0 * colour) / 30.0;
     double light = 0.38 + 0.012 * colour;
     double half = 0.6 * (light < 0.5 ? light : 1.0 - light);

@@ -9,8 +9,7 @@
 #include "picture.h"
 #include "raster.h"
 
-static void channels_of(uint32_t rgb, float channels[HOST_CHANNELS])
-{
+static void channels_of(uint32_t rgb, float channels[HOST_CHANNELS]) {
     for (int k = 0; k < 3; k++) {
         channels[k] = (float)(rgb >> (16 - 8 * k) & 255);
     }
@@ -20,8 +19,7 @@ static void channels_of(uint32_t rgb, float channels[HOST_CHANNELS])
 
 /* A line as a rectangle of half the weight: two cells share it. */
 static void draw_edge(struct host_raster *raster, const double a[2],
-                      const double b[2], double line)
-{
+                      const double b[2], double line) {
     static const float dark[HOST_CHANNELS] = {0.0f, 0.0f, 0.0f, 0.0f, 0.5f};
     double dx = b[0] - a[0], dy = b[1] - a[1], length = hypot(dx, dy);
     if (length > 0.0) {
@@ -35,8 +33,7 @@ static void draw_edge(struct host_raster *raster, const double a[2],
 }
 
 static void draw_cells(struct host_raster *raster,
-                       const struct host_picture *picture)
-{
+                       const struct host_picture *picture) {
     const struct host_section *section = picture->section;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
@@ -55,14 +52,12 @@ static void draw_cells(struct host_raster *raster,
     }
 }
 
-static png_byte level(double value)
-{
+static png_byte level(double value) {
     return (png_byte)lround(fmin(fmax(value, 0.0), 255.0));
 }
 
 /* Cells over white, edges over cells. */
-static void blend(const struct host_raster *raster, png_byte *bytes)
-{
+static void blend(const struct host_raster *raster, png_byte *bytes) {
     float edges[HOST_CHANNELS];
     channels_of(HOST_PICTURE_EDGES, edges);
     for (size_t i = 0; i < (size_t)raster->width * raster->height; i++) {
@@ -78,8 +73,7 @@ static void blend(const struct host_raster *raster, png_byte *bytes)
 }
 
 static int write_png(struct host_output *out, unsigned width, unsigned height,
-                     const png_byte *bytes, struct host_error *error)
-{
+                     const png_byte *bytes, struct host_error *error) {
     png_image image = {.version = PNG_IMAGE_VERSION,
                        .width = width,
                        .height = height,
@@ -97,8 +91,7 @@ static int write_png(struct host_output *out, unsigned width, unsigned height,
 }
 
 int host_picture_png(struct host_output *out, struct host_picture *picture,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_raster raster = {picture->width, picture->height, NULL};
     size_t pixels = (size_t)picture->width * picture->height;
     png_byte *bytes = host_map(3 * pixels);

@@ -8,8 +8,7 @@
 enum { LINES = 4 };
 
 static void add_part(struct host_raster *raster, unsigned x, unsigned y,
-                     double part, const float channels[HOST_CHANNELS])
-{
+                     double part, const float channels[HOST_CHANNELS]) {
     float *pixel = raster->pixels[(size_t)y * raster->width + x];
     for (unsigned k = 0; k < HOST_CHANNELS; k++) {
         pixel[k] += (float)(part / LINES) * channels[k];
@@ -18,8 +17,7 @@ static void add_part(struct host_raster *raster, unsigned x, unsigned y,
 
 /* From x0 to x1 of one line in row y. */
 static void add_line(struct host_raster *raster, unsigned y, double x0,
-                     double x1, const float channels[HOST_CHANNELS])
-{
+                     double x1, const float channels[HOST_CHANNELS]) {
     x0 = fmax(x0, 0.0);
     x1 = fmin(x1, raster->width);
     for (unsigned x = (unsigned)fmax(x0, 0.0); x < x1; x++) {
@@ -28,8 +26,7 @@ static void add_line(struct host_raster *raster, unsigned y, double x0,
 }
 
 void host_raster_add(struct host_raster *raster, double corner[][2],
-                     unsigned corners, const float channels[HOST_CHANNELS])
-{
+                     unsigned corners, const float channels[HOST_CHANNELS]) {
     double top = corner[0][1], bottom = corner[0][1];
     for (unsigned k = 1; k < corners; k++) {
         top = fmin(top, corner[k][1]);

@@ -19,8 +19,7 @@ struct cut {
 };
 
 static void bounds(const struct host_points *points, unsigned axis, double *lo,
-                   double *hi)
-{
+                   double *hi) {
     *lo = *hi = points->xyz[axis];
     for (uint64_t i = 1; i < points->count; i++) {
         double x = points->xyz[3 * i + axis];
@@ -29,16 +28,14 @@ static void bounds(const struct host_points *points, unsigned axis, double *lo,
     }
 }
 
-double host_plane_middle(const struct host_points *points, unsigned axis)
-{
+double host_plane_middle(const struct host_points *points, unsigned axis) {
     double lo, hi;
     bounds(points, axis, &lo, &hi);
     double middle = (double)(((wide)lo + (wide)hi) / 2);
     return middle > lo ? middle : hi;
 }
 
-struct host_plane host_plane_through_middle(const struct host_points *points)
-{
+struct host_plane host_plane_through_middle(const struct host_points *points) {
     unsigned least = 2;
     wide extent[3];
     for (unsigned d = 0; d < 3; d++) {
@@ -56,8 +53,7 @@ struct host_plane host_plane_through_middle(const struct host_points *points)
 /* How many vertices are above the plane, and which are: first those, then the
  * others. */
 static unsigned split(const struct cut *c, const uint32_t v[4],
-                      const double *vertex[4])
-{
+                      const double *vertex[4]) {
     unsigned above = 0, below = 4;
     for (unsigned k = 0; k < 4; k++) {
         const double *p = c->xyz + 3 * (uint64_t)v[k];
@@ -68,8 +64,7 @@ static unsigned split(const struct cut *c, const uint32_t v[4],
 
 /* Where the plane meets the edge, which is the same for all that share it. */
 static void meet(const struct cut *c, const double *above, const double *below,
-                 wide at[2])
-{
+                 wide at[2]) {
     unsigned axis = c->plane.axis;
     wide t = ((wide)c->plane.at - (wide)below[axis]) /
              ((wide)above[axis] - (wide)below[axis]);
@@ -81,8 +76,7 @@ static void meet(const struct cut *c, const double *above, const double *below,
 
 /* The corners of the cell of vertices of which `above` are above. */
 static unsigned corners(const struct cut *c, const double *vertex[4],
-                        unsigned above, wide at[4][2])
-{
+                        unsigned above, wide at[4][2]) {
     static const unsigned quadrilateral[4][2] = {
         {0, 2}, {0, 3}, {1, 3}, {1, 2}};
     if (above == 2) {
@@ -99,15 +93,13 @@ static unsigned corners(const struct cut *c, const double *vertex[4],
     return 3;
 }
 
-static wide length(const double *a, const double *b)
-{
+static wide length(const double *a, const double *b) {
     wide x = (wide)a[0] - (wide)b[0], y = (wide)a[1] - (wide)b[1];
     wide z = (wide)a[2] - (wide)b[2];
     return sqrtl(x * x + y * y + z * z);
 }
 
-static double size_of(const double *vertex[4])
-{
+static double size_of(const double *vertex[4]) {
     wide first = length(vertex[0], vertex[1]) + length(vertex[0], vertex[2]) +
                  length(vertex[0], vertex[3]);
     wide others = length(vertex[1], vertex[2]) + length(vertex[1], vertex[3]) +
@@ -117,8 +109,7 @@ static double size_of(const double *vertex[4])
 
 /* The first pass: how many cells there are, and their box. */
 static uint64_t measure(struct cut *c, const struct host_tetrahedra *tets,
-                        struct host_section *section)
-{
+                        struct host_section *section) {
     wide hi[2] = {0, 0}, at[4][2];
     const double *vertex[4];
     uint64_t count = 0;
@@ -148,8 +139,7 @@ static uint64_t measure(struct cut *c, const struct host_tetrahedra *tets,
 
 /* The second pass: the cells. */
 static void take(const struct cut *c, const struct host_tetrahedra *tets,
-                 struct host_section *section)
-{
+                 struct host_section *section) {
     const double *vertex[4];
     wide at[4][2];
     double sum = 0.0;
@@ -172,8 +162,7 @@ static void take(const struct cut *c, const struct host_tetrahedra *tets,
 }
 
 static int beside(const struct host_points *points, struct host_plane plane,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     double lo, hi;
     bounds(points, plane.axis, &lo, &hi);
     return host_fail(error, HOST_INPUT,
@@ -185,8 +174,7 @@ static int beside(const struct host_points *points, struct host_plane plane,
 int host_section_make(struct host_section *section,
                       const struct host_points *points,
                       const struct host_tetrahedra *tets,
-                      struct host_plane plane, struct host_error *error)
-{
+                      struct host_plane plane, struct host_error *error) {
     struct cut c = {.xyz = points->xyz, .plane = plane};
     memset(section, 0, sizeof *section);
     c.side[0] = plane.axis == 0 ? 1 : 0;
@@ -203,8 +191,7 @@ int host_section_make(struct host_section *section,
     return 0;
 }
 
-void host_section_free(struct host_section *section)
-{
+void host_section_free(struct host_section *section) {
     host_unmap(section->cells, section->count * sizeof *section->cells);
     memset(section, 0, sizeof *section);
 }

@@ -28,8 +28,7 @@ struct svg {
 
 /* The cell's corners in quarters, those that fall together taken as one. */
 static unsigned quarters(const struct host_picture *picture,
-                         const struct host_cell *cell, long at[4][2])
-{
+                         const struct host_cell *cell, long at[4][2]) {
     unsigned n = 0;
     for (unsigned k = 0; k < cell->corners; k++) {
         double place[2];
@@ -45,8 +44,7 @@ static unsigned quarters(const struct host_picture *picture,
 }
 
 /* The one pixel that all of it lies in; NULL: it is larger. */
-static struct pixel *pixel_of(const struct svg *s, long at[4][2], unsigned n)
-{
+static struct pixel *pixel_of(const struct svg *s, long at[4][2], unsigned n) {
     long lo[2] = {at[0][0], at[0][1]}, hi[2] = {lo[0], lo[1]};
     for (unsigned k = 1; k < n; k++) {
         for (unsigned d = 0; d < 2; d++) {
@@ -60,8 +58,7 @@ static struct pixel *pixel_of(const struct svg *s, long at[4][2], unsigned n)
                             (size_t)(lo[0] / QUARTERS)];
 }
 
-static void merge(struct svg *s)
-{
+static void merge(struct svg *s) {
     const struct host_section *section = s->picture->section;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
@@ -76,15 +73,13 @@ static void merge(struct svg *s)
     }
 }
 
-static void put_pair(struct svg *s, const char *command, long x, long y)
-{
+static void put_pair(struct svg *s, const char *command, long x, long y) {
     char text[2 * NUMBER + 4];
     snprintf(text, sizeof text, "%s%ld%s%ld", command, x, y < 0 ? "" : " ", y);
     host_output_text(s->out, text);
 }
 
-static void begin_path(struct svg *s, unsigned colour)
-{
+static void begin_path(struct svg *s, unsigned colour) {
     char text[64];
     snprintf(text, sizeof text, "<path fill=\"#%06x\" d=\"M0 0",
              host_picture_rgb(colour));
@@ -92,21 +87,18 @@ static void begin_path(struct svg *s, unsigned colour)
     s->at[0] = s->at[1] = 0;
 }
 
-static void end_path(struct svg *s)
-{
+static void end_path(struct svg *s) {
     host_output_text(s->out, "\"/>\n");
 }
 
 /* To the start of another cell. */
-static void move(struct svg *s, long x, long y)
-{
+static void move(struct svg *s, long x, long y) {
     put_pair(s, "m", x - s->at[0], y - s->at[1]);
     s->at[0] = x;
     s->at[1] = y;
 }
 
-static void put_pixels(struct svg *s, unsigned colour)
-{
+static void put_pixels(struct svg *s, unsigned colour) {
     unsigned width = s->picture->width, height = s->picture->height;
     bool any = false;
     for (size_t i = 0; i < (size_t)width * height; i++) {
@@ -126,8 +118,7 @@ static void put_pixels(struct svg *s, unsigned colour)
     }
 }
 
-static void put_cells(struct svg *s, unsigned colour)
-{
+static void put_cells(struct svg *s, unsigned colour) {
     const struct host_section *section = s->picture->section;
     bool any = false;
     for (uint64_t i = 0; i < section->count; i++) {
@@ -160,8 +151,7 @@ static void put_cells(struct svg *s, unsigned colour)
 }
 
 int host_picture_svg(struct host_output *out, struct host_picture *picture,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct svg s = {.out = out, .picture = picture};
     size_t pixels = (size_t)picture->width * picture->height;
     char text[256];

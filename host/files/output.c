@@ -41,8 +41,7 @@ enum { ENDINGS = sizeof endings / sizeof endings[0] };
 static volatile sig_atomic_t asked, in_place;
 
 /* In a handler of signals: what has happened, and what is left. */
-static void tell(int number)
-{
+static void tell(int number) {
     char text[160] = "incode: ";
     strcat(text, number == SIGINT    ? "interrupted"
                  : number == SIGTERM ? "terminated"
@@ -56,8 +55,7 @@ static void tell(int number)
 }
 
 /* With its default action back, the signal ends the program on return. */
-static void on_ending(int number)
-{
+static void on_ending(int number) {
     for (struct host_part *part = parts; part != NULL; part = part->next) {
         (void)unlink(part->name);
     }
@@ -65,8 +63,7 @@ static void on_ending(int number)
     (void)raise(number);
 }
 
-void host_output_guard(void)
-{
+void host_output_guard(void) {
     struct sigaction action = {.sa_handler = on_ending,
                                .sa_flags = (int)SA_RESETHAND};
     struct sigaction before;
@@ -82,8 +79,7 @@ void host_output_guard(void)
 
 /* Holds signals off while the list and the files change together.  Other
  * threads take none (parallel.h). */
-static void hold(sigset_t *before)
-{
+static void hold(sigset_t *before) {
     sigset_t set;
     (void)sigemptyset(&set);
     for (int i = 0; i < ENDINGS; i++) {
@@ -92,14 +88,12 @@ static void hold(sigset_t *before)
     (void)pthread_sigmask(SIG_BLOCK, &set, before);
 }
 
-static void release(const sigset_t *before)
-{
+static void release(const sigset_t *before) {
     (void)pthread_sigmask(SIG_SETMASK, before, NULL);
 }
 
 /* What has its names is whole, whatever comes after. */
-static void end_guard(void)
-{
+static void end_guard(void) {
     struct sigaction action;
     for (int i = 0; i < ENDINGS; i++) {
         if (sigaction(endings[i], NULL, &action) == 0 &&
@@ -109,23 +103,20 @@ static void end_guard(void)
     }
 }
 
-static int cannot_make(const char *path, int reason, struct host_error *error)
-{
+static int cannot_make(const char *path, int reason, struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s: cannot be written (%s); choose another place", path,
                      strerror(reason));
 }
 
 /* Beside `target`, of process `writer` and nobody else. */
-static char *name_beside(const char *target, const char *what, pid_t writer)
-{
+static char *name_beside(const char *target, const char *what, pid_t writer) {
     char *name = NULL;
     return asprintf(&name, "%s.%s-%ld", target, what, (long)writer) < 0 ? NULL
                                                                         : name;
 }
 
-void host_output_clean(const char *path, pid_t writer)
-{
+void host_output_clean(const char *path, pid_t writer) {
     struct stat status;
     char *target = host_target(path);
     char *name = target == NULL ? NULL : name_beside(target, "part", writer);
@@ -148,8 +139,7 @@ void host_output_clean(const char *path, pid_t writer)
 
 /* --- parts ---------------------------------------------------------------- */
 
-static void free_part(struct host_part *part)
-{
+static void free_part(struct host_part *part) {
     if (part != NULL) {
         free(part->path);
         free(part->target);
@@ -161,8 +151,7 @@ static void free_part(struct host_part *part)
 }
 
 /* Takes `target` over. */
-static struct host_part *make_part(const char *path, char *target)
-{
+static struct host_part *make_part(const char *path, char *target) {
     struct host_part *part = calloc(1, sizeof *part);
     if (part == NULL) {
         free(target);
@@ -181,8 +170,7 @@ static struct host_part *make_part(const char *path, char *target)
     return part;
 }
 
-static bool is_ours(const char *name)
-{
+static bool is_ours(const char *name) {
     const struct host_part *part = parts;
     while (part != NULL && strcmp(part->name, name) != 0) {
         part = part->next;
@@ -192,8 +180,7 @@ static bool is_ours(const char *name)
 
 /* Makes the part's file and notes it.  One that is there is of an earlier
  * process of this number, which was killed. */
-static int open_part(struct host_part *part)
-{
+static int open_part(struct host_part *part) {
     sigset_t signals;
     hold(&signals);
     int file = host_create(part->name, 0666);
@@ -219,8 +206,7 @@ static int open_part(struct host_part *part)
     return file;
 }
 
-static void drop_part(struct host_part *part)
-{
+static void drop_part(struct host_part *part) {
     sigset_t signals;
     hold(&signals);
     (void)unlink(part->name);
@@ -241,8 +227,7 @@ static void drop_part(struct host_part *part)
 
 /* Opens a device or a pipe, for which nobody waits that does not come. */
 static int open_in_place(struct host_output *out, bool pipe,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     int wait = pipe ? O_NONBLOCK : 0;
     out->file = open(out->path, O_WRONLY | O_CLOEXEC | wait);
     if (out->file < 0 && pipe && errno == ENXIO) {
@@ -258,8 +243,7 @@ static int open_in_place(struct host_output *out, bool pipe,
 }
 
 /* Opens a new file beside the target, or what is there in its place. */
-static int open_file(struct host_output *out, struct host_error *error)
-{
+static int open_file(struct host_output *out, struct host_error *error) {
     struct stat status;
     bool there = stat(out->path, &status) == 0;
     if (there && S_ISDIR(status.st_mode)) {
@@ -290,8 +274,7 @@ static int open_file(struct host_output *out, struct host_error *error)
 }
 
 int host_output_open(struct host_output *out, const char *path,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     *out = (struct host_output){.path = path, .file = -1};
     asked = 1;
     out->buffer = malloc(BUFFER_BYTES);
@@ -308,8 +291,7 @@ int host_output_open(struct host_output *out, const char *path,
     return error->code;
 }
 
-int host_output_probe(const char *path, struct host_error *error)
-{
+int host_output_probe(const char *path, struct host_error *error) {
     struct host_output out;
     struct stat status;
     if (host_output_open(&out, path, error) == 0) {
@@ -322,15 +304,13 @@ int host_output_probe(const char *path, struct host_error *error)
     return error->code;
 }
 
-void host_output_expect(void)
-{
+void host_output_expect(void) {
     asked = 1;
 }
 
 /* --- writing -------------------------------------------------------------- */
 
-static void put_out(struct host_output *out, const char *bytes, size_t size)
-{
+static void put_out(struct host_output *out, const char *bytes, size_t size) {
     for (size_t done = 0; done < size && out->failure == 0;) {
         in_place = in_place != 0 || out->part == NULL;
         ssize_t n = write(out->file, bytes + done, size - done);
@@ -343,14 +323,12 @@ static void put_out(struct host_output *out, const char *bytes, size_t size)
     }
 }
 
-static void flush(struct host_output *out)
-{
+static void flush(struct host_output *out) {
     put_out(out, out->buffer, out->used);
     out->used = 0;
 }
 
-void host_output_bytes(struct host_output *out, const void *bytes, size_t n)
-{
+void host_output_bytes(struct host_output *out, const void *bytes, size_t n) {
     const char *from = bytes;
     while (n > 0) {
         bool whole = out->used == 0 && n >= BUFFER_BYTES;
@@ -370,8 +348,7 @@ void host_output_bytes(struct host_output *out, const void *bytes, size_t n)
     }
 }
 
-void host_output_unsigned(struct host_output *out, uint64_t value)
-{
+void host_output_unsigned(struct host_output *out, uint64_t value) {
     char digits[20];
     size_t at = sizeof digits;
     do {
@@ -384,8 +361,7 @@ void host_output_unsigned(struct host_output *out, uint64_t value)
 /* --- the end -------------------------------------------------------------- */
 
 /* What a disk cannot take, it may say as late as this. */
-static void finish(struct host_output *out, struct host_error *error)
-{
+static void finish(struct host_output *out, struct host_error *error) {
     if (out->file >= 0) {
         flush(out);
         if (out->file != STDOUT_FILENO && close(out->file) != 0 &&
@@ -407,8 +383,7 @@ static void finish(struct host_output *out, struct host_error *error)
 }
 
 int host_output_close(struct host_output *out, size_t n,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     for (size_t i = 0; i < n; i++) {
         finish(&out[i], error);
         free(out[i].buffer);
@@ -423,16 +398,14 @@ int host_output_close(struct host_output *out, size_t n,
 }
 
 /* A second name, which one that was left there does not hinder. */
-static bool name_also(const char *name, const char *other)
-{
+static bool name_also(const char *name, const char *other) {
     return link(name, other) == 0 ||
            (errno == EEXIST && unlink(other) == 0 && link(name, other) == 0);
 }
 
 /* Gives the part its name, and what is there a second one, so that it can have
  * its own back. */
-static bool name_part(struct host_part *part)
-{
+static bool name_part(struct host_part *part) {
     part->keeps = name_also(part->target, part->kept);
     part->was = part->keeps || errno != ENOENT;
     part->marked = name_also(part->name, part->made);
@@ -440,8 +413,7 @@ static bool name_part(struct host_part *part)
     return part->named;
 }
 
-static void forget_names(const struct host_part *part)
-{
+static void forget_names(const struct host_part *part) {
     if (part->marked) {
         (void)unlink(part->made);
     }
@@ -452,8 +424,7 @@ static void forget_names(const struct host_part *part)
 
 /* The path of an output whose former file could not be kept; NULL: none.  A
  * file that somebody else has put there meanwhile stays. */
-static const char *take_names_back(void)
-{
+static const char *take_names_back(void) {
     const char *lost = NULL;
     for (struct host_part *part = parts; part != NULL; part = part->next) {
         if (part->named && host_is_file(&part->file, part->target) &&
@@ -467,8 +438,7 @@ static const char *take_names_back(void)
 }
 
 /* All of them get their names, or none. */
-static int name_all(struct host_error *error)
-{
+static int name_all(struct host_error *error) {
     struct host_part *part = parts;
     while (part != NULL && name_part(part)) {
         part = part->next;
@@ -493,8 +463,7 @@ static int name_all(struct host_error *error)
     return 0;
 }
 
-int host_output_commit(struct host_error *error)
-{
+int host_output_commit(struct host_error *error) {
     sigset_t signals;
     hold(&signals);
     if (error->code == 0 && name_all(error) == 0) {
@@ -507,8 +476,7 @@ int host_output_commit(struct host_error *error)
     return error->code;
 }
 
-int host_output_printed(struct host_error *error)
-{
+int host_output_printed(struct host_error *error) {
     errno = 0;
     if (fflush(stdout) == 0 && ferror(stdout) == 0) {
         return error->code;

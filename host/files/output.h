@@ -61,8 +61,7 @@ void host_output_expect(void);
 /* None of these fails at once: host_output_close tells. */
 void host_output_bytes(struct host_output *out, const void *bytes, size_t n);
 void host_output_unsigned(struct host_output *out, uint64_t value);
-static inline void host_output_text(struct host_output *out, const char *text)
-{
+static inline void host_output_text(struct host_output *out, const char *text) {
     host_output_bytes(out, text, strlen(text)); /* known of most, here */
 }
 

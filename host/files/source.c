@@ -38,23 +38,20 @@ struct host_feed {
     uint8_t packed[PACKED_BYTES];
 };
 
-bool host_is_packed(const char *path)
-{
+bool host_is_packed(const char *path) {
     size_t length = strlen(path), n = strlen(".gz");
     return length > n && strcasecmp(path + length - n, ".gz") == 0;
 }
 
 int host_source_fail(const struct host_source *source, struct host_error *error,
-                     const char *what)
-{
+                     const char *what) {
     return host_fail(error, HOST_INPUT, "%s: %s", source->path, what);
 }
 
 /* How many bytes a file may take that needs `bytes` now.  The available memory
  * is looked up once, and only for a large file; share: the part of it. */
 static size_t most_bytes(size_t *most, size_t bytes, size_t held,
-                         unsigned share)
-{
+                         unsigned share) {
     if (bytes <= ALWAYS) {
         return ALWAYS;
     }
@@ -65,8 +62,8 @@ static size_t most_bytes(size_t *most, size_t bytes, size_t held,
     return *most;
 }
 
-static int too_long(const struct host_source *source, struct host_error *error)
-{
+static int too_long(const struct host_source *source,
+                    struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s: more than %zu bytes, the most that %s has; give "
                      "another file",
@@ -74,8 +71,7 @@ static int too_long(const struct host_source *source, struct host_error *error)
 }
 
 static int too_large(const char *path, size_t bytes, size_t most,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const double mb = 1e6;
     return host_fail(error, HOST_INPUT,
                      "%s: %.1f MB or more, which is above half of the memory "
@@ -85,8 +81,7 @@ static int too_large(const char *path, size_t bytes, size_t most,
 }
 
 static int unpacks_too_large(const char *path, uint64_t packed, size_t most,
-                             const char *share, struct host_error *error)
-{
+                             const char *share, struct host_error *error) {
     const double mb = 1e6;
     return host_fail(error, HOST_INPUT,
                      "%s: %.1f MB that become more than %.1f MB unpacked, %s "
@@ -96,8 +91,7 @@ static int unpacks_too_large(const char *path, uint64_t packed, size_t most,
 }
 
 int host_source_unpacks(const struct host_source *source, uint64_t packed,
-                        uint64_t bytes, struct host_error *error)
-{
+                        uint64_t bytes, struct host_error *error) {
     size_t most = 0;
     (void)most_bytes(&most, (size_t)bytes, 0, PLAIN_SHARE);
     return bytes > ALWAYS && bytes > most
@@ -107,8 +101,7 @@ int host_source_unpacks(const struct host_source *source, uint64_t packed,
 
 /* Room for `more` bytes, or for as many as it may have, if for any. */
 static int reserve(struct host_source *source, size_t more,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     if (source->capacity - source->bytes >= more) {
         return 0;
     }
@@ -133,8 +126,7 @@ static int reserve(struct host_source *source, size_t more,
 }
 
 static int read_all(struct host_source *source, int file,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct stat status;
     size_t hint = (size_t)1 << 20;
     if (fstat(file, &status) == 0) {
@@ -181,15 +173,13 @@ static int read_all(struct host_source *source, int file,
 
 /* --- unpacking ------------------------------------------------------------ */
 
-static bool fault(struct host_feed *feed, const char *path, const char *what)
-{
+static bool fault(struct host_feed *feed, const char *path, const char *what) {
     host_fail(&feed->fault, HOST_INPUT, "%s: %s", path, what);
     return false;
 }
 
 /* Whether there are packed bytes left. */
-static bool take_packed(struct host_feed *feed, const char *path)
-{
+static bool take_packed(struct host_feed *feed, const char *path) {
     ssize_t n = 0;
     if (feed->z.avail_in > 0 || feed->file < 0) {
         return feed->z.avail_in > 0;
@@ -211,8 +201,7 @@ static bool take_packed(struct host_feed *feed, const char *path)
 
 /* After a member: whether another one follows.  Else the file ends here,
  * perhaps after zeros with which a tape or a disk has filled it up. */
-static bool begins_another(struct host_feed *feed, const char *path)
-{
+static bool begins_another(struct host_feed *feed, const char *path) {
     bool padded = false;
     while (take_packed(feed, path) && *feed->z.next_in == 0) {
         feed->z.next_in++;
@@ -227,8 +216,7 @@ static bool begins_another(struct host_feed *feed, const char *path)
 
 /* Unpacks at most `room` bytes.  0: the file has ended, or has a fault. */
 static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
-                     size_t room)
-{
+                     size_t room) {
     room = room > (size_t)1 << 30 ? (size_t)1 << 30 : room;
     feed->z.next_out = to;
     feed->z.avail_out = (uInt)room;
@@ -252,8 +240,7 @@ static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
 
 /* Appends unpacked bytes to those kept, in a window of at most `most` bytes. */
 static bool move_window(const struct host_source *source, const uint8_t **at,
-                        const uint8_t **end, size_t most)
-{
+                        const uint8_t **end, size_t most) {
     struct host_feed *feed = source->feed;
     size_t kept = (size_t)(*end - *at);
     memmove(feed->window, *at, kept);
@@ -275,8 +262,7 @@ static bool move_window(const struct host_source *source, const uint8_t **at,
 }
 
 bool host_source_more(const struct host_source *source, const uint8_t **at,
-                      const uint8_t **end)
-{
+                      const uint8_t **end) {
     if (source->feed == NULL) {
         return false;
     }
@@ -288,8 +274,7 @@ bool host_source_more(const struct host_source *source, const uint8_t **at,
 }
 
 int host_source_all(const struct host_source *source, const uint8_t **at,
-                    const uint8_t **end, struct host_error *error)
-{
+                    const uint8_t **end, struct host_error *error) {
     struct host_feed *feed = source->feed;
     bool more = feed != NULL;
     while (more) {
@@ -306,8 +291,7 @@ int host_source_all(const struct host_source *source, const uint8_t **at,
 }
 
 int host_source_fault(const struct host_source *source,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     if (source->feed != NULL && source->feed->fault.code != 0) {
         *error = source->feed->fault;
     }
@@ -316,8 +300,8 @@ int host_source_fault(const struct host_source *source,
 
 /* The size, modulo 2^32, that the last member of a file claims to unpack to: at
  * least as many bytes are to be held. */
-static int check_end(const struct host_source *source, struct host_error *error)
-{
+static int check_end(const struct host_source *source,
+                     struct host_error *error) {
     struct host_feed *feed = source->feed;
     uint8_t end[4];
     if (feed->size < sizeof end ||
@@ -333,8 +317,7 @@ static int check_end(const struct host_source *source, struct host_error *error)
                                              "a quarter", error);
 }
 
-int host_source_hold(struct host_source *source, struct host_error *error)
-{
+int host_source_hold(struct host_source *source, struct host_error *error) {
     const uint8_t *at = source->data, *end = source->data + source->bytes;
     if (source->feed != NULL && check_end(source, error) == 0 &&
         host_source_all(source, &at, &end, error) == 0) {
@@ -351,8 +334,7 @@ int host_source_hold(struct host_source *source, struct host_error *error)
 
 /* Takes over the file, or the bytes. */
 static int begin_unpacking(struct host_source *source, int file,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     struct stat status;
     struct host_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL || (feed->window = host_map(WINDOW)) == NULL ||
@@ -386,8 +368,7 @@ static int begin_unpacking(struct host_source *source, int file,
     return host_source_fault(source, error);
 }
 
-static int finish(struct host_source *source, struct host_error *error)
-{
+static int finish(struct host_source *source, struct host_error *error) {
     if (error->code == 0 && source->bytes == 0) {
         host_source_fail(source, error, "the file is empty; give another");
     }
@@ -398,8 +379,7 @@ static int finish(struct host_source *source, struct host_error *error)
 }
 
 static int open_source(struct host_source *source, const char *path,
-                       bool packed, struct host_error *error)
-{
+                       bool packed, struct host_error *error) {
     bool standard = strcmp(path, "-") == 0;
     source->path = standard ? "stdin" : path;
     host_progress_phase("reading", "MB");
@@ -421,15 +401,13 @@ static int open_source(struct host_source *source, const char *path,
 }
 
 int host_source_begin(struct host_source *source, const char *path, bool packed,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     *source = (struct host_source){.bound = 0};
     return open_source(source, path, packed, error);
 }
 
 int host_source_open(struct host_source *source, const char *path, bool packed,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     return host_source_begin(source, path, packed, error) == 0
                ? host_source_hold(source, error)
                : error->code;
@@ -437,15 +415,13 @@ int host_source_open(struct host_source *source, const char *path, bool packed,
 
 int host_source_open_bounded(struct host_source *source, const char *path,
                              size_t most, const char *what,
-                             struct host_error *error)
-{
+                             struct host_error *error) {
     *source = (struct host_source){.bound = most, .what = what};
     return open_source(source, path, false, error);
 }
 
 int host_source_wrap(struct host_source *source, const char *path,
-                     const void *data, size_t bytes, struct host_error *error)
-{
+                     const void *data, size_t bytes, struct host_error *error) {
     bool standard = strcmp(path, "-") == 0;
     *source = (struct host_source){
         .path = standard ? "stdin" : path, .data = data, .bytes = bytes};
@@ -459,8 +435,7 @@ int host_source_wrap(struct host_source *source, const char *path,
     return finish(source, error);
 }
 
-void host_source_close(struct host_source *source)
-{
+void host_source_close(struct host_source *source) {
     struct host_feed *feed = source->feed;
     if (feed != NULL) {
         (void)inflateEnd(&feed->z);

@@ -6,16 +6,14 @@
 #include <string.h>
 #include <unistd.h>
 
-bool host_is_file(const struct stat *file, const char *name)
-{
+bool host_is_file(const struct stat *file, const char *name) {
     struct stat named;
     return lstat(name, &named) == 0 && named.st_dev == file->st_dev &&
            named.st_ino == file->st_ino;
 }
 
 /* The name without links of what the kernel has opened as `path`. */
-static char *name_of(int opened, const char *path)
-{
+static char *name_of(int opened, const char *path) {
     struct stat status;
     char *name = realpath(path, NULL); /* by hand: believed where it agrees */
     if (name != NULL &&
@@ -29,8 +27,7 @@ static char *name_of(int opened, const char *path)
 
 /* Of a link to where nothing is.  A file without any rights is nobody else's:
  * it was made here. */
-static char *name_of_nothing(const char *path)
-{
+static char *name_of_nothing(const char *path) {
     struct stat made;
     int file = open(path, O_WRONLY | O_CREAT | O_NONBLOCK | O_CLOEXEC, 0);
     if (file < 0) {
@@ -47,8 +44,7 @@ static char *name_of_nothing(const char *path)
     return name;
 }
 
-char *host_target(const char *path)
-{
+char *host_target(const char *path) {
     struct stat status;
     int file = open(path, O_PATH | O_CLOEXEC);
     if (file < 0 && errno == ENOENT) {

@@ -58,8 +58,7 @@ static const struct argp_option options_of_flash[] = {
     {"quiet", 'q', NULL, 0, "Says nothing but what is wrong", 3},
     {0}};
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct flash *f = state->input;
     switch (key) {
     case KEY_NODES:
@@ -90,8 +89,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-static int parse_all(struct flash *f, int argc, char **argv)
-{
+static int parse_all(struct flash *f, int argc, char **argv) {
     static struct argp_option options[HOST_OPTIONS_MAX];
     static const struct argp argp = {
         options,
@@ -114,8 +112,7 @@ static int parse_all(struct flash *f, int argc, char **argv)
 
 /* --- before --------------------------------------------------------------- */
 
-static int open_image(struct flash *f)
-{
+static int open_image(struct flash *f) {
     if (host_image_open(&f->file, f->path, f->error) != 0) {
         return f->error->code;
     }
@@ -134,22 +131,19 @@ static int open_image(struct flash *f)
 }
 
 /* What is no set in any cube is told before a port is opened. */
-static int check_nodes(struct flash *f)
-{
+static int check_nodes(struct flash *f) {
     return f->nodes == NULL ? 0
                             : host_node_set_parse(&f->set, f->nodes,
                                                   CUBE_NODES_MAX, f->error);
 }
 
-static const char *board_in_file(void *context, unsigned node)
-{
+static const char *board_in_file(void *context, unsigned node) {
     const struct flash *f = context;
     return f->where.cube == NULL ? NULL : f->site.file.board_of[node]->name;
 }
 
 /* Of what the cube file says of boards, one has to fit. */
-static int choose_nodes(struct flash *f)
-{
+static int choose_nodes(struct flash *f) {
     const char *board = f->file.image.board;
     unsigned nodes = f->site.machine.nodes;
     bool fits = f->where.cube == NULL;
@@ -170,8 +164,7 @@ static int choose_nodes(struct flash *f)
 }
 
 /* Those without a line start their program, and are told to restart. */
-static int reset(struct flash *f)
-{
+static int reset(struct flash *f) {
     struct host_lines lines;
     unsigned count = 0;
     if (f->where.cube == NULL) {
@@ -202,27 +195,23 @@ static int reset(struct flash *f)
 
 /* --- the transfer --------------------------------------------------------- */
 
-static bool draw_serial(void *context, uint8_t serial[NODE_SERIAL_BYTES])
-{
+static bool draw_serial(void *context, uint8_t serial[NODE_SERIAL_BYTES]) {
     (void)context;
     return getrandom(serial, NODE_SERIAL_BYTES, 0) == NODE_SERIAL_BYTES;
 }
 
-static void changed(void *context, unsigned node)
-{
+static void changed(void *context, unsigned node) {
     const struct flash *f = context;
     host_flash_show_change(&f->show, node);
 }
 
-static void say(void *context, const char *line)
-{
+static void say(void *context, const char *line) {
     (void)context;
     host_note("flash: %s", line);
 }
 
 /* What is missing would be waited for. */
-static int plan(struct flash *f)
-{
+static int plan(struct flash *f) {
     char why[HOST_SPREAD_TEXT];
     host_flash_show_plan(&f->show);
     if (host_spread_result(&f->spread, f->error) != 0) {
@@ -238,8 +227,7 @@ static int plan(struct flash *f)
     return 0;
 }
 
-static int spread(struct flash *f)
-{
+static int spread(struct flash *f) {
     int status = host_spread_look(&f->spread, f->error);
     if (status == 0 && f->dry_run) {
         return plan(f);
@@ -265,8 +253,7 @@ static int spread(struct flash *f)
     return host_spread_result(&f->spread, f->error);
 }
 
-static int visit(struct flash *f)
-{
+static int visit(struct flash *f) {
     const struct host_spread_options options = {.image = f->file.source.data,
                                                 .bytes = f->file.source.bytes,
                                                 .nodes = f->set,
@@ -291,8 +278,7 @@ static int visit(struct flash *f)
     return status;
 }
 
-int host_flash(int argc, char **argv, struct host_error *error)
-{
+int host_flash(int argc, char **argv, struct host_error *error) {
     static struct flash f = {.patience_s = PATIENCE_S};
     f.error = error;
     f.argc = argc;

@@ -14,13 +14,11 @@ enum { SIGNALS = sizeof signals / sizeof signals[0] };
 static struct sigaction before[SIGNALS];
 static volatile sig_atomic_t came;
 
-static void keep(int number)
-{
+static void keep(int number) {
     came = number;
 }
 
-void host_flash_cut_begin(void)
-{
+void host_flash_cut_begin(void) {
     const struct sigaction action = {.sa_handler = keep,
                                      .sa_flags = (int)SA_RESETHAND};
     came = 0;
@@ -32,21 +30,18 @@ void host_flash_cut_begin(void)
     }
 }
 
-void host_flash_cut_end(void)
-{
+void host_flash_cut_end(void) {
     for (int i = 0; i < SIGNALS; i++) {
         (void)sigaction(signals[i], &before[i], NULL);
     }
 }
 
-int host_flash_cut(void)
-{
+int host_flash_cut(void) {
     return came;
 }
 
 /* What a node does now that nobody sends it anything; of several as well. */
-static const char *state_of(const struct host_spread *spread, unsigned i)
-{
+static const char *state_of(const struct host_spread *spread, unsigned i) {
     const struct host_spread_node *n = &spread->node[i];
     switch (n->phase) {
     case HOST_SPREAD_BEGINS:
@@ -67,8 +62,7 @@ static const char *state_of(const struct host_spread *spread, unsigned i)
     }
 }
 
-static void tell_states(FILE *out, const struct host_spread *spread)
-{
+static void tell_states(FILE *out, const struct host_spread *spread) {
     struct host_node_set told = {{0}};
     unsigned nodes = spread->visit->machine->nodes;
     for (unsigned i = 0; i < nodes; i++) {
@@ -90,8 +84,7 @@ static void tell_states(FILE *out, const struct host_spread *spread)
 }
 
 void host_flash_cut_tell(FILE *out, const struct host_spread *spread, int argc,
-                         char *const *argv)
-{
+                         char *const *argv) {
     char line[LINE];
     int used = snprintf(line, sizeof line, "incode flash");
     tell_states(out, spread);
@@ -107,8 +100,7 @@ void host_flash_cut_tell(FILE *out, const struct host_spread *spread, int argc,
     host_say(out, "incode: flash: interrupted; go on with: %s\n", line);
 }
 
-void host_flash_cut_finish(void)
-{
+void host_flash_cut_finish(void) {
     if (came != 0) {
         (void)signal(came, SIG_DFL);
         (void)raise(came);

@@ -8,14 +8,12 @@
 enum { LIST = 160, LINE = 600 };
 
 static const struct host_spread_node *node_of(const struct host_flash_show *s,
-                                              unsigned i)
-{
+                                              unsigned i) {
     return &s->spread->node[i];
 }
 
 void host_flash_show_begin(struct host_flash_show *show,
-                           const struct host_spread *spread, bool quiet)
-{
+                           const struct host_spread *spread, bool quiet) {
     *show = (struct host_flash_show){.spread = spread, .quiet = quiet};
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (host_node_set_has(&spread->options.nodes, i)) {
@@ -32,8 +30,7 @@ void host_flash_show_begin(struct host_flash_show *show,
 }
 
 /* Of several nodes, what the one says that is farthest behind. */
-static void draw_row(const struct host_flash_show *s, unsigned row)
-{
+static void draw_row(const struct host_flash_show *s, unsigned row) {
     struct host_node_set set = {{0}};
     enum host_spread_phase phase = HOST_SPREAD_LOST;
     unsigned from = row * s->nodes_a_row, count = 0;
@@ -54,16 +51,14 @@ static void draw_row(const struct host_flash_show *s, unsigned row)
     host_progress_row(row, head, moves ? part / count : -1.0, tail);
 }
 
-void host_flash_show_draw(const struct host_flash_show *show)
-{
+void host_flash_show_draw(const struct host_flash_show *show) {
     for (unsigned row = 0; row < show->rows; row++) {
         draw_row(show, row);
     }
     host_progress_draw();
 }
 
-void host_flash_show_change(const struct host_flash_show *show, unsigned node)
-{
+void host_flash_show_change(const struct host_flash_show *show, unsigned node) {
     const struct host_spread_node *n = node_of(show, node);
     bool silent = n->phase == HOST_SPREAD_BEGINS ||
                   n->phase == HOST_SPREAD_WHOLE ||
@@ -78,8 +73,7 @@ void host_flash_show_change(const struct host_flash_show *show, unsigned node)
 
 /* Those that are as node `first` is, by what is said of them. */
 static struct host_node_set alike(const struct host_flash_show *s,
-                                  unsigned first)
-{
+                                  unsigned first) {
     struct host_node_set set = {{0}};
     const struct host_visit_node *seen = s->spread->visit->node;
     for (unsigned k = 0; k < s->wanted; k++) {
@@ -96,8 +90,8 @@ static struct host_node_set alike(const struct host_flash_show *s,
 }
 
 /* "mps2-an500 0.1.0, number 3" */
-static const char *name_image(const struct host_flash_show *s, char text[LIST])
-{
+static const char *name_image(const struct host_flash_show *s,
+                              char text[LIST]) {
     const struct loader_image *image = &s->spread->image;
     snprintf(text, LIST, "%s %s, number %u", image->board, image->version,
              image->number);
@@ -106,8 +100,7 @@ static const char *name_image(const struct host_flash_show *s, char text[LIST])
 
 static void say_each(const struct host_flash_show *s,
                      void (*say)(const struct host_flash_show *s, unsigned i,
-                                 bool one, char line[LINE]))
-{
+                                 bool one, char line[LINE])) {
     struct host_node_set told = {{0}};
     for (unsigned k = 0; k < s->wanted; k++) {
         char nodes[LIST + 8], line[LINE] = "";
@@ -129,8 +122,7 @@ static void say_each(const struct host_flash_show *s,
 }
 
 static void say_result(const struct host_flash_show *s, unsigned i, bool one,
-                       char line[LINE])
-{
+                       char line[LINE]) {
     const struct host_spread_node *n = node_of(s, i);
     char image[LIST];
     name_image(s, image);
@@ -143,16 +135,14 @@ static void say_result(const struct host_flash_show *s, unsigned i, bool one,
     }
 }
 
-void host_flash_show_result(const struct host_flash_show *show)
-{
+void host_flash_show_result(const struct host_flash_show *show) {
     if (!show->quiet) {
         say_each(show, say_result);
     }
 }
 
 static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
-                     char line[LINE])
-{
+                     char line[LINE]) {
     const struct host_spread_node *n = node_of(s, i);
     const struct node_who *who = &s->spread->visit->node[i].who;
     char image[LIST];
@@ -167,7 +157,6 @@ static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
     }
 }
 
-void host_flash_show_plan(const struct host_flash_show *show)
-{
+void host_flash_show_plan(const struct host_flash_show *show) {
     say_each(show, say_plan);
 }

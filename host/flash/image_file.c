@@ -7,8 +7,7 @@
 #include "transport/drivers/sign_sodium.h"
 
 int host_image_open(struct host_image *file, const char *path,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     if (host_source_open_bounded(&file->source, path, LOADER_IMAGE_MAX,
                                  "an image", error) != 0) {
         return error->code;
@@ -36,14 +35,12 @@ int host_image_open(struct host_image *file, const char *path,
     return error->code;
 }
 
-void host_image_close(struct host_image *file)
-{
+void host_image_close(struct host_image *file) {
     host_source_close(&file->source);
 }
 
 void host_image_digest(const uint8_t *header, const uint8_t *code, size_t size,
-                       uint8_t digest[SIGN_DIGEST_BYTES])
-{
+                       uint8_t digest[SIGN_DIGEST_BYTES]) {
     alignas(64) uint8_t hash[SIGN_HASH_BYTES];
     sign_sodium.begin(hash);
     sign_sodium.add(hash, header, LOADER_NAMED_BYTES);
@@ -51,8 +48,7 @@ void host_image_digest(const uint8_t *header, const uint8_t *code, size_t size,
     sign_sodium.end(hash, digest);
 }
 
-enum loader_fault host_image_fault(const struct host_image *file)
-{
+enum loader_fault host_image_fault(const struct host_image *file) {
     uint8_t digest[SIGN_DIGEST_BYTES];
     const uint8_t *header = file->source.data;
     host_image_digest(header, header + LOADER_HEADER_BYTES, file->image.bytes,

@@ -59,8 +59,7 @@ static const struct argp_option options_of_image[] = {
     {0}};
 
 static void parse_value(struct sign *s, const char *option, const char *value,
-                        uint64_t *number, bool *given)
-{
+                        uint64_t *number, bool *given) {
     char *end = NULL;
     bool hex = strncmp(value, "0x", 2) == 0 && value[2] != '\0';
     unsigned long long all = hex ? strtoull(value, &end, 16) : 0;
@@ -74,8 +73,7 @@ static void parse_value(struct sign *s, const char *option, const char *value,
 }
 
 static void parse_text(struct sign *s, const char *option, const char *value,
-                       size_t most, const char **text)
-{
+                       size_t most, const char **text) {
     bool printable = *value != '\0';
     for (const char *at = value; *at != '\0'; at++) {
         printable = *at > ' ' && *at < 0x7f && printable;
@@ -89,8 +87,7 @@ static void parse_text(struct sign *s, const char *option, const char *value,
     }
 }
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct sign *s = state->input;
     switch (key) {
     case KEY_KEY:
@@ -123,8 +120,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-static int check_board(const struct sign *s)
-{
+static int check_board(const struct sign *s) {
     char allowed[120] = "";
     for (unsigned i = 0; host_board_name(i) != NULL; i++) {
         const struct host_board *board = host_board_row(i);
@@ -147,8 +143,8 @@ static int check_board(const struct sign *s)
 
 /* What is no image is a board's binary, if that is said; but neither of these:
  * what was made of one would pass for an image, and come up on no board. */
-static int check_binary(const struct sign *s, const struct host_source *source)
-{
+static int check_binary(const struct sign *s,
+                        const struct host_source *source) {
     static const char elf[] = "\177ELF", image[] = "incodeI1";
     if (s->board == NULL) {
         return host_fail(s->error, HOST_USAGE,
@@ -175,8 +171,7 @@ static int check_binary(const struct sign *s, const struct host_source *source)
 
 /* What the image is to be, and where its code begins in the file. */
 static int describe(const struct sign *s, const struct host_source *source,
-                    struct loader_image *image, size_t *code)
-{
+                    struct loader_image *image, size_t *code) {
     bool old = source->bytes >= LOADER_HEADER_BYTES &&
                loader_image_unpack(image, source->data) == LOADER_GOOD;
     *code = old ? LOADER_HEADER_BYTES : 0;
@@ -216,8 +211,7 @@ static int describe(const struct sign *s, const struct host_source *source,
 }
 
 /* An image is taken from somewhere else under its own digest alone. */
-static int check_old(const struct sign *s, const struct host_source *source)
-{
+static int check_old(const struct sign *s, const struct host_source *source) {
     struct host_image old = {.source = *source};
     (void)loader_image_unpack(&old.image, source->data);
     return host_image_fault(&old) == LOADER_WRONG_DIGEST
@@ -230,8 +224,7 @@ static int check_old(const struct sign *s, const struct host_source *source)
 
 static int make(const struct sign *s, const struct host_source *source,
                 const struct host_sign_key *pair,
-                uint8_t header[LOADER_HEADER_BYTES], size_t *code)
-{
+                uint8_t header[LOADER_HEADER_BYTES], size_t *code) {
     struct loader_image image;
     if (describe(s, source, &image, code) != 0 ||
         (*code > 0 && check_old(s, source) != 0)) {
@@ -247,8 +240,7 @@ static int make(const struct sign *s, const struct host_source *source,
 }
 
 static int write_image(const struct sign *s, const struct host_source *source,
-                       const uint8_t header[LOADER_HEADER_BYTES], size_t code)
-{
+                       const uint8_t header[LOADER_HEADER_BYTES], size_t code) {
     struct host_output out;
     const char *path = s->output == NULL ? s->path : s->output;
     if (host_output_open(&out, path, s->error) != 0) {
@@ -260,8 +252,7 @@ static int write_image(const struct sign *s, const struct host_source *source,
     return host_output_commit(s->error);
 }
 
-int host_sign(int argc, char **argv, struct host_error *error)
-{
+int host_sign(int argc, char **argv, struct host_error *error) {
     static const struct argp argp = {
         options_of_sign,
         parse,
@@ -306,15 +297,13 @@ int host_sign(int argc, char **argv, struct host_error *error)
 
 /* --- image ---------------------------------------------------------------- */
 
-static void print_hex(const char *name, const uint8_t *bytes, size_t size)
-{
+static void print_hex(const char *name, const uint8_t *bytes, size_t size) {
     char text[2 * SIGN_BYTES + 1];
     host_sign_hex(text, bytes, size);
     printf("%-10s %s\n", name, text);
 }
 
-static void print_image(const struct loader_image *image)
-{
+static void print_image(const struct loader_image *image) {
     host_say(stdout, "board      %s\n", image->board);
     host_say(stdout, "version    %s\n", image->version);
     printf("number     %u%s\n", image->number,
@@ -328,8 +317,7 @@ static void print_image(const struct loader_image *image)
 
 /* What to do about it, and the exit status. */
 static int judge(const struct sign *s, const struct host_image *file,
-                 const uint8_t wanted[SIGN_PUBLIC_BYTES])
-{
+                 const uint8_t wanted[SIGN_PUBLIC_BYTES]) {
     enum loader_fault fault = host_image_fault(file);
     if (fault == LOADER_UNSIGNED) {
         printf("signed by  nobody\n");
@@ -352,8 +340,7 @@ static int judge(const struct sign *s, const struct host_image *file,
                      loader_fault_text(fault), s->path);
 }
 
-int host_image_show(int argc, char **argv, struct host_error *error)
-{
+int host_image_show(int argc, char **argv, struct host_error *error) {
     static const struct argp argp = {
         options_of_image,
         parse,

@@ -29,25 +29,21 @@ static_assert((int)HOST_SIGN_SECRET_BYTES == crypto_sign_ed25519_SECRETKEYBYTES,
 static_assert((int)SECURE_KEY_BYTES == (int)SIGN_PUBLIC_BYTES,
               "a key's file holds a public half");
 
-void host_sign_hex(char *text, const uint8_t *bytes, size_t size)
-{
+void host_sign_hex(char *text, const uint8_t *bytes, size_t size) {
     (void)sodium_bin2hex(text, 2 * size + 1, bytes, size);
 }
 
-void host_sign_key_wipe(struct host_sign_key *pair)
-{
+void host_sign_key_wipe(struct host_sign_key *pair) {
     secure_wipe(pair->secret, sizeof pair->secret);
 }
 
 static void make_pair(struct host_sign_key *pair,
-                      const uint8_t seed[SEED_BYTES])
-{
+                      const uint8_t seed[SEED_BYTES]) {
     (void)crypto_sign_ed25519_seed_keypair(pair->public, pair->secret, seed);
 }
 
 static int name_public(char name[PATH_MAX], const char *path,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     int size = snprintf(name, PATH_MAX, "%s.pub", path);
     if (size >= PATH_MAX) {
         return host_fail(error, HOST_INPUT,
@@ -65,8 +61,8 @@ static int name_public(char name[PATH_MAX], const char *path,
 
 /* The secret half first: where that is not written, there is no other. */
 static int write_pair(const char *path, const char *public_path,
-                      const uint8_t seed[SEED_BYTES], struct host_error *error)
-{
+                      const uint8_t seed[SEED_BYTES],
+                      struct host_error *error) {
     struct host_sign_key pair;
     char secret[SECRET_TEXT + 1] = MARK, public[PUBLIC_TEXT + 1];
     make_pair(&pair, seed);
@@ -86,8 +82,7 @@ static int write_pair(const char *path, const char *public_path,
     return status;
 }
 
-int host_sign_key_make(const char *path, struct host_error *error)
-{
+int host_sign_key_make(const char *path, struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     char public_path[PATH_MAX];
     if (name_public(public_path, path, error) != 0) {
@@ -107,8 +102,7 @@ int host_sign_key_make(const char *path, struct host_error *error)
 /* What is wrong with a secret half's file; the other commands are told of the
  * key that they may have been given instead. */
 static int refuse(const char *path, enum key_file_state state,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     int reason = errno;
     uint8_t key[SECURE_KEY_BYTES];
     enum key_file_state as_cube = key_file_read(path, key);
@@ -143,8 +137,7 @@ static int refuse(const char *path, enum key_file_state state,
 }
 
 int host_sign_key_read(struct host_sign_key *pair, const char *path,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     enum key_file_state state = key_file_read_marked(path, MARK, seed);
     if (state == KEY_FILE_GOOD) {
@@ -156,8 +149,7 @@ int host_sign_key_read(struct host_sign_key *pair, const char *path,
 }
 
 int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     enum key_file_state state = key_file_read(path, public);
     if (state == KEY_FILE_GOOD || state == KEY_FILE_SEEN) {
@@ -176,8 +168,7 @@ int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
 }
 
 void host_sign_key_sign(const struct host_sign_key *pair, const uint8_t *bytes,
-                        size_t size, uint8_t signature[SIGN_BYTES])
-{
+                        size_t size, uint8_t signature[SIGN_BYTES]) {
     (void)crypto_sign_ed25519_detached(signature, NULL, bytes, size,
                                        pair->secret);
 }

@@ -13,14 +13,12 @@ enum {
     LOOK_US = 50000
 };
 
-static void look_at_clock(struct host_spread *spread)
-{
+static void look_at_clock(struct host_spread *spread) {
     struct host_machine *machine = spread->visit->machine;
     spread->now_us = machine->now_us(machine->context);
 }
 
-static void take(void *context, const struct cube_message *message)
-{
+static void take(void *context, const struct cube_message *message) {
     struct host_spread *spread = context;
     struct loader_state_message state = {0};
     bool good = message->type == NODE_IMAGE_STATE &&
@@ -35,8 +33,7 @@ static void take(void *context, const struct cube_message *message)
 
 int host_spread_open(struct host_spread *spread, struct host_visit *visit,
                      const struct host_spread_options *options,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     *spread = (struct host_spread){.visit = visit,
                                    .options = *options,
                                    .transfer = visit->machine->epoch,
@@ -61,16 +58,14 @@ int host_spread_open(struct host_spread *spread, struct host_visit *visit,
     return 0;
 }
 
-void host_spread_close(struct host_spread *spread)
-{
+void host_spread_close(struct host_spread *spread) {
     spread->visit->take = NULL;
     free(spread->node);
 }
 
 /* --- a look --------------------------------------------------------------- */
 
-static bool has_looked(const struct host_spread *spread)
-{
+static bool has_looked(const struct host_spread *spread) {
     uint64_t now = spread->now_us;
     bool all = true;
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
@@ -81,8 +76,7 @@ static bool has_looked(const struct host_spread *spread)
                    now - spread->arrived_us >= ARRIVAL_US);
 }
 
-static void judge_all(struct host_spread *spread)
-{
+static void judge_all(struct host_spread *spread) {
     look_at_clock(spread);
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (spread_wanted(spread, i)) {
@@ -91,8 +85,7 @@ static void judge_all(struct host_spread *spread)
     }
 }
 
-int host_spread_look(struct host_spread *spread, struct host_error *error)
-{
+int host_spread_look(struct host_spread *spread, struct host_error *error) {
     int status = 0;
     judge_all(spread);
     while (status == 0 && !has_looked(spread)) {
@@ -105,16 +98,14 @@ int host_spread_look(struct host_spread *spread, struct host_error *error)
 
 /* --- steps ---------------------------------------------------------------- */
 
-static void say(const struct host_spread *spread, const char *line)
-{
+static void say(const struct host_spread *spread, const char *line) {
     if (spread->options.say != NULL) {
         spread->options.say(spread->options.context, line);
     }
 }
 
 /* Says once of each absence whom it waits for. */
-static void say_who_is_awaited(struct host_spread *spread)
-{
+static void say_who_is_awaited(struct host_spread *spread) {
     struct host_node_set set = {{0}};
     char nodes[HOST_SPREAD_TEXT + 8], why[HOST_SPREAD_TEXT],
         line[2 * HOST_SPREAD_TEXT + 80];
@@ -140,8 +131,7 @@ static void say_who_is_awaited(struct host_spread *spread)
     say(spread, line);
 }
 
-bool host_spread_over(const struct host_spread *spread)
-{
+bool host_spread_over(const struct host_spread *spread) {
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (spread_wanted(spread, i) &&
             (!spread_ended(&spread->node[i]) || spread_goes_home(spread, i))) {
@@ -153,8 +143,7 @@ bool host_spread_over(const struct host_spread *spread)
 
 /* With a generation goes what was on its way: it is said again, and nobody
  * waits for answers to it. */
-static void look_at_generation(struct host_spread *spread)
-{
+static void look_at_generation(struct host_spread *spread) {
     if (spread->generation == spread->visit->generation) {
         return;
     }
@@ -169,8 +158,7 @@ static void look_at_generation(struct host_spread *spread)
 }
 
 int host_spread_step(struct host_spread *spread, uint64_t wait_us,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     look_at_generation(spread);
     judge_all(spread);
     if (spread_orders(spread, error) != 0) {
@@ -188,8 +176,7 @@ int host_spread_step(struct host_spread *spread, uint64_t wait_us,
 }
 
 /* The last that a board that has fallen back says for itself. */
-static int ask_for_logs(struct host_spread *spread, struct host_error *error)
-{
+static int ask_for_logs(struct host_spread *spread, struct host_error *error) {
     enum { LOG_US = 3000000 };
     struct host_node_set set = {{0}};
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
@@ -211,8 +198,7 @@ static int ask_for_logs(struct host_spread *spread, struct host_error *error)
     return status;
 }
 
-int host_spread_run(struct host_spread *spread, struct host_error *error)
-{
+int host_spread_run(struct host_spread *spread, struct host_error *error) {
     int status = spread->looked ? 0 : host_spread_look(spread, error);
     while (status == 0 && !host_spread_over(spread)) {
         status = host_spread_step(spread, LOOK_US, error);
@@ -222,16 +208,14 @@ int host_spread_run(struct host_spread *spread, struct host_error *error)
 
 /* --- what has come of it -------------------------------------------------- */
 
-static bool has_failed(const struct host_spread *spread, unsigned i)
-{
+static bool has_failed(const struct host_spread *spread, unsigned i) {
     return spread_wanted(spread, i) &&
            spread->node[i].phase >= HOST_SPREAD_REFUSED;
 }
 
 /* Those with which the same is wrong as with the first that is not `told`. */
 static unsigned gather(const struct host_spread *spread,
-                       struct host_node_set *told, struct host_node_set *set)
-{
+                       struct host_node_set *told, struct host_node_set *set) {
     unsigned first = spread->visit->machine->nodes;
     *set = (struct host_node_set){{0}};
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
@@ -247,8 +231,7 @@ static unsigned gather(const struct host_spread *spread,
     return first;
 }
 
-int host_spread_result(struct host_spread *spread, struct host_error *error)
-{
+int host_spread_result(struct host_spread *spread, struct host_error *error) {
     struct host_node_set told = {{0}}, set;
     char nodes[HOST_SPREAD_TEXT + 8], line[2 * HOST_SPREAD_TEXT + 16] = "";
     unsigned all = spread->visit->machine->nodes, i;
@@ -265,8 +248,7 @@ int host_spread_result(struct host_spread *spread, struct host_error *error)
     return code == 0 ? 0 : host_fail(error, code, "%s", line);
 }
 
-const char *host_spread_phase_text(enum host_spread_phase phase)
-{
+const char *host_spread_phase_text(enum host_spread_phase phase) {
     static const char *const texts[] = {
         [HOST_SPREAD_AWAITED] = "is not there",
         [HOST_SPREAD_LEAVES] = "restarts into its loader",

@@ -16,13 +16,11 @@ enum {
     SPREAD_AGAIN_US = 4000000 /* an order that had no effect is repeated */
 };
 
-static inline bool spread_wanted(const struct host_spread *spread, unsigned i)
-{
+static inline bool spread_wanted(const struct host_spread *spread, unsigned i) {
     return host_node_set_has(&spread->options.nodes, i);
 }
 
-static inline bool spread_ended(const struct host_spread_node *node)
-{
+static inline bool spread_ended(const struct host_spread_node *node) {
     return node->phase >= HOST_SPREAD_DONE;
 }
 

@@ -8,16 +8,14 @@
 
 static const uint8_t nothing[NODE_DIGEST_BYTES];
 
-bool spread_in_loader(const struct host_spread *spread, unsigned i)
-{
+bool spread_in_loader(const struct host_spread *spread, unsigned i) {
     const struct host_visit_node *seen = &spread->visit->node[i];
     return spread_wanted(spread, i) && seen->there &&
            seen->who.kind == NODE_KIND_LOADER &&
            !spread_ended(&spread->node[i]);
 }
 
-bool spread_goes_home(const struct host_spread *spread, unsigned i)
-{
+bool spread_goes_home(const struct host_spread *spread, unsigned i) {
     enum { TRIES = 3 };
     const struct host_visit_node *seen = &spread->visit->node[i];
     const struct host_spread_node *n = &spread->node[i];
@@ -25,8 +23,7 @@ bool spread_goes_home(const struct host_spread *spread, unsigned i)
            seen->starts == n->start && n->homeward <= TRIES;
 }
 
-static void tell(const struct host_spread *spread, unsigned i)
-{
+static void tell(const struct host_spread *spread, unsigned i) {
     const struct host_spread_options *options = &spread->options;
     if (options->changed != NULL) {
         options->changed(options->context, i);
@@ -34,8 +31,7 @@ static void tell(const struct host_spread *spread, unsigned i)
 }
 
 void spread_set(struct host_spread *spread, unsigned i,
-                enum host_spread_phase phase)
-{
+                enum host_spread_phase phase) {
     struct host_spread_node *n = &spread->node[i];
     if (n->phase != phase) {
         n->phase = phase;
@@ -47,8 +43,7 @@ void spread_set(struct host_spread *spread, unsigned i,
 
 __attribute__((format(printf, 4, 5))) static void
 end(struct host_spread *spread, unsigned i, enum host_spread_phase phase,
-    const char *format, ...)
-{
+    const char *format, ...) {
     struct host_spread_node *n = &spread->node[i];
     va_list list;
     va_start(list, format);
@@ -58,8 +53,7 @@ end(struct host_spread *spread, unsigned i, enum host_spread_phase phase,
 }
 
 static void refuse(struct host_spread *spread, unsigned i,
-                   enum loader_fault fault)
-{
+                   enum loader_fault fault) {
     static const char *const next[LOADER_FAULTS] = {
         [LOADER_TOO_LARGE] = "build a smaller one",
         [LOADER_WRONG_BOARD] = "give the image of its board",
@@ -83,8 +77,7 @@ static void refuse(struct host_spread *spread, unsigned i,
 
 /* --- by who it is --------------------------------------------------------- */
 
-static void begin_anew(struct host_spread *spread, unsigned i)
-{
+static void begin_anew(struct host_spread *spread, unsigned i) {
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
     n->start = seen->starts;
@@ -97,8 +90,7 @@ static void begin_anew(struct host_spread *spread, unsigned i)
 }
 
 /* Of what it is known to be, nothing has to be heard. */
-static bool pass_over(struct host_spread *spread, unsigned i)
-{
+static bool pass_over(struct host_spread *spread, unsigned i) {
     const struct host_spread_options *options = &spread->options;
     const char *known =
         options->board == NULL ? NULL : options->board(options->context, i);
@@ -110,8 +102,7 @@ static bool pass_over(struct host_spread *spread, unsigned i)
     return true;
 }
 
-static void judge_program(struct host_spread *spread, unsigned i)
-{
+static void judge_program(struct host_spread *spread, unsigned i) {
     const struct node_who *who = &spread->visit->node[i].who;
     struct host_spread_node *n = &spread->node[i];
     bool same =
@@ -132,8 +123,7 @@ static void judge_program(struct host_spread *spread, unsigned i)
     }
 }
 
-static void judge_loader(struct host_spread *spread, unsigned i)
-{
+static void judge_loader(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     if (n->booted && n->start != n->boot_start) {
         end(spread, i, HOST_SPREAD_FELL_BACK,
@@ -143,8 +133,7 @@ static void judge_loader(struct host_spread *spread, unsigned i)
     }
 }
 
-static void judge_kind(struct host_spread *spread, unsigned i)
-{
+static void judge_kind(struct host_spread *spread, unsigned i) {
     const struct node_who *who = &spread->visit->node[i].who;
     char board[NODE_BOARD_BYTES + 1] = "";
     memcpy(board, who->board, sizeof who->board);
@@ -166,8 +155,7 @@ static void judge_kind(struct host_spread *spread, unsigned i)
 
 /* Not heard for as long as a loader may be busy with its flash, or its answers
  * wait on a slow wire behind those of others. */
-static bool is_absent(const struct host_spread *spread, unsigned i)
-{
+static bool is_absent(const struct host_spread *spread, unsigned i) {
     enum { BUSY_US = 15000000 };
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
@@ -178,16 +166,14 @@ static bool is_absent(const struct host_spread *spread, unsigned i)
 }
 
 /* A node that is told to restart is not there for a while. */
-static void judge_absent(struct host_spread *spread, unsigned i)
-{
+static void judge_absent(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     if (n->phase > HOST_SPREAD_LEAVES && n->phase < HOST_SPREAD_STARTS) {
         spread_set(spread, i, HOST_SPREAD_AWAITED);
     }
 }
 
-void spread_judge(struct host_spread *spread, unsigned i)
-{
+void spread_judge(struct host_spread *spread, unsigned i) {
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
     if (spread_ended(n) || pass_over(spread, i)) {
@@ -216,8 +202,7 @@ void spread_judge(struct host_spread *spread, unsigned i)
 
 /* --- by what its loader says ---------------------------------------------- */
 
-static uint32_t lacking(const struct host_spread *spread, const uint8_t *map)
-{
+static uint32_t lacking(const struct host_spread *spread, const uint8_t *map) {
     uint32_t count = 0;
     for (uint32_t b = 0; b < spread->blocks; b++) {
         count += (map[b / 8] >> b % 8 & 1) == 0;
@@ -226,8 +211,7 @@ static uint32_t lacking(const struct host_spread *spread, const uint8_t *map)
 }
 
 static void take_map(struct host_spread *spread, unsigned i,
-                     const struct loader_state_message *state)
-{
+                     const struct loader_state_message *state) {
     struct host_spread_node *n = &spread->node[i];
     uint32_t held = n->held;
     memcpy(n->map, state->map, sizeof n->map);
@@ -241,8 +225,7 @@ static void take_map(struct host_spread *spread, unsigned i,
 }
 
 static void take_whole(struct host_spread *spread, unsigned i,
-                       enum host_spread_phase phase)
-{
+                       enum host_spread_phase phase) {
     struct host_spread_node *n = &spread->node[i];
     n->held = n->blocks = spread->blocks;
     if (n->phase < phase) {
@@ -251,8 +234,7 @@ static void take_whole(struct host_spread *spread, unsigned i,
 }
 
 void spread_hear(struct host_spread *spread, unsigned i,
-                 const struct loader_state_message *state)
-{
+                 const struct loader_state_message *state) {
     struct host_spread_node *n = &spread->node[i];
     if (!spread_in_loader(spread, i) || n->phase >= HOST_SPREAD_STARTS) {
         return;
@@ -285,8 +267,7 @@ void spread_hear(struct host_spread *spread, unsigned i,
 }
 
 /* Its lines, the last ones if they are too many, as one. */
-void spread_explain(struct host_spread *spread, unsigned i)
-{
+void spread_explain(struct host_spread *spread, unsigned i) {
     enum { LOG_MAX = 120 };
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
@@ -310,8 +291,7 @@ void spread_explain(struct host_spread *spread, unsigned i)
 
 /* --- no further ----------------------------------------------------------- */
 
-void spread_expire(struct host_spread *spread, unsigned i)
-{
+void spread_expire(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     char text[HOST_SPREAD_TEXT];
     const char *reason = NULL;

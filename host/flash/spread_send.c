@@ -15,14 +15,12 @@ enum {
 };
 
 static bool send(struct host_spread *spread, uint16_t dest, uint8_t type,
-                 const void *data, size_t size)
-{
+                 const void *data, size_t size) {
     return host_visit_send(spread->visit, dest, type, data, size);
 }
 
 static bool order(struct host_spread *spread, unsigned i,
-                  enum loader_order what)
-{
+                  enum loader_order what) {
     const struct loader_do_message message = {.transfer = spread->transfer,
                                               .what = what};
     return send(spread, (uint16_t)i, NODE_IMAGE_DO, &message, sizeof message);
@@ -30,16 +28,14 @@ static bool order(struct host_spread *spread, unsigned i,
 
 /* Whether it is time to tell it again. */
 static bool is_due(const struct host_spread *spread,
-                   const struct host_spread_node *n)
-{
+                   const struct host_spread_node *n) {
     return n->told_us == 0 || spread->now_us - n->told_us >= SPREAD_AGAIN_US;
 }
 
 /* --- to the loader, and to begin ------------------------------------------ */
 
 static int restart_those_that_run(struct host_spread *spread,
-                                  struct host_error *error)
-{
+                                  struct host_error *error) {
     struct host_node_set set = {{0}};
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
@@ -58,8 +54,7 @@ static int restart_those_that_run(struct host_spread *spread,
 }
 
 /* To all at once, unless it is for one alone. */
-static void begin(struct host_spread *spread)
-{
+static void begin(struct host_spread *spread) {
     struct loader_begin_message message = {
         .transfer = spread->transfer, .bytes = (uint32_t)spread->options.bytes};
     unsigned count = 0, last = 0;
@@ -85,14 +80,12 @@ static void begin(struct host_spread *spread)
     spread->ask_due = true;
 }
 
-static bool has_answered(const struct host_spread_node *n)
-{
+static bool has_answered(const struct host_spread_node *n) {
     return n->asks > 0 && n->replies == n->asks;
 }
 
 /* Within the transfer, once the board has proved the image's signature. */
-static void name(struct host_spread *spread, unsigned i)
-{
+static void name(struct host_spread *spread, unsigned i) {
     static const uint8_t nobody[NODE_SERIAL_BYTES];
     const struct host_spread_options *options = &spread->options;
     struct host_spread_node *n = &spread->node[i];
@@ -111,8 +104,7 @@ static void name(struct host_spread *spread, unsigned i)
 
 /* --- what each lacks ------------------------------------------------------ */
 
-static bool is_asked(const struct host_spread *spread, unsigned i)
-{
+static bool is_asked(const struct host_spread *spread, unsigned i) {
     return spread_in_loader(spread, i) &&
            spread->node[i].phase < HOST_SPREAD_VERIFIED;
 }
@@ -120,8 +112,7 @@ static bool is_asked(const struct host_spread *spread, unsigned i)
 /* Answers take a tenth of the slowest wire at most, by what it is said to
  * carry, and are waited for a third of the time, by what they took the last
  * time. */
-static uint64_t ask_interval(const struct host_spread *spread, unsigned nodes)
-{
+static uint64_t ask_interval(const struct host_spread *spread, unsigned nodes) {
     uint32_t baud = spread->visit->machine->serial_baud;
     uint64_t took_us = spread->answered_us > spread->asked_us
                            ? spread->answered_us - spread->asked_us
@@ -135,16 +126,15 @@ static uint64_t ask_interval(const struct host_spread *spread, unsigned nodes)
 }
 
 /* Within which an answer comes, if it does. */
-static uint64_t answer_time(const struct host_spread *spread)
-{
+static uint64_t answer_time(const struct host_spread *spread) {
     uint32_t baud = spread->visit->machine->serial_baud;
     return ANSWER_US +
            (baud == 0 ? 0
                       : UINT64_C(10) * QUEUE_BYTES * SLOWER * 1000000 / baud);
 }
 
-static bool send_ask(struct host_spread *spread, unsigned count, unsigned last)
-{
+static bool send_ask(struct host_spread *spread, unsigned count,
+                     unsigned last) {
     const struct loader_ask_message message = {spread->transfer};
     if (!send(spread, count == 1 ? (uint16_t)last : CUBE_ALL, NODE_IMAGE_ASK,
               &message, sizeof message)) {
@@ -163,8 +153,7 @@ static bool send_ask(struct host_spread *spread, unsigned count, unsigned last)
     return true;
 }
 
-static void ask(struct host_spread *spread)
-{
+static void ask(struct host_spread *spread) {
     unsigned count = 0, silent = 0, last = 0;
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (is_asked(spread, i)) {
@@ -185,8 +174,7 @@ static void ask(struct host_spread *spread)
 /* --- blocks --------------------------------------------------------------- */
 
 /* Whether the others wait for what it says it lacks. */
-static bool is_waited_for(const struct host_spread *spread, unsigned i)
-{
+static bool is_waited_for(const struct host_spread *spread, unsigned i) {
     const struct host_spread_node *n = &spread->node[i];
     uint64_t passed = spread->now_us - n->moved_us;
     if (n->phase == HOST_SPREAD_LEAVES) {
@@ -198,8 +186,7 @@ static bool is_waited_for(const struct host_spread *spread, unsigned i)
 }
 
 /* A pass begins once all who will be in it have said what they lack. */
-static bool may_plan(const struct host_spread *spread)
-{
+static bool may_plan(const struct host_spread *spread) {
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (is_waited_for(spread, i)) {
             return false;
@@ -210,8 +197,7 @@ static bool may_plan(const struct host_spread *spread)
 
 /* Whether there is, or may come, a node of which it is not known what it lacks.
  */
-static bool is_any_unknown(const struct host_spread *spread)
-{
+static bool is_any_unknown(const struct host_spread *spread) {
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         bool known = n->phase > HOST_SPREAD_TAKES ||
@@ -223,8 +209,7 @@ static bool is_any_unknown(const struct host_spread *spread)
     return false;
 }
 
-static void plan(struct host_spread *spread)
-{
+static void plan(struct host_spread *spread) {
     uint16_t *dest = spread->dest;
     bool unknown = is_any_unknown(spread);
     for (uint32_t b = 0; b < spread->blocks; b++) {
@@ -247,8 +232,7 @@ static void plan(struct host_spread *spread)
     spread->next = 0;
 }
 
-static bool send_block(struct host_spread *spread, uint32_t block)
-{
+static bool send_block(struct host_spread *spread, uint32_t block) {
     uint8_t bytes[MESSAGE_MAX];
     size_t at = (size_t)block * LOADER_BLOCK_BYTES;
     size_t size = spread->options.bytes - at;
@@ -263,8 +247,7 @@ static bool send_block(struct host_spread *spread, uint32_t block)
                 sizeof head + size);
 }
 
-void spread_blocks(struct host_spread *spread)
-{
+void spread_blocks(struct host_spread *spread) {
     if (!spread->passing && may_plan(spread)) {
         plan(spread);
     }
@@ -285,8 +268,7 @@ void spread_blocks(struct host_spread *spread)
 
 /* --- verify, and start ---------------------------------------------------- */
 
-static void verify(struct host_spread *spread, unsigned i)
-{
+static void verify(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     if (n->phase == HOST_SPREAD_WHOLE && spread_in_loader(spread, i) &&
         is_due(spread, n) && order(spread, i, LOADER_VERIFY)) {
@@ -297,8 +279,7 @@ static void verify(struct host_spread *spread, unsigned i)
 
 /* None is on its way any more that will be there soon: starts take the way to
  * others away for a while. */
-static bool may_boot(const struct host_spread *spread)
-{
+static bool may_boot(const struct host_spread *spread) {
     uint64_t now = spread->now_us;
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
@@ -312,8 +293,7 @@ static bool may_boot(const struct host_spread *spread)
     return true;
 }
 
-static bool boot(struct host_spread *spread, unsigned i)
-{
+static bool boot(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     bool starts = spread_in_loader(spread, i) &&
                   (n->phase == HOST_SPREAD_VERIFIED ||
@@ -337,8 +317,7 @@ static bool boot(struct host_spread *spread, unsigned i)
 }
 
 /* The farthest ones first: their way leads over the others. */
-static void boot_all(struct host_spread *spread)
-{
+static void boot_all(struct host_spread *spread) {
     struct host_machine *machine = spread->visit->machine;
     if (!may_boot(spread)) {
         return;
@@ -352,8 +331,7 @@ static void boot_all(struct host_spread *spread)
     }
 }
 
-int spread_orders(struct host_spread *spread, struct host_error *error)
-{
+int spread_orders(struct host_spread *spread, struct host_error *error) {
     if (restart_those_that_run(spread, error) != 0) {
         return error->code;
     }

@@ -18,20 +18,17 @@ struct host_claim {
     bool known, there, input;
 };
 
-static const char *last_name(const char *path)
-{
+static const char *last_name(const char *path) {
     const char *slash = strrchr(path, '/');
     return slash == NULL ? path : slash + 1;
 }
 
-static bool is_standard(const struct host_claim *c)
-{
+static bool is_standard(const struct host_claim *c) {
     return strcmp(c->name, "-") == 0;
 }
 
 /* False where nothing is at its name and no directory is there for it. */
-static bool look(struct host_claim *c)
-{
+static bool look(struct host_claim *c) {
     c->there = true;
     if (is_standard(c)) {
         return fstat(c->input ? STDIN_FILENO : STDOUT_FILENO, &c->status) == 0;
@@ -48,8 +45,7 @@ static bool look(struct host_claim *c)
 }
 
 /* Devices, such as terminals, take what comes. */
-static bool is_same(const struct host_claim *a, const struct host_claim *b)
-{
+static bool is_same(const struct host_claim *a, const struct host_claim *b) {
     if (!a->input && !b->input && is_standard(a) && is_standard(b)) {
         return true;
     }
@@ -63,8 +59,7 @@ static bool is_same(const struct host_claim *a, const struct host_claim *b)
 }
 
 static int refuse(const struct host_claim *c, const struct host_claim *other,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     bool beside = strcmp(c->name, c->path) != 0;
     const char *what = other->input ? "would overwrite the input"
                        : strcmp(other->name, other->path) != 0
@@ -81,8 +76,7 @@ static int refuse(const struct host_claim *c, const struct host_claim *other,
 }
 
 static int claim(struct host_claims *claims, struct host_claim new,
-                 const char *name, struct host_error *error)
-{
+                 const char *name, struct host_error *error) {
     if (claims->count == claims->capacity) {
         unsigned capacity = 2 * claims->capacity + 8;
         void *grown = realloc(claims->claim, capacity * sizeof new);
@@ -113,16 +107,14 @@ static int claim(struct host_claims *claims, struct host_claim new,
 }
 
 int host_claims_read(struct host_claims *claims, const char *path,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_claim c = {.option = "", .path = path, .input = true};
     return claim(claims, c, path, error);
 }
 
 int host_claims_write(struct host_claims *claims, const char *option,
                       const char *path, const char *input,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct host_claim c = {.option = option, .path = path};
     char name[HOST_PATH_MAX];
     const char *file = path;
@@ -135,8 +127,7 @@ int host_claims_write(struct host_claims *claims, const char *option,
     return error->code;
 }
 
-void host_claims_free(struct host_claims *claims)
-{
+void host_claims_free(struct host_claims *claims) {
     for (unsigned i = 0; i < claims->count; i++) {
         free(claims->claim[i].name);
         free(claims->claim[i].target);

@@ -13,8 +13,7 @@
 
 /* Whether `out` leaves `in`, which is read, as it is. */
 static int check_claims(const char *in, const char *out,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_claims claims = {0};
     host_claims_read(&claims, in, error);
     host_claims_write(&claims, "", out, NULL, error);
@@ -24,8 +23,7 @@ static int check_claims(const char *in, const char *out,
 
 /* The extension of the file beside `path` that holds its points.  A format that
  * makes none has its points where that of standard input has them. */
-static const char *points_extension(const char *path)
-{
+static const char *points_extension(const char *path) {
     const struct host_format *f = host_format_named(path);
     if (f == NULL || f->beside[0] == NULL) {
         f = host_format_of("-", HOST_READ_TETRAHEDRA);
@@ -36,8 +34,7 @@ static const char *points_extension(const char *path)
 /* The points of a file of tetrahedra that holds none: from the one beside it,
  * packed or not. */
 static int points_beside(const char *in, const char *out,
-                         struct host_points *points, struct host_error *error)
-{
+                         struct host_points *points, struct host_error *error) {
     const char *extension = points_extension(in);
     size_t n = strlen(in) - (host_is_packed(in) ? strlen(".gz") : 0);
     size_t more = strlen(extension);
@@ -67,16 +64,14 @@ static int points_beside(const char *in, const char *out,
 }
 
 /* Whether writing it takes no points: a file of rows with none beside it. */
-static bool holds_rows_only(const char *path)
-{
+static bool holds_rows_only(const char *path) {
     const struct host_format *f = host_format_named(path);
     return strcmp(path, "-") == 0 ||
            (f != NULL && f->rows_only && f->beside[0] == NULL);
 }
 
 static int convert_tetrahedra(const char *in, const char *out,
-                              struct host_error *error)
-{
+                              struct host_error *error) {
     struct host_tetrahedra tets;
     struct host_points points;
     if (host_tetrahedra_read(in, &tets, &points, error) != 0) {
@@ -97,15 +92,13 @@ static int convert_tetrahedra(const char *in, const char *out,
 }
 
 /* Formats that hold nothing but tetrahedra, on either side, decide. */
-static bool holds_tetrahedra(const char *path)
-{
+static bool holds_tetrahedra(const char *path) {
     const struct host_format *f = host_format_named(path);
     return f != NULL && f->read_points == NULL && f->write_points == NULL;
 }
 
 /* Others may hold either. */
-static bool has_tetrahedra(const char *path)
-{
+static bool has_tetrahedra(const char *path) {
     const struct host_format *f = host_format_named(path);
     if (f == NULL || f->read_tetrahedra == NULL) {
         return false;
@@ -119,8 +112,7 @@ static bool has_tetrahedra(const char *path)
 }
 
 static int convert(const char *in, const char *format, const char *out,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     const struct host_format *to = host_format_named(out);
     bool either =
         to != NULL && to->write_points != NULL && to->write_tetrahedra != NULL;
@@ -141,8 +133,7 @@ static int convert(const char *in, const char *format, const char *out,
 }
 
 int host_convert(const char *in, const char *format, const char *out,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     (void)convert(in, format, out, error);
     return host_output_commit(error);
 }

@@ -8,31 +8,26 @@ struct field {
     const char *first, *last;
 };
 
-static bool is_blank(char c)
-{
+static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r';
 }
 
-static bool is_mark(char c)
-{
+static bool is_mark(char c) {
     return c == ',' || c == ';';
 }
 
-static bool begins_number(char c)
-{
+static bool begins_number(char c) {
     return (c >= '0' && c <= '9') || c == '-' || c == '+' || c == '.';
 }
 
-static const char *line_end(const struct host_scan *s)
-{
+static const char *line_end(const struct host_scan *s) {
     const char *end = memchr(s->at, '\n', (size_t)(s->end - s->at));
     return end == NULL ? s->end : end;
 }
 
 /* Where the line begins whose first word is at hand: a first field may be
  * empty. */
-static const char *line_begin(const struct host_scan *s)
-{
+static const char *line_begin(const struct host_scan *s) {
     const char *at = s->at;
     while (at > s->start && (is_blank(at[-1]) || is_mark(at[-1]))) {
         at--;
@@ -40,8 +35,7 @@ static const char *line_begin(const struct host_scan *s)
     return at;
 }
 
-bool host_csv_begins_empty(const struct host_scan *s)
-{
+bool host_csv_begins_empty(const struct host_scan *s) {
     const char *at = s->at;
     while (at > s->start && is_blank(at[-1])) {
         at--;
@@ -50,13 +44,11 @@ bool host_csv_begins_empty(const struct host_scan *s)
 }
 
 /* Where blanks part fields, any of them does. */
-static bool is_delimiter(char c, char delimiter)
-{
+static bool is_delimiter(char c, char delimiter) {
     return c == delimiter || (delimiter == ' ' && is_blank(c));
 }
 
-static const char *skip_blanks(const char *c, const char *end, char delimiter)
-{
+static const char *skip_blanks(const char *c, const char *end, char delimiter) {
     while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter)) {
         c++;
     }
@@ -64,8 +56,7 @@ static const char *skip_blanks(const char *c, const char *end, char delimiter)
 }
 
 /* Where the field behind the one that ends at c begins; NULL: nowhere. */
-static const char *behind(const char *c, const char *end, char delimiter)
-{
+static const char *behind(const char *c, const char *end, char delimiter) {
     if (c == end) {
         return NULL;
     }
@@ -78,8 +69,8 @@ static const char *behind(const char *c, const char *end, char delimiter)
 }
 
 /* Takes a field off the line; *at is NULL behind the last. */
-static struct field next_field(const char **at, const char *end, char delimiter)
-{
+static struct field next_field(const char **at, const char *end,
+                               char delimiter) {
     bool quoted = false;
     const char *c = skip_blanks(*at, end, delimiter);
     struct field f = {c, c};
@@ -99,8 +90,7 @@ static struct field next_field(const char **at, const char *end, char delimiter)
 }
 
 /* The first of these that is on the line out of quotes, or a blank. */
-static char delimiter_of(const char *at, const char *end)
-{
+static char delimiter_of(const char *at, const char *end) {
     static const char delimiters[] = ",;\t";
     for (const char *d = delimiters; *d != '\0'; d++) {
         bool quoted = false;
@@ -115,8 +105,7 @@ static char delimiter_of(const char *at, const char *end)
 }
 
 /* 0, 1, 2 for x, y, z, alone or with a unit after it; else 3. */
-static unsigned axis_of(struct field f)
-{
+static unsigned axis_of(struct field f) {
     while (f.first < f.last && is_blank(*f.first)) {
         f.first++;
     }
@@ -130,8 +119,7 @@ static unsigned axis_of(struct field f)
 
 /* Whether a word begins like a number, or is one that is not finite: such a
  * line is a point that is wrong, and no header. */
-static bool is_numeric(const char *word)
-{
+static bool is_numeric(const char *word) {
     static const char *const others[] = {"nan", "inf", "infinity"};
     bool quoted = word[0] == '"';
     size_t n = strlen(word += quoted);
@@ -148,8 +136,7 @@ static bool is_numeric(const char *word)
 }
 
 /* Whether no word of the line is a number. */
-static bool names_columns(struct host_scan s)
-{
+static bool names_columns(struct host_scan s) {
     while (host_scan_more(&s)) {
         char word[64];
         host_scan_word(&s, word, sizeof word);
@@ -161,8 +148,7 @@ static bool names_columns(struct host_scan s)
 }
 
 int host_csv_header(struct host_csv *csv, struct host_scan *s,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     unsigned found[4] = {0};
     *csv = (struct host_csv){.column = {0, 1, 2}};
     if (!host_scan_skip_blank_lines(s) || !names_columns(*s)) {
@@ -203,8 +189,7 @@ int host_csv_header(struct host_csv *csv, struct host_scan *s,
  * behind the last, or a comment, *at is NULL. */
 static int take_number(const struct host_scan *s, const char **at,
                        const char *end, char delimiter, double *value,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_scan part = *s;
     part.at = skip_blanks(*at, end, delimiter);
     part.end = end;
@@ -240,15 +225,13 @@ static int take_number(const struct host_scan *s, const char **at,
 
 /* Whether what stands at `at`, behind the last column, is none more: a comment,
  * or nothing behind a delimiter that ends the line. */
-static bool is_end(const char *at, const char *end, char delimiter)
-{
+static bool is_end(const char *at, const char *end, char delimiter) {
     struct field f = next_field(&at, end, delimiter);
     return f.first == f.last ? at == NULL : *f.first == '#';
 }
 
 int host_csv_row(const struct host_csv *csv, struct host_scan *s, double xyz[3],
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     const char *at = line_begin(s), *end = line_end(s), *field = at;
     char delimiter = csv->delimiter;
     uint64_t columns = 0;

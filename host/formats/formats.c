@@ -32,13 +32,11 @@
 FORMATS(DECLARE)
 static const struct host_format *const formats[] = {FORMATS(POINT)};
 
-const struct host_format *host_format_row(unsigned i)
-{
+const struct host_format *host_format_row(unsigned i) {
     return i < sizeof formats / sizeof formats[0] ? formats[i] : NULL;
 }
 
-static bool has_use(const struct host_format *format, enum host_use use)
-{
+static bool has_use(const struct host_format *format, enum host_use use) {
     switch (use) {
     case HOST_READ_POINTS:
         return format->read_points != NULL;
@@ -51,14 +49,12 @@ static bool has_use(const struct host_format *format, enum host_use use)
     }
 }
 
-static bool ends_in(const char *path, size_t length, const char *extension)
-{
+static bool ends_in(const char *path, size_t length, const char *extension) {
     size_t n = strlen(extension);
     return length > n && strncasecmp(path + length - n, extension, n) == 0;
 }
 
-const struct host_format *host_format_named(const char *path)
-{
+const struct host_format *host_format_named(const char *path) {
     size_t length = strlen(path) - (host_is_packed(path) ? strlen(".gz") : 0);
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
@@ -71,8 +67,7 @@ const struct host_format *host_format_named(const char *path)
     return NULL;
 }
 
-static const struct host_format *first_with(enum host_use use)
-{
+static const struct host_format *first_with(enum host_use use) {
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
         if (has_use(f, use)) {
@@ -82,8 +77,7 @@ static const struct host_format *first_with(enum host_use use)
     return f;
 }
 
-const struct host_format *host_format_of(const char *path, enum host_use use)
-{
+const struct host_format *host_format_of(const char *path, enum host_use use) {
     bool written = use == HOST_WRITE_POINTS || use == HOST_WRITE_TETRAHEDRA;
     if (strcmp(path, "-") == 0) {
         return first_with(use);
@@ -101,24 +95,21 @@ struct text {
     size_t room; /* with the end of the string */
 };
 
-static void add(struct text *text, const char *words)
-{
+static void add(struct text *text, const char *words) {
     int n = snprintf(text->at, text->room, "%s", words);
     size_t used = (size_t)n < text->room ? (size_t)n : text->room - 1;
     text->at += used;
     text->room -= used;
 }
 
-static void add_extensions(struct text *text, const struct host_format *f)
-{
+static void add_extensions(struct text *text, const struct host_format *f) {
     for (unsigned k = 0; f->extensions[k] != NULL; k++) {
         add(text, k == 0 ? "" : " ");
         add(text, f->extensions[k]);
     }
 }
 
-void host_format_list(enum host_use use, char *text, size_t size)
-{
+void host_format_list(enum host_use use, char *text, size_t size) {
     struct text list = {text, size};
     text[0] = '\0';
     const struct host_format *f;
@@ -132,8 +123,7 @@ void host_format_list(enum host_use use, char *text, size_t size)
     }
 }
 
-static void add_beside(struct text *text, const struct host_format *f)
-{
+static void add_beside(struct text *text, const struct host_format *f) {
     for (unsigned k = 0; f->beside[k] != NULL; k++) {
         add(text, k == 0                     ? "; with "
                   : f->beside[k + 1] == NULL ? " and "
@@ -143,8 +133,7 @@ static void add_beside(struct text *text, const struct host_format *f)
     add(text, f->beside[0] != NULL ? " beside it" : "");
 }
 
-void host_format_help(enum host_use use, char *text, size_t size)
-{
+void host_format_help(enum host_use use, char *text, size_t size) {
     struct text list = {text, size};
     text[0] = '\0';
     const struct host_format *f;
@@ -166,8 +155,7 @@ void host_format_help(enum host_use use, char *text, size_t size)
 }
 
 const struct host_format *host_format_told(const char *name, enum host_use use,
-                                           struct host_error *error)
-{
+                                           struct host_error *error) {
     char path[64], list[HOST_FORMAT_LIST_MAX];
     int n =
         snprintf(path, sizeof path, "a%s%s", name[0] == '.' ? "" : ".", name);

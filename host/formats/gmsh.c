@@ -4,8 +4,7 @@
 #include "rows.h"
 #include "scan.h"
 
-static int msh_format(struct host_scan *s, struct host_error *error)
-{
+static int msh_format(struct host_scan *s, struct host_error *error) {
     double version;
     uint64_t binary;
     if (host_scan_double_anywhere(s, &version, error) != 0 ||
@@ -21,8 +20,7 @@ static int msh_format(struct host_scan *s, struct host_error *error)
 }
 
 static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     uint64_t count;
     if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0) {
         return error->code;
@@ -55,8 +53,7 @@ static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
 /* A whole number of the row at hand: a row that is short takes none of the
  * next. */
 static int msh_number(struct host_scan *s, uint64_t most, uint64_t *value,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     return host_scan_more(s)
                ? host_scan_unsigned(s, most, value, error)
                : host_scan_fail(s, s->at, error,
@@ -65,8 +62,7 @@ static int msh_number(struct host_scan *s, uint64_t most, uint64_t *value,
 }
 
 static int msh_elements(const struct host_source *source, struct host_scan *s,
-                        struct host_mesh *mesh, struct host_error *error)
-{
+                        struct host_mesh *mesh, struct host_error *error) {
     enum { TETRAHEDRON = 4 };
     uint64_t count;
     if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0) {
@@ -101,8 +97,7 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
 }
 
 static int read_msh(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     bool any = false;
     while (host_scan_skip_blank_lines(&s)) {
@@ -129,8 +124,7 @@ static int read_msh(const struct host_source *source, struct host_mesh *mesh,
 static int write_msh(struct host_output *out, struct host_output *beside,
                      const struct host_points *points,
                      const struct host_tetrahedra *tets,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     (void)beside;
     host_output_text(out, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n");
     host_output_unsigned(out, points->count);

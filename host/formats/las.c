@@ -37,15 +37,13 @@ struct las {
 };
 
 static uint64_t field(const struct host_source *source, size_t at,
-                      enum host_number type)
-{
+                      enum host_number type) {
     return host_whole_at(source->data + at, type, false);
 }
 
 /* What is known of versions and of formats. */
 static int check_known(const struct host_source *source, const struct las *las,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     if (source->data[AT_MAJOR] != 1 || las->minor > 4) {
         return host_fail(error, HOST_INPUT,
                          "%s: LAS %u.%u, where 1.0 to 1.4 are read; convert it "
@@ -65,8 +63,7 @@ static int check_known(const struct host_source *source, const struct las *las,
 }
 
 static int cut_short(const struct host_source *source, const struct las *las,
-                     uint64_t points, struct host_error *error)
-{
+                     uint64_t points, struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s: %llu points where its header tells of %llu; the "
                      "file is cut short, get it whole",
@@ -77,8 +74,7 @@ static int cut_short(const struct host_source *source, const struct las *las,
 /* Whether all records are behind the header, and within the file as far as its
  * size is known. */
 static int check_bounds(const struct host_source *source, const struct las *las,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     const unsigned header_bytes =
         las->minor < 4 ? HEADER_BYTES : HEADER_BYTES_4;
     static const uint8_t least[FORMATS] = {20, 28, 26, 34, 57, 63,
@@ -108,8 +104,7 @@ static int check_bounds(const struct host_source *source, const struct las *las,
  * count in the offset; nothing comes behind the points. */
 static int skip_signature(const struct host_source *source, struct las *las,
                           const uint8_t **at, const uint8_t **end,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     static const uint8_t signature[] = {0xdd, 0xcc};
     if (las->minor != 0) {
         return 0;
@@ -128,8 +123,7 @@ static int skip_signature(const struct host_source *source, struct las *las,
 
 /* Skips so many bytes; false if the file ends before. */
 static bool skip(const struct host_source *source, uint64_t bytes,
-                 const uint8_t **at, const uint8_t **end)
-{
+                 const uint8_t **at, const uint8_t **end) {
     while ((uint64_t)(*end - *at) < bytes) {
         bytes -= (uint64_t)(*end - *at);
         *at = *end;
@@ -142,8 +136,7 @@ static bool skip(const struct host_source *source, uint64_t bytes,
 }
 
 static int read_header(const struct host_source *source, struct las *las,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     if (source->bytes < HEADER_BYTES || memcmp(source->data, "LASF", 4) != 0) {
         return host_source_fail(source, error,
                                 "no LAS file, or less than its header; get it "
@@ -177,8 +170,7 @@ static int read_header(const struct host_source *source, struct las *las,
 }
 
 static int read_las(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct las las = {0};
     if (read_header(source, &las, error) != 0) {
         return error->code;

@@ -5,8 +5,7 @@
 #include "scan.h"
 
 static int medit_vertices(struct host_scan *s, struct host_mesh *mesh,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     uint64_t count;
     if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0) {
         return error->code;
@@ -29,8 +28,7 @@ static int medit_vertices(struct host_scan *s, struct host_mesh *mesh,
 
 static int medit_tetrahedra(const struct host_source *source,
                             struct host_scan *s, struct host_mesh *mesh,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     uint64_t count;
     if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0) {
         return error->code;
@@ -50,8 +48,7 @@ static int medit_tetrahedra(const struct host_source *source,
 }
 
 static int read_mesh(const struct host_source *source, struct host_mesh *mesh,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     bool any = false;
     if (!host_scan_skip_blank_lines(&s) ||
@@ -83,8 +80,7 @@ static int read_mesh(const struct host_source *source, struct host_mesh *mesh,
 static int write_mesh(struct host_output *out, struct host_output *beside,
                       const struct host_points *points,
                       const struct host_tetrahedra *tets,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     (void)beside;
     host_output_text(out, "MeshVersionFormatted 2\nDimension 3\nVertices\n");
     host_output_unsigned(out, points->count);

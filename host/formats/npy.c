@@ -14,8 +14,7 @@ struct npy {
     size_t start; /* of the numbers */
 };
 
-static enum host_number type_of(char kind, int bytes)
-{
+static enum host_number type_of(char kind, int bytes) {
     static const struct {
         char kind;
         int bytes;
@@ -33,8 +32,7 @@ static enum host_number type_of(char kind, int bytes)
 }
 
 /* Just past `key` and its colon, or NULL. */
-static const char *value_of(const char *header, const char *key)
-{
+static const char *value_of(const char *header, const char *key) {
     const char *at = strstr(header, key);
     if (at == NULL) {
         return NULL;
@@ -43,8 +41,7 @@ static const char *value_of(const char *header, const char *key)
     return *at == '\0' ? NULL : at + 1 + strspn(at + 1, ": ");
 }
 
-static bool parse_dictionary(const char *header, struct npy *npy)
-{
+static bool parse_dictionary(const char *header, struct npy *npy) {
     const char *descr = value_of(header, "'descr'");
     const char *order = value_of(header, "'fortran_order'");
     const char *shape = value_of(header, "'shape'");
@@ -70,8 +67,7 @@ static bool parse_dictionary(const char *header, struct npy *npy)
 }
 
 static int parse_header(const struct host_source *source, struct npy *npy,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     const uint8_t *data = source->data;
     if (source->bytes < 12 || memcmp(data, "\x93NUMPY", 6) != 0) {
         return host_source_fail(source, error,
@@ -103,14 +99,12 @@ static int parse_header(const struct host_source *source, struct npy *npy,
     return 0;
 }
 
-static bool is_floating(const struct npy *npy)
-{
+static bool is_floating(const struct npy *npy) {
     return npy->type == HOST_F64 || npy->type == HOST_F32;
 }
 
 static int wrong_size(const struct host_source *source, const struct npy *npy,
-                      uint64_t have, struct host_error *error)
-{
+                      uint64_t have, struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s: %llu bytes of numbers where %llu rows of %llu "
                      "numbers are due; the file is cut short or damaged, "
@@ -130,8 +124,7 @@ typedef int taker(const struct host_source *source, const struct npy *npy,
  * shows it.  Fortran's order needs the whole file. */
 static int take_rows(const struct host_source *source, const struct npy *npy,
                      taker *take, struct host_mesh *mesh,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const uint64_t row = host_number_bytes(npy->type) * npy->columns;
     const uint8_t *at = source->data + npy->start;
     const uint8_t *end = source->data + source->bytes;
@@ -167,8 +160,7 @@ static int take_rows(const struct host_source *source, const struct npy *npy,
 
 static int take_points(const struct host_source *source, const struct npy *npy,
                        const uint8_t *from, uint64_t rows,
-                       struct host_mesh *mesh, struct host_error *error)
-{
+                       struct host_mesh *mesh, struct host_error *error) {
     size_t bytes = host_number_bytes(npy->type);
     (void)source;
     if (!npy->fortran) {
@@ -192,8 +184,7 @@ static int take_points(const struct host_source *source, const struct npy *npy,
 static int take_tetrahedra(const struct host_source *source,
                            const struct npy *npy, const uint8_t *from,
                            uint64_t rows, struct host_mesh *mesh,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     size_t bytes = host_number_bytes(npy->type);
     for (uint64_t i = 0; i < rows; i++) {
         uint64_t v[4];
@@ -209,8 +200,7 @@ static int take_tetrahedra(const struct host_source *source,
 }
 
 static int read_points(const struct host_source *source, const struct npy *npy,
-                       struct host_mesh *mesh, struct host_error *error)
-{
+                       struct host_mesh *mesh, struct host_error *error) {
     if (npy->rows == 3 && npy->columns > 3) {
         return host_fail(error, HOST_INPUT,
                          "%s: an array of shape (3, %llu), of which each row "
@@ -231,8 +221,7 @@ static int read_points(const struct host_source *source, const struct npy *npy,
 
 static int read_tetrahedra(const struct host_source *source,
                            const struct npy *npy, struct host_mesh *mesh,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     if (npy->columns != 4 || is_floating(npy)) {
         return host_fail(error, HOST_INPUT,
                          "%s: %llu columns of %s numbers where 4 vertices are "
@@ -244,8 +233,7 @@ static int read_tetrahedra(const struct host_source *source,
 }
 
 static int read_npy(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct npy npy = {.type = HOST_NO_NUMBER};
     if (parse_header(source, &npy, error) != 0) {
         return error->code;
@@ -259,8 +247,7 @@ static int read_npy(const struct host_source *source, struct host_mesh *mesh,
 /* The header of an array of `columns`, so long that numbers are aligned to 64.
  */
 static void write_header(struct host_output *out, const char *type,
-                         uint64_t rows, int columns)
-{
+                         uint64_t rows, int columns) {
     char text[160];
     int n = snprintf(text, sizeof text,
                      "{'descr': '%s', 'fortran_order': False, "
@@ -277,8 +264,7 @@ static void write_header(struct host_output *out, const char *type,
 }
 
 static void write_points(struct host_output *out,
-                         const struct host_points *points)
-{
+                         const struct host_points *points) {
     write_header(out, "<f8", points->count, 3);
     host_put_doubles(out, points->xyz, 3 * (size_t)points->count);
 }
@@ -286,8 +272,7 @@ static void write_points(struct host_output *out,
 static int write_tetrahedra(struct host_output *out, struct host_output *beside,
                             const struct host_points *points,
                             const struct host_tetrahedra *tets,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     (void)beside;
     (void)points;
     write_header(out, "<u4", tets->count, 4);

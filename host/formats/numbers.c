@@ -37,14 +37,12 @@ static const struct {
     {"vtktypeuint8", HOST_U8},
 };
 
-size_t host_number_bytes(enum host_number type)
-{
+size_t host_number_bytes(enum host_number type) {
     static const size_t bytes[] = {8, 4, 1, 1, 2, 2, 4, 4, 8, 8, 0};
     return bytes[type];
 }
 
-enum host_number host_number_named(const char *name)
-{
+enum host_number host_number_named(const char *name) {
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         if (strcasecmp(name, names[i].name) == 0) {
             return names[i].type;
@@ -53,8 +51,7 @@ enum host_number host_number_named(const char *name)
     return HOST_NO_NUMBER;
 }
 
-static uint64_t bits_at(const uint8_t *from, size_t bytes, bool big)
-{
+static uint64_t bits_at(const uint8_t *from, size_t bytes, bool big) {
     uint64_t bits = 0;
     for (size_t i = 0; i < bytes; i++) {
         size_t shift = 8 * (big ? bytes - 1 - i : i);
@@ -63,14 +60,12 @@ static uint64_t bits_at(const uint8_t *from, size_t bytes, bool big)
     return bits;
 }
 
-static int64_t extended(uint64_t bits, size_t bytes)
-{
+static int64_t extended(uint64_t bits, size_t bytes) {
     uint64_t sign = bytes == 0 ? 0 : UINT64_C(1) << (8 * bytes - 1);
     return (int64_t)((bits ^ sign) - sign);
 }
 
-double host_number_at(const uint8_t *from, enum host_number type, bool big)
-{
+double host_number_at(const uint8_t *from, enum host_number type, bool big) {
     size_t bytes = host_number_bytes(type);
     uint64_t bits = bits_at(from, bytes, big);
     double d;
@@ -93,8 +88,7 @@ double host_number_at(const uint8_t *from, enum host_number type, bool big)
     }
 }
 
-uint64_t host_whole_at(const uint8_t *from, enum host_number type, bool big)
-{
+uint64_t host_whole_at(const uint8_t *from, enum host_number type, bool big) {
     size_t bytes = host_number_bytes(type);
     uint64_t bits = bits_at(from, bytes, big);
     if (type == HOST_F64 || type == HOST_F32) {
@@ -110,8 +104,7 @@ static const bool is_little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
 
 int host_append_numbers(struct host_points *points, const uint8_t *from,
                         uint64_t rows, size_t stride, enum host_number type,
-                        bool big, struct host_error *error)
-{
+                        bool big, struct host_error *error) {
     enum { ROWS = 512 };
     double xyz[3 * ROWS];
     size_t bytes = host_number_bytes(type);
@@ -138,8 +131,7 @@ int host_append_numbers(struct host_points *points, const uint8_t *from,
 int host_append_tetrahedron(struct host_tetrahedra *tets,
                             const uint64_t vertex[4],
                             const struct host_source *source,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, error);
     if (row == NULL) {
         return error->code;
@@ -158,8 +150,7 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
 }
 
 void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
-                    bool big)
-{
+                    bool big) {
     uint8_t byte[8];
     for (size_t i = 0; i < bytes; i++) {
         byte[i] = (uint8_t)(value >> 8 * (big ? bytes - 1 - i : i));
@@ -167,15 +158,13 @@ void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
     host_output_bytes(out, byte, bytes);
 }
 
-void host_put_double(struct host_output *out, double value, bool big)
-{
+void host_put_double(struct host_output *out, double value, bool big) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     host_put_whole(out, bits, sizeof bits, big);
 }
 
-void host_put_words(struct host_output *out, const uint32_t *values, size_t n)
-{
+void host_put_words(struct host_output *out, const uint32_t *values, size_t n) {
     if (is_little) {
         host_output_bytes(out, values, n * sizeof *values);
         return;
@@ -185,8 +174,7 @@ void host_put_words(struct host_output *out, const uint32_t *values, size_t n)
     }
 }
 
-void host_put_doubles(struct host_output *out, const double *values, size_t n)
-{
+void host_put_doubles(struct host_output *out, const double *values, size_t n) {
     if (is_little) {
         host_output_bytes(out, values, n * sizeof *values);
         return;

@@ -7,8 +7,7 @@
 #include "scan.h"
 
 /* Whether the line goes on behind the backslash at hand; goes there if so. */
-static bool take_continuation(struct host_scan *s)
-{
+static bool take_continuation(struct host_scan *s) {
     const char *c = s->at;
     if (c == s->end || *c != '\\') {
         return false;
@@ -23,8 +22,7 @@ static bool take_continuation(struct host_scan *s)
 }
 
 static int take_number(struct host_scan *s, double *value,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     while (host_scan_more(s) && take_continuation(s)) {
     }
     struct host_scan word = *s; /* a backslash may end it */
@@ -45,8 +43,7 @@ static int take_number(struct host_scan *s, double *value,
 
 /* What is left of the line, and of those that continue it.  A comment, which
  * may well end in the name of a folder, is not continued. */
-static void pass_line(struct host_scan *s)
-{
+static void pass_line(struct host_scan *s) {
     const char *begin, *c;
     do {
         begin = s->at;
@@ -59,8 +56,7 @@ static void pass_line(struct host_scan *s)
 }
 
 static int read_obj(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     while (host_scan_skip_blank_lines(&s)) {
         double xyz[3];

@@ -6,8 +6,7 @@
 
 /* The faces after the vertices, for their number and that of the vertices. */
 static int skip_faces(struct host_scan *s, uint64_t faces, uint64_t vertices,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     for (; faces > 0; faces--) {
         uint64_t corners, vertex;
         if (!host_scan_skip_blank_lines(s)) {
@@ -33,8 +32,7 @@ static int skip_faces(struct host_scan *s, uint64_t faces, uint64_t vertices,
 
 /* A vertex, and how many numbers the line has: normals and colours follow. */
 static int take_vertex(struct host_scan *s, double xyz[3], uint64_t *columns,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     char word[8];
     *columns = 3;
     if (host_scan_double_anywhere(s, &xyz[0], error) != 0 ||
@@ -49,8 +47,7 @@ static int take_vertex(struct host_scan *s, double xyz[3], uint64_t *columns,
 }
 
 static int read_off(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     if (!host_scan_skip_blank_lines(&s) ||
         !(host_scan_take(&s, "OFF") || host_scan_take(&s, "COFF") ||
@@ -89,8 +86,8 @@ static int read_off(const struct host_source *source, struct host_mesh *mesh,
     return skip_faces(&s, faces, count, error);
 }
 
-static void write_off(struct host_output *out, const struct host_points *points)
-{
+static void write_off(struct host_output *out,
+                      const struct host_points *points) {
     host_put_line(out, "OFF\n", points->count, " 0 0\n");
     host_put_points(out, points, " ", false);
 }

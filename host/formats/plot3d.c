@@ -21,13 +21,11 @@ struct cursor {
     size_t record_end; /* within a record with marks */
 };
 
-static bool has(const struct cursor *c, uint64_t bytes)
-{
+static bool has(const struct cursor *c, uint64_t bytes) {
     return c->source->bytes - c->at >= bytes;
 }
 
-static bool whole(struct cursor *c, uint64_t *value)
-{
+static bool whole(struct cursor *c, uint64_t *value) {
     if (!has(c, 4)) {
         return false;
     }
@@ -37,8 +35,7 @@ static bool whole(struct cursor *c, uint64_t *value)
 }
 
 /* With marks every record's length stands before and after it. */
-static bool open_record(struct cursor *c, uint64_t bytes)
-{
+static bool open_record(struct cursor *c, uint64_t bytes) {
     uint64_t length;
     if (!c->v.marks) {
         return has(c, bytes);
@@ -46,14 +43,12 @@ static bool open_record(struct cursor *c, uint64_t bytes)
     return whole(c, &length) && length == bytes && has(c, bytes);
 }
 
-static bool close_record(struct cursor *c, uint64_t bytes)
-{
+static bool close_record(struct cursor *c, uint64_t bytes) {
     uint64_t length;
     return !c->v.marks || (whole(c, &length) && length == bytes);
 }
 
-static bool dimensions(struct cursor *c, uint64_t *points)
-{
+static bool dimensions(struct cursor *c, uint64_t *points) {
     uint64_t n = 1;
     for (int d = 0; d < 3; d++) {
         uint64_t side;
@@ -67,8 +62,7 @@ static bool dimensions(struct cursor *c, uint64_t *points)
 }
 
 static int append_block(struct cursor *c, uint64_t n,
-                        struct host_points *points, struct host_error *error)
-{
+                        struct host_points *points, struct host_error *error) {
     const uint8_t *data = c->source->data + c->at;
     size_t bytes = host_number_bytes(c->v.type);
     for (uint64_t i = 0; i < n; i++) {
@@ -87,8 +81,7 @@ static int append_block(struct cursor *c, uint64_t n,
 /* Whether the file is of this variant, to the last byte; appends the points
  * where `points` is not NULL. */
 static bool walk(const struct host_source *source, struct variant v,
-                 struct host_points *points, struct host_error *error)
-{
+                 struct host_points *points, struct host_error *error) {
     struct cursor c = {.source = source, .v = v};
     uint64_t blocks = 1;
     if (v.blocks &&
@@ -121,8 +114,7 @@ static bool walk(const struct host_source *source, struct variant v,
 }
 
 static int read_plot3d(const struct host_source *source, struct host_mesh *mesh,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     for (unsigned bits = 0; bits < 32; bits++) {
         /* Of two variants that fit, marks are the better evidence, and
          * iblank is the rarer. */

@@ -36,13 +36,12 @@ struct ply {
     const uint8_t *at, *end;
 };
 
-static int damaged(struct ply *ply, struct host_error *error, const char *what)
-{
+static int damaged(struct ply *ply, struct host_error *error,
+                   const char *what) {
     return host_scan_fail(&ply->scan, ply->scan.at, error, what);
 }
 
-static int header_property(struct ply *ply, struct host_error *error)
-{
+static int header_property(struct ply *ply, struct host_error *error) {
     if (ply->elements == 0) {
         return damaged(ply, error,
                        "a property before any element; correct "
@@ -77,8 +76,7 @@ static int header_property(struct ply *ply, struct host_error *error)
     return 0;
 }
 
-static int header_element(struct ply *ply, struct host_error *error)
-{
+static int header_element(struct ply *ply, struct host_error *error) {
     if (ply->elements == ELEMENTS_MAX) {
         return damaged(ply, error, "more than 16 elements; remove some");
     }
@@ -90,8 +88,7 @@ static int header_element(struct ply *ply, struct host_error *error)
     return host_scan_unsigned(&ply->scan, UINT32_MAX - 1, &e->rows, error);
 }
 
-static int header_format(struct ply *ply, struct host_error *error)
-{
+static int header_format(struct ply *ply, struct host_error *error) {
     char word[64];
     host_scan_word(&ply->scan, word, sizeof word);
     ply->coding = strcmp(word, "ascii") == 0                  ? TEXT
@@ -105,8 +102,7 @@ static int header_format(struct ply *ply, struct host_error *error)
                : 0;
 }
 
-static int read_header(struct ply *ply, struct host_error *error)
-{
+static int read_header(struct ply *ply, struct host_error *error) {
     if (!host_scan_take(&ply->scan, "ply")) {
         return damaged(ply, error,
                        "the first line is not 'ply'; give a PLY file");
@@ -141,8 +137,7 @@ static int read_header(struct ply *ply, struct host_error *error)
                : 0;
 }
 
-static int cut_short(struct ply *ply, struct host_error *error, uint64_t row)
-{
+static int cut_short(struct ply *ply, struct host_error *error, uint64_t row) {
     return host_fail(error, HOST_INPUT,
                      "%s: the file ends in row %llu of an element; it is cut "
                      "short, get it whole",
@@ -151,8 +146,7 @@ static int cut_short(struct ply *ply, struct host_error *error, uint64_t row)
 
 /* One number of a row, from text or bytes. */
 static int take_number(struct ply *ply, enum host_number type, uint64_t row,
-                       double *value, struct host_error *error)
-{
+                       double *value, struct host_error *error) {
     if (ply->coding == TEXT) {
         return host_scan_double_anywhere(&ply->scan, value, error);
     }
@@ -168,8 +162,7 @@ static int take_number(struct ply *ply, enum host_number type, uint64_t row,
 }
 
 static int take_list(struct ply *ply, const struct property *p, uint64_t row,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     double count = 0, skipped;
     if (take_number(ply, p->count, row, &count, error) != 0) {
         return error->code;
@@ -190,8 +183,7 @@ static int take_list(struct ply *ply, const struct property *p, uint64_t row,
 }
 
 static int read_element(struct ply *ply, const struct element *e,
-                        struct host_points *points, struct host_error *error)
-{
+                        struct host_points *points, struct host_error *error) {
     for (uint64_t row = 0; row < e->rows && e->properties > 0; row++) {
         double value[PROPERTIES_MAX] = {0};
         for (int i = 0; i < e->properties; i++) {
@@ -221,8 +213,7 @@ static int read_element(struct ply *ply, const struct element *e,
 }
 
 /* Nothing but white space may follow the last element. */
-static int check_end(struct ply *ply, struct host_error *error)
-{
+static int check_end(struct ply *ply, struct host_error *error) {
     static const char what[] = "more follows than the rows that the header "
                                "gives; correct its numbers of rows";
     if (ply->coding == TEXT) {
@@ -238,8 +229,7 @@ static int check_end(struct ply *ply, struct host_error *error)
 }
 
 static int read_ply(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct ply ply = {
         .source = source, .coding = UNKNOWN, .scan = host_scan_source(source)};
     if (read_header(&ply, error) != 0) {
@@ -263,8 +253,8 @@ static int read_ply(const struct host_source *source, struct host_mesh *mesh,
                                   "there is no element 'vertex'; give points");
 }
 
-static void write_ply(struct host_output *out, const struct host_points *points)
-{
+static void write_ply(struct host_output *out,
+                      const struct host_points *points) {
     host_put_line(out, "ply\nformat binary_little_endian 1.0\nelement vertex ",
                   points->count,
                   "\nproperty double x\nproperty double y\n"

@@ -8,8 +8,7 @@
 #include "scan.h"
 
 /* Whether the line at hand is a number of points; takes it if so. */
-static bool take_count(struct host_scan *s, uint64_t *count)
-{
+static bool take_count(struct host_scan *s, uint64_t *count) {
     struct host_error none = {0};
     struct host_scan line = *s;
     uint64_t number;
@@ -23,8 +22,7 @@ static bool take_count(struct host_scan *s, uint64_t *count)
 }
 
 static int wrong_count(const struct host_scan *s, uint64_t rows, uint64_t count,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     char text[160];
     (void)snprintf(text, sizeof text,
                    "%s than the %llu points that the line before them tells "
@@ -34,8 +32,7 @@ static int wrong_count(const struct host_scan *s, uint64_t rows, uint64_t count,
 }
 
 static int read_pts(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     uint64_t rows = 0, count = 0;
     bool more = host_scan_skip_blank_lines(&s);
@@ -54,8 +51,8 @@ static int read_pts(const struct host_source *source, struct host_mesh *mesh,
     return counted && rows < count ? wrong_count(&s, rows, count, error) : 0;
 }
 
-static void write_pts(struct host_output *out, const struct host_points *points)
-{
+static void write_pts(struct host_output *out,
+                      const struct host_points *points) {
     host_put_line(out, "", points->count, "\n");
     host_put_points(out, points, " ", false);
 }

@@ -10,8 +10,7 @@
 
 static const struct host_format *format_of(const char *path, enum host_use use,
                                            const char *what,
-                                           struct host_error *error)
-{
+                                           struct host_error *error) {
     char list[HOST_FORMAT_LIST_MAX];
     const struct host_format *format = host_format_of(path, use);
     const struct host_format *named = host_format_named(path);
@@ -38,8 +37,7 @@ static const struct host_format *format_of(const char *path, enum host_use use,
 }
 
 static int check_finite(const char *path, const struct host_points *points,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     for (uint64_t i = 0; i < 3 * points->count; i++) {
         if (!isfinite(points->xyz[i])) {
             return host_fail(error, HOST_INPUT,
@@ -54,8 +52,7 @@ static int check_finite(const char *path, const struct host_points *points,
 
 /* Whether it is text whose lines end in CR alone: the first CR is before the
  * first LF, and not right before it. */
-static bool ends_in_cr(const struct host_source *source)
-{
+static bool ends_in_cr(const struct host_source *source) {
     const uint8_t *data = source->data, *end = data + source->bytes;
     const uint8_t *lf = memchr(data, '\n', source->bytes);
     const uint8_t *cr =
@@ -72,8 +69,7 @@ static bool ends_in_cr(const struct host_source *source)
  * its format needs that. */
 static int mend_line_ends(struct host_source *source,
                           const struct host_format *format,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     bool mends = ends_in_cr(source);
     if ((mends || !format->pieces) && host_source_hold(source, error) != 0) {
         return error->code;
@@ -101,8 +97,7 @@ static int mend_line_ends(struct host_source *source,
 
 static int take_points(struct host_source *source,
                        const struct host_format *format,
-                       struct host_points *points, struct host_error *error)
-{
+                       struct host_points *points, struct host_error *error) {
     struct host_mesh mesh = {.points = points};
     host_progress_phase("reading", "Mpoint");
     if (mend_line_ends(source, format, error) == 0) {
@@ -124,8 +119,7 @@ static int take_points(struct host_source *source,
 }
 
 int host_points_read_as(const char *path, const char *format,
-                        struct host_points *points, struct host_error *error)
-{
+                        struct host_points *points, struct host_error *error) {
     struct host_source source;
     *points = (struct host_points){0};
     const struct host_format *f =
@@ -140,13 +134,11 @@ int host_points_read_as(const char *path, const char *format,
 }
 
 int host_points_read(const char *path, struct host_points *points,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     return host_points_read_as(path, NULL, points, error);
 }
 
-void host_points_note(const char *path, const struct host_points *points)
-{
+void host_points_note(const char *path, const struct host_points *points) {
     const char *name = strcmp(path, "-") == 0 ? "stdin" : path;
     if (points->named) {
         host_note("%s: its first line is taken for names of columns", name);
@@ -162,8 +154,7 @@ void host_points_note(const char *path, const struct host_points *points)
 }
 
 int host_points_parse(const char *path, const void *data, size_t bytes,
-                      struct host_points *points, struct host_error *error)
-{
+                      struct host_points *points, struct host_error *error) {
     struct host_source source;
     *points = (struct host_points){0};
     const struct host_format *format =
@@ -178,8 +169,7 @@ int host_points_parse(const char *path, const void *data, size_t bytes,
 static const struct host_format *start(const char *path,
                                        struct host_tetrahedra *tets,
                                        struct host_points *points,
-                                       struct host_error *error)
-{
+                                       struct host_error *error) {
     *tets = (struct host_tetrahedra){0};
     if (points != NULL) {
         *points = (struct host_points){0};
@@ -190,8 +180,8 @@ static const struct host_format *start(const char *path,
 static int take_tetrahedra(struct host_source *source,
                            const struct host_format *format,
                            struct host_tetrahedra *tets,
-                           struct host_points *points, struct host_error *error)
-{
+                           struct host_points *points,
+                           struct host_error *error) {
     struct host_mesh mesh = {.points = points, .tets = tets};
     if (mend_line_ends(source, format, error) == 0) {
         format->read_tetrahedra(source, &mesh, error);
@@ -208,8 +198,7 @@ static int take_tetrahedra(struct host_source *source,
 }
 
 int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
-                         struct host_points *points, struct host_error *error)
-{
+                         struct host_points *points, struct host_error *error) {
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
@@ -221,8 +210,8 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
 
 int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
                           struct host_tetrahedra *tets,
-                          struct host_points *points, struct host_error *error)
-{
+                          struct host_points *points,
+                          struct host_error *error) {
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
@@ -233,8 +222,8 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
 }
 
 int host_rows_check(const char *path, const struct host_tetrahedra *tets,
-                    const struct host_points *points, struct host_error *error)
-{
+                    const struct host_points *points,
+                    struct host_error *error) {
     for (uint64_t i = 0; i < tets->count; i++) {
         for (int k = 0; k < 4; k++) {
             if (tets->v[i][k] >= points->count) {

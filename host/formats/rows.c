@@ -15,8 +15,7 @@ enum next { NEXT_FIELD, NEXT_EMPTY, NEXT_NONE };
 
 /* Goes to the next field of the line; one with more than `most` delimiters
  * before it comes after an empty one. */
-static enum next go_to_field(struct host_scan *s, unsigned most)
-{
+static enum next go_to_field(struct host_scan *s, unsigned most) {
     const char *c = s->at;
     for (unsigned delimiters = 0; c < s->end; c++) {
         if (*c == ',' || *c == ';') {
@@ -35,8 +34,7 @@ static enum next go_to_field(struct host_scan *s, unsigned most)
 }
 
 static int wrong_columns(struct host_scan *s, int columns, enum next next,
-                         bool first, struct host_error *error)
-{
+                         bool first, struct host_error *error) {
     static const char *const few[] = {
         "", "1 column where x, y and z are due; complete the line",
         "2 columns where x, y and z are due; complete the line"};
@@ -56,15 +54,13 @@ static int wrong_columns(struct host_scan *s, int columns, enum next next,
  * no whole number begins. */
 enum { COMMA_NONE = 1, COMMA_DECIMAL = 2, COMMA_ZERO = 4 };
 
-static bool is_digit(char c)
-{
+static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
 /* `to` is before `end`. */
 static unsigned commas_between(const char *from, const char *to,
-                               const char *end, bool coordinate)
-{
+                               const char *end, bool coordinate) {
     if (to - from > 1 || *from != ',') {
         return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
     }
@@ -80,8 +76,7 @@ enum commas { COMMAS_PART, COMMAS_DOUBTFUL, COMMAS_DECIMAL };
 /* For a line whose first comma is between two digits.  `1,2,3,4` may be either;
  * `1,5, 2,5, 3` is three numbers.  If a number is not whole, commas separate
  * columns. */
-static enum commas commas_of(const char *at, const char *end)
-{
+static enum commas commas_of(const char *at, const char *end) {
     unsigned alone = 0, other = 0;
     while (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
         const char *gap = at;
@@ -107,8 +102,7 @@ static enum commas commas_of(const char *at, const char *end)
 /* Checks a line of more than three numbers, the first of them at `line`; seen:
  * what is between the first three. */
 static int check_commas(struct host_scan *s, const char *line, unsigned seen,
-                        struct host_points *points, struct host_error *error)
-{
+                        struct host_points *points, struct host_error *error) {
     enum commas commas =
         (seen & COMMA_DECIMAL) == 0 ? COMMAS_PART : commas_of(line, s->end);
     if ((seen & COMMA_NONE) != 0 && (seen & COMMA_DECIMAL) != 0) {
@@ -131,8 +125,7 @@ static int check_commas(struct host_scan *s, const char *line, unsigned seen,
 }
 
 int host_take_point(struct host_scan *s, bool is_csv,
-                    struct host_points *points, struct host_error *error)
-{
+                    struct host_points *points, struct host_error *error) {
     double xyz[3];
     unsigned most = is_csv ? 1 : UINT_MAX, commas = 0;
     enum next next = NEXT_NONE;
@@ -167,8 +160,7 @@ int host_take_point(struct host_scan *s, bool is_csv,
 
 int host_take_element(struct host_mesh *mesh, const uint64_t number[4],
                       uint64_t base, const struct host_source *source,
-                      const struct host_scan *s, struct host_error *error)
-{
+                      const struct host_scan *s, struct host_error *error) {
     uint64_t v[4];
     for (int k = 0; k < 4; k++) {
         v[k] = number[k] - base;
@@ -183,8 +175,7 @@ int host_take_element(struct host_mesh *mesh, const uint64_t number[4],
                : host_append_tetrahedron(mesh->tets, v, source, error);
 }
 
-int host_take_section_end(struct host_scan *s, struct host_error *error)
-{
+int host_take_section_end(struct host_scan *s, struct host_error *error) {
     return !host_scan_skip_blank_lines(s) || *s->at == '$' ||
                    isalpha((unsigned char)*s->at)
                ? 0
@@ -195,8 +186,7 @@ int host_take_section_end(struct host_scan *s, struct host_error *error)
 }
 
 void host_put_line(struct host_output *out, const char *before, uint64_t number,
-                   const char *after)
-{
+                   const char *after) {
     host_output_text(out, before);
     host_output_unsigned(out, number);
     host_output_text(out, after);
@@ -223,8 +213,7 @@ struct decimals {
  * reads back.
  * With `places` such that 10^16 <= P 2^-s < 10^18, T is at most 10^22 and at
  * least 100, and P below 2^127. */
-static struct decimals decimals_of(double value)
-{
+static struct decimals decimals_of(double value) {
     int exponent;
     uint64_t m = (uint64_t)ldexp(frexp(value, &exponent), DBL_MANT_DIG);
     int s = DBL_MANT_DIG - exponent;
@@ -253,8 +242,7 @@ static struct decimals decimals_of(double value)
 
 /* The multiple of the largest power of ten that reads back, without its zeros:
  * the nearest one, of two the even one. */
-static uint64_t shortest(struct decimals *d)
-{
+static uint64_t shortest(struct decimals *d) {
     uint64_t unit = 1;
     while (d->most / (10 * unit) * (10 * unit) >= d->least) {
         unit *= 10;
@@ -269,8 +257,7 @@ static uint64_t shortest(struct decimals *d)
 }
 
 /* n 10^-places, of more than 0 places. */
-static size_t print_fixed(char *text, bool negative, uint64_t n, int places)
-{
+static size_t print_fixed(char *text, bool negative, uint64_t n, int places) {
     char digits[DOUBLE_BYTES];
     size_t at = sizeof digits;
     for (int i = 0; i < places || n > 0; i++, n /= 10) {
@@ -293,8 +280,7 @@ static size_t print_fixed(char *text, bool negative, uint64_t n, int places)
 /* By trial, with at most 17 digits.  Normal numbers are tried from 15 digits
  * on, as a shorter decimal is one of 15 digits that ends in zeros.  Some powers
  * of two get 17 digits where 16 that are not the nearest would do. */
-static size_t print_rare(char *text, double value)
-{
+static size_t print_rare(char *text, double value) {
     int n = 0, digits = fabs(value) < DBL_MIN ? 1 : DBL_DIG;
     do {
         n = snprintf(text, DOUBLE_BYTES, "%.*g", digits, value);
@@ -302,8 +288,7 @@ static size_t print_rare(char *text, double value)
     return (size_t)n;
 }
 
-static void put_double(struct host_output *out, double value)
-{
+static void put_double(struct host_output *out, double value) {
     char text[DOUBLE_BYTES];
     double size = fabs(value);
     if (size < fast_most && size == floor(size)) {
@@ -324,8 +309,7 @@ static void put_double(struct host_output *out, double value)
     host_output_bytes(out, text, n);
 }
 
-void host_put_xyz(struct host_output *out, const double *xyz)
-{
+void host_put_xyz(struct host_output *out, const double *xyz) {
     for (int d = 0; d < 3; d++) {
         put_double(out, xyz[d] + 0.0);
         if (d < 2) {
@@ -335,8 +319,7 @@ void host_put_xyz(struct host_output *out, const double *xyz)
 }
 
 void host_put_row(struct host_output *out, const uint32_t *v, int n,
-                  uint64_t base)
-{
+                  uint64_t base) {
     for (int k = 0; k < n; k++) {
         host_output_text(out, " ");
         host_output_unsigned(out, v[k] + base);
@@ -344,8 +327,7 @@ void host_put_row(struct host_output *out, const uint32_t *v, int n,
 }
 
 void host_put_points(struct host_output *out, const struct host_points *points,
-                     const char *separator, bool numbered)
-{
+                     const char *separator, bool numbered) {
     for (uint64_t i = 0; i < points->count; i++) {
         if (numbered) {
             host_output_unsigned(out, i + points->base);

@@ -7,8 +7,7 @@
 #include <strings.h>
 
 struct host_scan host_scan_start(const char *path, const void *data,
-                                 size_t bytes)
-{
+                                 size_t bytes) {
     const char *text = data;
     struct host_scan s = {path, text, text, text + bytes, 0, NULL, NULL};
     if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
@@ -18,8 +17,7 @@ struct host_scan host_scan_start(const char *path, const void *data,
 }
 
 /* Unpacks until the current line is whole, or the file has ended. */
-static void fill(struct host_scan *s)
-{
+static void fill(struct host_scan *s) {
     const uint8_t *at = (const uint8_t *)s->at, *end = (const uint8_t *)s->end;
     const char *last = NULL;
     for (const char *c = s->start; c < s->at; c++) {
@@ -36,8 +34,7 @@ static void fill(struct host_scan *s)
     }
 }
 
-struct host_scan host_scan_source(const struct host_source *source)
-{
+struct host_scan host_scan_source(const struct host_source *source) {
     struct host_scan s =
         host_scan_start(source->path, source->data, source->bytes);
     if (source->feed != NULL) {
@@ -51,28 +48,23 @@ struct host_scan host_scan_source(const struct host_source *source)
     return s;
 }
 
-static bool is_blank(char c)
-{
+static bool is_blank(char c) {
     return c == ' ' || c == '\t' || c == '\r' || c == ',' || c == ';';
 }
 
-static bool is_end(char c)
-{
+static bool is_end(char c) {
     return c == '\n' || c == '#';
 }
 
-static bool is_digit(char c)
-{
+static bool is_digit(char c) {
     return c >= '0' && c <= '9';
 }
 
-bool host_scan_is_comment(const char *at, const char *end)
-{
+bool host_scan_is_comment(const char *at, const char *end) {
     return *at == '#' || (*at == '/' && end - at > 1 && at[1] == '/');
 }
 
-bool host_scan_more(struct host_scan *s)
-{
+bool host_scan_more(struct host_scan *s) {
     while (s->at < s->end && is_blank(*s->at)) {
         s->at++;
     }
@@ -80,8 +72,7 @@ bool host_scan_more(struct host_scan *s)
            !host_scan_is_comment(s->at, s->end);
 }
 
-void host_scan_next_line(struct host_scan *s)
-{
+void host_scan_next_line(struct host_scan *s) {
     const char *line = memchr(s->at, '\n', (size_t)(s->end - s->at));
     s->at = line == NULL ? s->end : line + 1;
     if (s->source != NULL && s->at >= s->whole) {
@@ -89,8 +80,7 @@ void host_scan_next_line(struct host_scan *s)
     }
 }
 
-bool host_scan_skip_blank_lines(struct host_scan *s)
-{
+bool host_scan_skip_blank_lines(struct host_scan *s) {
     while (!host_scan_more(s)) {
         if (s->at == s->end) {
             return false;
@@ -101,8 +91,7 @@ bool host_scan_skip_blank_lines(struct host_scan *s)
 }
 
 int host_scan_fail(const struct host_scan *s, const char *at,
-                   struct host_error *error, const char *what)
-{
+                   struct host_error *error, const char *what) {
     uint64_t line = s->lines_before + 1;
     const char *begin = s->start;
     for (const char *c = s->start; c < at; c++) {
@@ -117,8 +106,7 @@ int host_scan_fail(const struct host_scan *s, const char *at,
 }
 
 int host_scan_end(struct host_scan *s, struct host_error *error,
-                  const char *what)
-{
+                  const char *what) {
     return host_scan_skip_blank_lines(s) ? host_scan_fail(s, s->at, error, what)
                                          : 0;
 }
@@ -148,8 +136,7 @@ static const uint64_t power10[20] = {1,
 
 /* The double nearest to (q + a bit more if `sticky`) * 2^exponent, ties to
  * even; the result is a normal number by the ranges of the caller. */
-static double rounded(uint64_t q, bool sticky, int exponent)
-{
+static double rounded(uint64_t q, bool sticky, int exponent) {
     int shift = 11 - __builtin_clzll(q);
     if (shift <= 0) {
         return ldexp((double)q, exponent); /* 53 bits or fewer; sticky = 0 */
@@ -165,8 +152,7 @@ static double rounded(uint64_t q, bool sticky, int exponent)
 
 /* m * 10^power, exactly rounded, for 0 < m and |power| <= 19: products and
  * quotients of 64-bit integers are exact in 128 bits. */
-static double scaled(uint64_t m, int power)
-{
+static double scaled(uint64_t m, int power) {
     if (m <= UINT64_C(1) << 53 && power >= -19 && power <= 19) {
         /* Both are exact doubles (10^19 = 5^19 * 2^19): one rounding. */
         return power < 0 ? (double)m / (double)power10[-power]
@@ -192,8 +178,7 @@ static double scaled(uint64_t m, int power)
 
 /* The slow way: a copy, since the text need not end and may hold Fortran's D
  * for E. */
-static double slow_double(const char *first, const char *last)
-{
+static double slow_double(const char *first, const char *last) {
     char buffer[512];
     size_t n = (size_t)(last - first);
     char *copy = n < sizeof buffer ? buffer : malloc(n + 1);
@@ -221,8 +206,7 @@ struct decimal {
 };
 
 static const char *take_digits(const char *c, const char *end,
-                               struct decimal *n, int *taken)
-{
+                               struct decimal *n, int *taken) {
     while (c < end && is_digit(*c)) {
         if (*taken < 19) {
             n->mantissa = 10 * n->mantissa + (uint64_t)(*c - '0');
@@ -235,8 +219,7 @@ static const char *take_digits(const char *c, const char *end,
     return c;
 }
 
-static struct decimal parse_decimal(const char *c, const char *end)
-{
+static struct decimal parse_decimal(const char *c, const char *end) {
     struct decimal n = {.exact = true};
     if (c < end && (*c == '-' || *c == '+')) {
         n.negative = *c++ == '-';
@@ -276,8 +259,7 @@ static struct decimal parse_decimal(const char *c, const char *end)
 static size_t word_length(struct host_scan *s);
 
 /* Whether the word at hand has a NUL byte in it, which no text has. */
-static bool is_binary(struct host_scan *s, struct host_error *error)
-{
+static bool is_binary(struct host_scan *s, struct host_error *error) {
     size_t n = word_length(s);
     const char *nul = n > 0 ? memchr(s->at, '\0', n) : NULL;
     if (nul == NULL) {
@@ -290,8 +272,7 @@ static bool is_binary(struct host_scan *s, struct host_error *error)
     return true;
 }
 
-static int no_number(struct host_scan *s, struct host_error *error)
-{
+static int no_number(struct host_scan *s, struct host_error *error) {
     char word[48], text[160];
     const char *at = s->at;
     if (is_binary(s, error)) {
@@ -319,8 +300,7 @@ static int no_number(struct host_scan *s, struct host_error *error)
 }
 
 int host_scan_double(struct host_scan *s, double *value,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (!host_scan_more(s)) {
         return host_scan_fail(s, s->at, error,
                               "the line ends where a number is due; complete "
@@ -347,8 +327,7 @@ int host_scan_double(struct host_scan *s, double *value,
 }
 
 int host_scan_double_anywhere(struct host_scan *s, double *value,
-                              struct host_error *error)
-{
+                              struct host_error *error) {
     if (!host_scan_skip_blank_lines(s)) {
         return host_scan_fail(s, s->at, error,
                               "the file ends where a number is due; it is cut "
@@ -358,8 +337,7 @@ int host_scan_double_anywhere(struct host_scan *s, double *value,
 }
 
 int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     if (!host_scan_skip_blank_lines(s)) {
         return host_scan_fail(s, s->at, error,
                               "the file ends where a whole number is due; it "
@@ -389,8 +367,7 @@ int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
 
 /* --- Words ------------------------------------------------------------ */
 
-static size_t word_length(struct host_scan *s)
-{
+static size_t word_length(struct host_scan *s) {
     if (!host_scan_more(s)) {
         return 0;
     }
@@ -401,8 +378,7 @@ static size_t word_length(struct host_scan *s)
     return (size_t)(c - s->at);
 }
 
-void host_scan_word(struct host_scan *s, char *word, size_t size)
-{
+void host_scan_word(struct host_scan *s, char *word, size_t size) {
     size_t n = word_length(s);
     size_t kept = n < size ? n : size - 1;
     memcpy(word, s->at, kept);
@@ -410,8 +386,7 @@ void host_scan_word(struct host_scan *s, char *word, size_t size)
     s->at += n;
 }
 
-bool host_scan_take(struct host_scan *s, const char *word)
-{
+bool host_scan_take(struct host_scan *s, const char *word) {
     size_t n = word_length(s);
     if (n != strlen(word) || strncasecmp(s->at, word, n) != 0) {
         return false;

@@ -14,8 +14,7 @@ enum {
 };
 
 static int read_binary(const struct host_source *source, uint64_t facets,
-                       struct host_points *points, struct host_error *error)
-{
+                       struct host_points *points, struct host_error *error) {
     const uint8_t *facet = source->data + START_BYTES;
     for (; facets > 0; facets--, facet += FACET_BYTES) {
         if (host_append_numbers(points, facet + NORMAL_BYTES, 3, CORNER_BYTES,
@@ -29,8 +28,7 @@ static int read_binary(const struct host_source *source, uint64_t facets,
 /* --- text ----------------------------------------------------------------- */
 
 static int expect(struct host_scan *s, const char *word, const char *otherwise,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     return host_scan_skip_blank_lines(s) && host_scan_take(s, word)
                ? 0
                : host_scan_fail(s, s->at, error, otherwise);
@@ -38,8 +36,7 @@ static int expect(struct host_scan *s, const char *word, const char *otherwise,
 
 /* Behind the word "facet".  A normal may be anything, also NaN. */
 static int take_facet(struct host_scan *s, struct host_points *points,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     char word[8];
     double xyz[3];
     int status = expect(s, "normal", "'normal' is due; correct it", error);
@@ -74,8 +71,7 @@ static int take_facet(struct host_scan *s, struct host_points *points,
 }
 
 static int read_text(struct host_scan s, struct host_points *points,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     bool open = false;
     while (host_scan_skip_blank_lines(&s)) {
         if (host_scan_take(&s, "solid") || host_scan_take(&s, "endsolid")) {
@@ -97,8 +93,7 @@ static int read_text(struct host_scan s, struct host_points *points,
 /* --- either --------------------------------------------------------------- */
 
 static int read_stl(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     uint64_t facets = 0;
     bool whole = source->bytes >= START_BYTES;
     if (whole) {

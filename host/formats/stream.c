@@ -1,15 +1,13 @@
 #include "stream.h"
 
-static int at_end(const struct host_stream *s, struct host_error *error)
-{
+static int at_end(const struct host_stream *s, struct host_error *error) {
     return host_source_fail(s->source, error,
                             "the file ends within its numbers; it is cut "
                             "short, get it whole");
 }
 
 int host_stream_next(struct host_stream *s, double *value,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (s->text) {
         return host_scan_double_anywhere(&s->scan, value, error);
     }
@@ -23,8 +21,7 @@ int host_stream_next(struct host_stream *s, double *value,
 }
 
 int host_stream_whole(struct host_stream *s, uint64_t *value,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     if (s->text) {
         return host_scan_unsigned(&s->scan, UINT64_MAX - 1, value, error);
     }
@@ -42,8 +39,7 @@ int host_stream_whole(struct host_stream *s, uint64_t *value,
 }
 
 int host_stream_skip(struct host_stream *s, uint64_t count,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (s->text) {
         double skipped;
         for (; count > 0; count--) {
@@ -61,14 +57,12 @@ int host_stream_skip(struct host_stream *s, uint64_t count,
     return 0;
 }
 
-bool host_stream_ended(struct host_stream *s)
-{
+bool host_stream_ended(struct host_stream *s) {
     return s->text ? !host_scan_skip_blank_lines(&s->scan) : s->at == s->end;
 }
 
 int host_stream_points(struct host_stream *s, uint64_t rows,
-                       struct host_points *points, struct host_error *error)
-{
+                       struct host_points *points, struct host_error *error) {
     if (!s->text) {
         size_t row = 3 * host_number_bytes(s->type);
         if ((size_t)(s->end - s->at) / row < rows) {
@@ -98,8 +92,7 @@ enum { VTK_QUAD = 9, VTK_TETRA = 10 };
 
 static int take_cell(struct host_stream *connectivity, uint64_t size,
                      uint64_t type, uint64_t first,
-                     struct host_tetrahedra *tets, struct host_error *error)
-{
+                     struct host_tetrahedra *tets, struct host_error *error) {
     if (type <= VTK_QUAD) { /* as numbered, all cells without volume */
         return host_stream_skip(connectivity, size, error);
     }
@@ -124,8 +117,7 @@ static int take_cell(struct host_stream *connectivity, uint64_t size,
 int host_stream_cells(struct host_stream *connectivity,
                       struct host_stream *offsets, struct host_stream *types,
                       uint64_t cells, uint64_t first,
-                      struct host_tetrahedra *tets, struct host_error *error)
-{
+                      struct host_tetrahedra *tets, struct host_error *error) {
     uint64_t from = 0;
     for (; cells > 0; cells--) {
         uint64_t type = 0, size = 0;

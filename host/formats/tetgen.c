@@ -11,8 +11,7 @@
 /* --- .node ------------------------------------------------------------ */
 
 static int read_node(const struct host_source *source, struct host_mesh *mesh,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     uint64_t count, dimensions, base = 0;
     if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
@@ -54,16 +53,14 @@ static int read_node(const struct host_source *source, struct host_mesh *mesh,
 }
 
 static void write_node(struct host_output *out,
-                       const struct host_points *points)
-{
+                       const struct host_points *points) {
     host_put_line(out, "", points->count, " 3 0 0\n");
     host_put_points(out, points, " ", true);
 }
 
 /* Beside an .ele, where -0.0 is 0.0. */
 static void write_node_beside(struct host_output *out,
-                              const struct host_points *points)
-{
+                              const struct host_points *points) {
     host_put_line(out, "", points->count, " 3 0 0\n");
     for (uint64_t i = 0; i < points->count; i++) {
         host_put_line(out, "", i + points->base, " ");
@@ -86,8 +83,7 @@ struct neighbours {
     uint64_t hull_facets;
 };
 
-static uint32_t twin(const struct host_group *group, size_t i)
-{
+static uint32_t twin(const struct host_group *group, size_t i) {
     const struct host_facet *f = group->facet;
     if (i > 0 && f[i - 1].others == f[i].others) {
         return f[i - 1].tet;
@@ -98,8 +94,7 @@ static uint32_t twin(const struct host_group *group, size_t i)
     return UINT32_MAX;
 }
 
-static int first_sweep(struct neighbours *n, struct host_error *error)
-{
+static int first_sweep(struct neighbours *n, struct host_error *error) {
     for (uint32_t p = 0; p < n->adjacency.vertices; p++) {
         if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0) {
             return error->code;
@@ -117,8 +112,7 @@ static int first_sweep(struct neighbours *n, struct host_error *error)
 }
 
 static int second_group(struct neighbours *n, uint32_t p,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     uint32_t first = n->adjacency.first_by_lowest[p];
     size_t count = n->adjacency.first_by_lowest[p + 1] - first;
     if (n->capacity < count) {
@@ -146,8 +140,7 @@ static int second_group(struct neighbours *n, uint32_t p,
 
 static void write_neighbours(struct host_output *neigh,
                              struct host_output *face, struct neighbours *n,
-                             uint32_t p, uint64_t base, uint64_t *facets)
-{
+                             uint32_t p, uint64_t base, uint64_t *facets) {
     uint32_t i = n->adjacency.first_by_lowest[p];
     uint32_t first = i, end = n->adjacency.first_by_lowest[p + 1];
     for (; i < end; i++) {
@@ -174,8 +167,7 @@ static void write_neighbours(struct host_output *neigh,
 static int write_topology(struct host_output *neigh, struct host_output *face,
                           const struct host_points *points,
                           const struct host_tetrahedra *tets,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct neighbours n = {.capacity = 0};
     size_t bytes = (size_t)tets->count * sizeof(uint32_t);
     n.opposite_lowest = host_map(bytes);
@@ -204,8 +196,7 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
 /* --- .ele ------------------------------------------------------------- */
 
 static int read_ele(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     uint64_t count, corners, base = 0;
     if (host_scan_unsigned(&s, UINT64_MAX / 64, &count, error) != 0 ||
@@ -252,8 +243,7 @@ static int read_ele(const struct host_source *source, struct host_mesh *mesh,
 static int write_ele(struct host_output *out, struct host_output *beside,
                      const struct host_points *points,
                      const struct host_tetrahedra *tets,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     enum { NODE, NEIGH, FACE };
     if (beside != NULL) {
         if (beside[NODE].file >= 0) {

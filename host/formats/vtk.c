@@ -32,14 +32,13 @@ struct vtk {
     struct host_stream offsets, connectivity, types;
 };
 
-static int damaged(struct vtk *vtk, struct host_error *error, const char *what)
-{
+static int damaged(struct vtk *vtk, struct host_error *error,
+                   const char *what) {
     return host_scan_fail(&vtk->scan, vtk->scan.at, error, what);
 }
 
 static int take_type(struct vtk *vtk, enum host_number *type,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     char word[64];
     host_scan_word(&vtk->scan, word, sizeof word);
     *type = host_number_named(word);
@@ -50,8 +49,7 @@ static int take_type(struct vtk *vtk, enum host_number *type,
 }
 
 /* The numbers that begin on the next line. */
-static struct host_stream open_stream(struct vtk *vtk, enum host_number type)
-{
+static struct host_stream open_stream(struct vtk *vtk, enum host_number type) {
     host_scan_next_line(&vtk->scan);
     return (struct host_stream){.source = vtk->source,
                                 .text = !vtk->binary,
@@ -62,14 +60,12 @@ static struct host_stream open_stream(struct vtk *vtk, enum host_number type)
                                 .end = (const uint8_t *)vtk->scan.end};
 }
 
-static void close_stream(struct vtk *vtk, const struct host_stream *s)
-{
+static void close_stream(struct vtk *vtk, const struct host_stream *s) {
     vtk->scan.at = s->text ? s->scan.at : (const char *)s->at;
 }
 
 static int skip_numbers(struct vtk *vtk, enum host_number type, uint64_t count,
-                        struct host_stream *start, struct host_error *error)
-{
+                        struct host_stream *start, struct host_error *error) {
     struct host_stream s = open_stream(vtk, type);
     if (start != NULL) {
         *start = s;
@@ -80,8 +76,7 @@ static int skip_numbers(struct vtk *vtk, enum host_number type, uint64_t count,
     return error->code;
 }
 
-static int take_three(struct vtk *vtk, double v[3], struct host_error *error)
-{
+static int take_three(struct vtk *vtk, double v[3], struct host_error *error) {
     for (int d = 0; d < 3; d++) {
         if (host_scan_double(&vtk->scan, &v[d], error) != 0) {
             return error->code;
@@ -90,8 +85,7 @@ static int take_three(struct vtk *vtk, double v[3], struct host_error *error)
     return 0;
 }
 
-static int take_dimensions(struct vtk *vtk, struct host_error *error)
-{
+static int take_dimensions(struct vtk *vtk, struct host_error *error) {
     for (int d = 0; d < 3; d++) {
         if (host_scan_unsigned(&vtk->scan, UINT32_MAX - 1, &vtk->dimension[d],
                                error) != 0) {
@@ -103,8 +97,7 @@ static int take_dimensions(struct vtk *vtk, struct host_error *error)
 }
 
 /* What follows numbers is a keyword, or the file's end. */
-static int check_keyword(struct vtk *vtk, struct host_error *error)
-{
+static int check_keyword(struct vtk *vtk, struct host_error *error) {
     if (!host_scan_skip_blank_lines(&vtk->scan)) {
         return 0;
     }
@@ -120,8 +113,7 @@ static int check_keyword(struct vtk *vtk, struct host_error *error)
                          "their number");
 }
 
-static int take_points(struct vtk *vtk, struct host_error *error)
-{
+static int take_points(struct vtk *vtk, struct host_error *error) {
     uint64_t count;
     enum host_number type;
     if (host_scan_unsigned(&vtk->scan, UINT32_MAX - 1, &count, error) != 0 ||
@@ -140,8 +132,7 @@ static int take_points(struct vtk *vtk, struct host_error *error)
     return code;
 }
 
-static int take_axis(struct vtk *vtk, int d, struct host_error *error)
-{
+static int take_axis(struct vtk *vtk, int d, struct host_error *error) {
     uint64_t count;
     enum host_number type;
     if (host_scan_unsigned(&vtk->scan, vtk->source->bytes, &count, error) !=
@@ -169,8 +160,7 @@ static int take_axis(struct vtk *vtk, int d, struct host_error *error)
 
 /* The places of a grid along one axis, as they are or made from its spacing. */
 static int fill_axis(struct vtk *vtk, int d, uint64_t count,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (vtk->axis[d] != NULL) {
         return 0;
     }
@@ -186,8 +176,7 @@ static int fill_axis(struct vtk *vtk, int d, uint64_t count,
 }
 
 static int append_grid(struct vtk *vtk, const uint64_t n[3],
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     uint64_t points = n[0];
     for (int d = 1; d < 3 && points != 0; d++) {
         points = n[d] > grid_max / points ? grid_max + 1 : points * n[d];
@@ -221,8 +210,7 @@ static int append_grid(struct vtk *vtk, const uint64_t n[3],
 }
 
 /* Points of data sets that do not list them. */
-static int implied_points(struct vtk *vtk, struct host_error *error)
-{
+static int implied_points(struct vtk *vtk, struct host_error *error) {
     if (vtk->axis[0] != NULL && vtk->axis[1] != NULL && vtk->axis[2] != NULL) {
         uint64_t n[3] = {vtk->axis_count[0], vtk->axis_count[1],
                          vtk->axis_count[2]};
@@ -241,8 +229,7 @@ static int implied_points(struct vtk *vtk, struct host_error *error)
                             "POINTS, or a grid");
 }
 
-static int take_cells(struct vtk *vtk, struct host_error *error)
-{
+static int take_cells(struct vtk *vtk, struct host_error *error) {
     uint64_t count, size;
     enum host_number type = HOST_I32;
     if (host_scan_unsigned(&vtk->scan, UINT64_MAX / 64, &count, error) != 0 ||
@@ -273,8 +260,7 @@ static int take_cells(struct vtk *vtk, struct host_error *error)
                : skip_numbers(vtk, type, size, &vtk->connectivity, error);
 }
 
-static int take_cell_types(struct vtk *vtk, struct host_error *error)
-{
+static int take_cell_types(struct vtk *vtk, struct host_error *error) {
     uint64_t count;
     if (host_scan_unsigned(&vtk->scan, UINT64_MAX / 64, &count, error) != 0) {
         return error->code;
@@ -288,8 +274,7 @@ static int take_cell_types(struct vtk *vtk, struct host_error *error)
     return skip_numbers(vtk, HOST_I32, count, &vtk->types, error);
 }
 
-static int append_cells(struct vtk *vtk, struct host_error *error)
-{
+static int append_cells(struct vtk *vtk, struct host_error *error) {
     if (!vtk->has_types) {
         return host_source_fail(vtk->source, error,
                                 "there are no cells; give an unstructured "
@@ -307,8 +292,7 @@ static int append_cells(struct vtk *vtk, struct host_error *error)
 
 /* VERTICES and the like (only counted past), FIELD arrays, METADATA. */
 static int skip_section(struct vtk *vtk, const char *word,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     uint64_t count, size, tuples;
     enum host_number type;
     if (strcasecmp(word, "FIELD") == 0) {
@@ -342,8 +326,7 @@ static int skip_section(struct vtk *vtk, const char *word,
     return damaged(vtk, error, "this keyword is not known here; correct it");
 }
 
-static int take_section(struct vtk *vtk, bool *done, struct host_error *error)
-{
+static int take_section(struct vtk *vtk, bool *done, struct host_error *error) {
     static const char *const axes[] = {"X_COORDINATES", "Y_COORDINATES",
                                        "Z_COORDINATES"};
     struct host_scan *s = &vtk->scan;
@@ -390,8 +373,7 @@ static int take_section(struct vtk *vtk, bool *done, struct host_error *error)
     return skip_section(vtk, word, error);
 }
 
-static int read_header(struct vtk *vtk, struct host_error *error)
-{
+static int read_header(struct vtk *vtk, struct host_error *error) {
     struct host_scan *s = &vtk->scan;
     if (vtk->source->bytes < 5 || memcmp(s->start, "# vtk", 5) != 0) {
         return damaged(vtk, error,
@@ -407,8 +389,7 @@ static int read_header(struct vtk *vtk, struct host_error *error)
     return 0;
 }
 
-static int read_sections(struct vtk *vtk, struct host_error *error)
-{
+static int read_sections(struct vtk *vtk, struct host_error *error) {
     bool done = false;
     while (!done && host_scan_skip_blank_lines(&vtk->scan)) {
         if (take_section(vtk, &done, error) != 0) {
@@ -425,8 +406,7 @@ static int read_sections(struct vtk *vtk, struct host_error *error)
 }
 
 static int read_vtk(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct vtk vtk = {
         .source = source,
         .mesh = mesh,
@@ -442,8 +422,7 @@ static int read_vtk(const struct host_source *source, struct host_mesh *mesh,
 }
 
 static void write_points(struct host_output *out,
-                         const struct host_points *points)
-{
+                         const struct host_points *points) {
     host_put_line(out,
                   "# vtk DataFile Version 3.0\nincode\nBINARY\n"
                   "DATASET POLYDATA\nPOINTS ",
@@ -457,8 +436,7 @@ static void write_points(struct host_output *out,
 static int write_tetrahedra(struct host_output *out, struct host_output *beside,
                             const struct host_points *points,
                             const struct host_tetrahedra *tets,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     (void)beside;
     char text[160];
     if (points->count > INT32_MAX) {

@@ -9,23 +9,20 @@
 /* A deflated byte holds at most 1,032 (zlib's own figure). */
 enum { INFLATION_MAX = 1032 };
 
-void vtk_array_free(struct vtk_array *array)
-{
+void vtk_array_free(struct vtk_array *array) {
     host_unmap(array->data, array->capacity);
     *array = (struct vtk_array){0};
 }
 
 static int reserve(struct vtk_array *array, size_t bytes,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     array->data = host_map(bytes);
     array->capacity = bytes;
     array->bytes = 0;
     return array->data == NULL ? host_fail_memory(error, "an array") : 0;
 }
 
-static int value_of(uint8_t c)
-{
+static int value_of(uint8_t c) {
     return c >= 'A' && c <= 'Z'   ? c - 'A'
            : c >= 'a' && c <= 'z' ? c - 'a' + 26
            : c >= '0' && c <= '9' ? c - '0' + 52
@@ -37,8 +34,7 @@ static int value_of(uint8_t c)
 /* Decodes until `most` bytes are out or something that is not base64 comes.
  * Padding may stand in the middle: writers encode headers by themselves. */
 static size_t decode(const uint8_t *from, size_t bytes, uint8_t *to,
-                     size_t most)
-{
+                     size_t most) {
     size_t done = 0;
     uint32_t bits = 0;
     int count = 0, padding = 0;
@@ -73,8 +69,7 @@ struct packed {
 
 /* The first `most` bytes of what is packed, decoded. */
 static int plain(struct vtk_array *out, const struct packed *p, size_t most,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     size_t limit = p->bytes;
     if (reserve(out, most < limit ? most : limit, error) != 0) {
         return error->code;
@@ -94,15 +89,13 @@ static int plain(struct vtk_array *out, const struct packed *p, size_t most,
 }
 
 static uint64_t header_word(const struct vtk_array *a, size_t i,
-                            const struct vtk_coding *coding)
-{
+                            const struct vtk_coding *coding) {
     enum host_number type = coding->wide_header ? HOST_U64 : HOST_U32;
     return host_whole_at(a->data + i * host_number_bytes(type), type,
                          coding->big);
 }
 
-static int damaged(const struct packed *p, struct host_error *error)
-{
+static int damaged(const struct packed *p, struct host_error *error) {
     return host_source_fail(p->source, error,
                             "a packed array is damaged; get the file again");
 }
@@ -110,8 +103,7 @@ static int damaged(const struct packed *p, struct host_error *error)
 static int inflate_blocks(struct vtk_array *out, const struct packed *p,
                           const struct vtk_array *head,
                           const struct vtk_array *in, uint64_t blocks,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     uint64_t size = header_word(head, 1, p->coding);
     uint64_t last = header_word(head, 2, p->coding);
     size_t at = head->bytes;
@@ -134,8 +126,7 @@ static int inflate_blocks(struct vtk_array *out, const struct packed *p,
 /* Header: blocks, bytes a block, bytes of a last partial block, then the
  * packed bytes of each. */
 static int unpack_blocks(struct vtk_array *out, const struct packed *p,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     size_t word = p->coding->wide_header ? 8 : 4;
     struct vtk_array head = {0}, in = {0};
     uint64_t blocks = 0, packed = 0;
@@ -169,8 +160,7 @@ static int unpack_blocks(struct vtk_array *out, const struct packed *p,
 }
 
 static int unpack_plain(struct vtk_array *out, const struct packed *p,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     size_t word = p->coding->wide_header ? 8 : 4;
     struct vtk_array head = {0};
     uint64_t bytes = 0;
@@ -190,8 +180,7 @@ static int unpack_plain(struct vtk_array *out, const struct packed *p,
 
 int vtk_array_unpack(struct vtk_array *array, const struct host_source *source,
                      const struct vtk_coding *coding, const uint8_t *from,
-                     size_t bytes, struct host_error *error)
-{
+                     size_t bytes, struct host_error *error) {
     struct packed p = {source, coding, from, bytes};
     if (coding->base64) { /* leading blanks of inline data */
         while (p.bytes > 0 && (*p.from == ' ' || *p.from == '\n' ||

@@ -43,8 +43,7 @@ struct xml {
     struct array array[WANTS];
 };
 
-static void fail(struct xml *x, const char *what)
-{
+static void fail(struct xml *x, const char *what) {
     if (x->error->code == 0) {
         host_fail(x->error, HOST_INPUT, "%s:%llu: %s", x->source->path,
                   (unsigned long long)XML_GetCurrentLineNumber(x->parser),
@@ -52,8 +51,7 @@ static void fail(struct xml *x, const char *what)
     }
 }
 
-static const char *attribute(const char **attributes, const char *name)
-{
+static const char *attribute(const char **attributes, const char *name) {
     for (; *attributes != NULL; attributes += 2) {
         if (strcmp(attributes[0], name) == 0) {
             return attributes[1];
@@ -62,8 +60,7 @@ static const char *attribute(const char **attributes, const char *name)
     return "";
 }
 
-static void start_file(struct xml *x, const char **attributes)
-{
+static void start_file(struct xml *x, const char **attributes) {
     const char *compressor = attribute(attributes, "compressor");
     x->coding.big =
         strcmp(attribute(attributes, "byte_order"), "BigEndian") == 0;
@@ -77,8 +74,7 @@ static void start_file(struct xml *x, const char **attributes)
 }
 
 static void unpack(struct xml *x, enum want want, bool base64,
-                   const uint8_t *from, size_t bytes)
-{
+                   const uint8_t *from, size_t bytes) {
     struct vtk_coding coding = x->coding;
     coding.base64 = base64;
     if (x->error->code == 0) {
@@ -87,8 +83,7 @@ static void unpack(struct xml *x, enum want want, bool base64,
     }
 }
 
-static void start_array(struct xml *x, const char **attributes)
-{
+static void start_array(struct xml *x, const char **attributes) {
     static const char *const names[] = {"", "connectivity", "offsets", "types"};
     const char *name = attribute(attributes, "Name");
     const char *format = attribute(attributes, "format");
@@ -135,8 +130,7 @@ static void start_array(struct xml *x, const char **attributes)
 }
 
 /* A piece of a structured grid tells its points by their extent. */
-static void start_piece(struct xml *x, const char **attributes)
-{
+static void start_piece(struct xml *x, const char **attributes) {
     const char *points = attribute(attributes, "NumberOfPoints");
     const char *extent = attribute(attributes, "Extent");
     int e[6];
@@ -160,8 +154,7 @@ static void start_piece(struct xml *x, const char **attributes)
 }
 
 static void XMLCALL start_element(void *context, const char *name,
-                                  const char **attributes)
-{
+                                  const char **attributes) {
     struct xml *x = context;
     if (x->reading != WANTS) {
         x->nested++; /* information about the array: not its text */
@@ -178,8 +171,7 @@ static void XMLCALL start_element(void *context, const char *name,
     }
 }
 
-static void XMLCALL characters(void *context, const char *text, int length)
-{
+static void XMLCALL characters(void *context, const char *text, int length) {
     struct xml *x = context;
     size_t n = (size_t)length;
     if (x->reading == WANTS || x->nested > 0 || x->error->code != 0) {
@@ -203,8 +195,7 @@ static void XMLCALL characters(void *context, const char *text, int length)
     x->text_bytes += n;
 }
 
-static void end_array(struct xml *x)
-{
+static void end_array(struct xml *x) {
     struct array *a = &x->array[x->reading];
     if (x->reading_base64) {
         unpack(x, x->reading, true, (const uint8_t *)x->text, x->text_bytes);
@@ -217,8 +208,7 @@ static void end_array(struct xml *x)
     x->reading = WANTS;
 }
 
-static struct host_stream stream_of(struct xml *x, enum want want)
-{
+static struct host_stream stream_of(struct xml *x, enum want want) {
     static const char blank[] = " ";
     struct array *a = &x->array[want];
     const void *data = a->bytes.data != NULL ? (void *)a->bytes.data : blank;
@@ -233,8 +223,7 @@ static struct host_stream stream_of(struct xml *x, enum want want)
     return s;
 }
 
-static void piece_points(struct xml *x)
-{
+static void piece_points(struct xml *x) {
     struct array *a = &x->array[POINTS];
     if (x->mesh->points == NULL || (!a->there && x->piece_points == 0)) {
         return;
@@ -267,8 +256,7 @@ static void piece_points(struct xml *x)
     }
 }
 
-static void end_piece(struct xml *x)
-{
+static void end_piece(struct xml *x) {
     uint64_t first = x->points_before;
     x->in_piece = false;
     x->points_before += x->piece_points;
@@ -304,8 +292,7 @@ static void end_piece(struct xml *x)
     }
 }
 
-static void XMLCALL end_element(void *context, const char *name)
-{
+static void XMLCALL end_element(void *context, const char *name) {
     struct xml *x = context;
     if (x->nested > 0) {
         x->nested--;
@@ -322,8 +309,7 @@ static void XMLCALL end_element(void *context, const char *name)
 
 /* Finds the appended data, which need not be XML, and returns how many bytes
  * come before it. */
-static size_t find_appended(struct xml *x)
-{
+static size_t find_appended(struct xml *x) {
     const char *begin = (const char *)x->source->data;
     size_t bytes = x->source->bytes;
     const char *tag = memmem(begin, bytes, "<AppendedData", 13);
@@ -343,8 +329,7 @@ static size_t find_appended(struct xml *x)
     return (size_t)(tag - begin);
 }
 
-static void parse(struct xml *x, size_t bytes)
-{
+static void parse(struct xml *x, size_t bytes) {
     const char *at = (const char *)x->source->data;
     bool whole = bytes == x->source->bytes; /* else appended data follows */
     XML_SetUserData(x->parser, x);
@@ -372,8 +357,7 @@ static void parse(struct xml *x, size_t bytes)
 }
 
 static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct xml x = {.source = source,
                     .mesh = mesh,
                     .error = error,
@@ -394,8 +378,7 @@ static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
 /* .vtu and .vtp: one cell a point, so that ParaView shows them. */
 static void write_cells_of_points(struct host_output *out,
                                   const struct host_points *points,
-                                  bool polydata)
-{
+                                  bool polydata) {
     uint64_t n = points->count;
     host_output_text(out, "<?xml version=\"1.0\"?>\n<VTKFile type=\"");
     host_output_text(out, polydata ? "PolyData" : "UnstructuredGrid");
@@ -448,13 +431,13 @@ static void write_cells_of_points(struct host_output *out,
     host_output_text(out, "\n</AppendedData>\n</VTKFile>\n");
 }
 
-static void write_vtu(struct host_output *out, const struct host_points *points)
-{
+static void write_vtu(struct host_output *out,
+                      const struct host_points *points) {
     write_cells_of_points(out, points, false);
 }
 
-static void write_vtp(struct host_output *out, const struct host_points *points)
-{
+static void write_vtp(struct host_output *out,
+                      const struct host_points *points) {
     write_cells_of_points(out, points, true);
 }
 
@@ -462,8 +445,7 @@ static void write_vtp(struct host_output *out, const struct host_points *points)
 static int write_tetrahedra(struct host_output *out, struct host_output *beside,
                             const struct host_points *points,
                             const struct host_tetrahedra *tets,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     (void)beside;
     uint64_t m = tets->count, n = points->count;
     size_t word = 4 * m < INT32_MAX && n < INT32_MAX ? 4 : 8;

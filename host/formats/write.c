@@ -9,8 +9,7 @@
 
 /* Reports that the extension of `path` names no format to write. */
 static int refuse(const char *path, const char *what, enum host_use use,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     char list[HOST_FORMAT_LIST_MAX];
     struct stat status;
     size_t length = strlen(path);
@@ -30,8 +29,7 @@ static int refuse(const char *path, const char *what, enum host_use use,
 
 int host_points_write_as(const char *path, const char *format,
                          const struct host_points *points,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     struct host_output out;
     const struct host_format *f =
         format == NULL ? host_format_of(path, HOST_WRITE_POINTS)
@@ -48,13 +46,11 @@ int host_points_write_as(const char *path, const char *format,
 }
 
 int host_points_write(const char *path, const struct host_points *points,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     return host_points_write_as(path, NULL, points, error);
 }
 
-int host_write_check(const char *path, struct host_error *error)
-{
+int host_write_check(const char *path, struct host_error *error) {
     return host_format_of(path, HOST_WRITE_TETRAHEDRA) != NULL
                ? 0
                : refuse(path, "tetrahedra", HOST_WRITE_TETRAHEDRA, error);
@@ -62,8 +58,7 @@ int host_write_check(const char *path, struct host_error *error)
 
 /* The extension of file k of those that belong beside the output `path`; NULL:
  * there are not so many. */
-static const char *beside(const char *path, unsigned k)
-{
+static const char *beside(const char *path, unsigned k) {
     const struct host_format *format =
         host_format_of(path, HOST_WRITE_TETRAHEDRA);
     return format == NULL || strcmp(path, "-") == 0 || k >= HOST_BESIDE_MAX
@@ -72,8 +67,7 @@ static const char *beside(const char *path, unsigned k)
 }
 
 const char *host_write_file(const char *path, unsigned k, char *name,
-                            size_t size)
-{
+                            size_t size) {
     size_t length = strlen(path);
     if (strcmp(path, "-") == 0 || length >= size) {
         return NULL;
@@ -90,8 +84,7 @@ const char *host_write_file(const char *path, unsigned k, char *name,
     return n < 0 || (size_t)n >= size ? NULL : name;
 }
 
-bool host_write_leaves(const char *input, const char *name)
-{
+bool host_write_leaves(const char *input, const char *name) {
     struct stat from, to;
     return input != NULL && strcmp(input, "-") != 0 && !host_is_packed(input) &&
            host_format_named(input) != NULL &&
@@ -101,8 +94,7 @@ bool host_write_leaves(const char *input, const char *name)
 }
 
 int host_write_probe(const char *path, const char *input,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     char name[HOST_PATH_MAX];
     const char *file = path;
     for (unsigned k = 0; file != NULL && error->code == 0; k++) {
@@ -116,8 +108,7 @@ int host_write_probe(const char *path, const char *input,
 
 int host_write(const char *path, const char *input,
                const struct host_points *points,
-               const struct host_tetrahedra *tets, struct host_error *error)
-{
+               const struct host_tetrahedra *tets, struct host_error *error) {
     struct host_output out[HOST_BESIDE_MAX + 1];
     char names[HOST_BESIDE_MAX][HOST_PATH_MAX];
     const struct host_format *format =

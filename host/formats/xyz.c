@@ -6,8 +6,7 @@
 #include "scan.h"
 
 static int read_text(const struct host_source *source, bool is_csv,
-                     struct host_points *points, struct host_error *error)
-{
+                     struct host_points *points, struct host_error *error) {
     struct host_scan s = host_scan_source(source);
     struct host_csv csv = {0};
     double xyz[3];
@@ -29,26 +28,24 @@ static int read_text(const struct host_source *source, bool is_csv,
 }
 
 static int read_xyz(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     return read_text(source, false, mesh->points, error);
 }
 
 static int read_csv(const struct host_source *source, struct host_mesh *mesh,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     int status = read_text(source, true, mesh->points, error);
     mesh->points->named = false; /* in a .csv, names are usual */
     return status;
 }
 
-static void write_xyz(struct host_output *out, const struct host_points *points)
-{
+static void write_xyz(struct host_output *out,
+                      const struct host_points *points) {
     host_put_points(out, points, " ", false);
 }
 
-static void write_csv(struct host_output *out, const struct host_points *points)
-{
+static void write_csv(struct host_output *out,
+                      const struct host_points *points) {
     host_put_points(out, points, ",", false);
 }
 

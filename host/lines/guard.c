@@ -15,8 +15,7 @@ static const int signals[HOST_GUARD_SIGNALS] = {SIGINT, SIGTERM, SIGHUP,
 static volatile sig_atomic_t came[HOST_GUARD_SIGNALS];
 static volatile sig_atomic_t pipe_end = -1;
 
-static void take(int signal)
-{
+static void take(int signal) {
     int reason = errno;
     for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
         came[i] = came[i] || signals[i] == signal;
@@ -28,8 +27,7 @@ static void take(int signal)
     errno = reason;
 }
 
-int host_guard_begin(struct host_guard *guard)
-{
+int host_guard_begin(struct host_guard *guard) {
     struct sigaction action = {.sa_handler = take, .sa_flags = SA_RESTART};
     memset(guard, 0, sizeof *guard);
     if (pipe2(guard->ends, O_CLOEXEC | O_NONBLOCK) != 0) {
@@ -46,8 +44,7 @@ int host_guard_begin(struct host_guard *guard)
     return 0;
 }
 
-bool host_guard_wait(struct host_guard *guard, unsigned ms)
-{
+bool host_guard_wait(struct host_guard *guard, unsigned ms) {
     struct pollfd look = {.fd = guard->ends[0], .events = POLLIN};
     uint64_t end_us = host_now_us() + (uint64_t)ms * 1000, now_us;
     int got = 0;
@@ -57,8 +54,7 @@ bool host_guard_wait(struct host_guard *guard, unsigned ms)
     return got <= 0;
 }
 
-void host_guard_end(struct host_guard *guard)
-{
+void host_guard_end(struct host_guard *guard) {
     for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
         if (guard->taken[i]) {
             (void)sigaction(signals[i], &guard->before[i], NULL);

@@ -10,14 +10,12 @@
 /* --- one line ------------------------------------------------------------- */
 
 static const char *device(const struct host_lines *lines,
-                          const struct host_cube_pin *pin)
-{
+                          const struct host_cube_pin *pin) {
     return host_cube_host_wire(lines->file, (unsigned)pin->wire)->device[1];
 }
 
 static int set(const struct host_lines *lines, const struct host_cube_pin *pin,
-               bool active, struct host_error *error)
-{
+               bool active, struct host_error *error) {
     int status =
         pin->wire < 0
             ? host_gpio_set(lines->gpio[pin - lines->file->pin], active)
@@ -34,8 +32,7 @@ static int set(const struct host_lines *lines, const struct host_cube_pin *pin,
 }
 
 static int open_gpio(struct host_lines *lines, unsigned i,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const struct host_cube_pin *pin = &lines->file->pin[i];
     char why[HOST_GPIO_WHY];
     int status = host_gpio_open(&lines->gpio[i], pin, why);
@@ -47,8 +44,7 @@ static int open_gpio(struct host_lines *lines, unsigned i,
 }
 
 static int open_port(struct host_lines *lines, unsigned k,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const struct host_cube_wire *wire = host_cube_host_wire(lines->file, k);
     struct serial_port_settings settings = {.baud = wire->baud,
                                             .rts_cts = wire->rts_cts,
@@ -64,8 +60,7 @@ static int open_port(struct host_lines *lines, unsigned k,
 /* --- all of them ---------------------------------------------------------- */
 
 int host_lines_open(struct host_lines *lines, const struct host_cube_file *file,
-                    struct host_remote *remote, struct host_error *error)
-{
+                    struct host_remote *remote, struct host_error *error) {
     memset(lines, 0, sizeof *lines);
     lines->file = file;
     lines->gpio = calloc(file->pins + 1, sizeof(void *));
@@ -88,8 +83,7 @@ int host_lines_open(struct host_lines *lines, const struct host_cube_file *file,
     return error->code;
 }
 
-void host_lines_close(struct host_lines *lines)
-{
+void host_lines_close(struct host_lines *lines) {
     for (unsigned i = 0; lines->gpio != NULL && i < lines->file->pins; i++) {
         host_gpio_close(lines->gpio[i]);
     }
@@ -106,8 +100,7 @@ void host_lines_close(struct host_lines *lines)
 /* Both are tried, whatever fails.  False: cut short. */
 static bool pulse(struct host_lines *lines, const struct host_cube_pin *reset,
                   const struct host_cube_pin *boot, struct host_guard *guard,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     bool good = (boot == NULL || set(lines, boot, true, error) == 0) &&
                 set(lines, reset, true, error) == 0;
     bool whole = !good || host_guard_wait(guard, HOST_RESET_MS);
@@ -121,8 +114,7 @@ static bool pulse(struct host_lines *lines, const struct host_cube_pin *reset,
 }
 
 int host_lines_reset(struct host_lines *lines, unsigned node, bool stay,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const struct host_cube_file *file = lines->file;
     const struct host_cube_pin *reset =
         host_cube_pin(file, node, HOST_LINE_RESET);

@@ -37,8 +37,7 @@ int host_lines_open(struct host_lines *lines, const struct host_cube_file *file,
 
 /* Whether the file names such a line; nothing need be open. */
 static inline bool host_lines_has(const struct host_cube_file *file,
-                                  unsigned node, enum host_line_kind kind)
-{
+                                  unsigned node, enum host_line_kind kind) {
     return host_cube_pin(file, node, kind) != NULL;
 }
 

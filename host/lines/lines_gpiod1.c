@@ -15,15 +15,13 @@ struct host_gpio {
 /* --- why not -------------------------------------------------------------- */
 
 static int refuse(char why[HOST_GPIO_WHY], int code, const char *what,
-                  const char *next)
-{
+                  const char *next) {
     snprintf(why, HOST_GPIO_WHY, "%s; %s", what, next);
     return code;
 }
 
 /* "Permission denied; join the group.." */
-static int refuse_errno(char why[HOST_GPIO_WHY], const char *what, int reason)
-{
+static int refuse_errno(char why[HOST_GPIO_WHY], const char *what, int reason) {
     snprintf(why, HOST_GPIO_WHY, "%s: %s; %s", what, strerror(reason),
              reason == EACCES || reason == EPERM
                  ? "join the group that /dev/gpiochip0 belongs to, or run this "
@@ -33,8 +31,7 @@ static int refuse_errno(char why[HOST_GPIO_WHY], const char *what, int reason)
 }
 
 /* No chip of that name: those that there are. */
-static int refuse_chip(char why[HOST_GPIO_WHY], const char *name, int reason)
-{
+static int refuse_chip(char why[HOST_GPIO_WHY], const char *name, int reason) {
     char what[HOST_PIN_NAME_MAX + 8], next[HOST_GPIO_WHY / 2] = "";
     size_t used = 0;
     struct gpiod_chip *chip;
@@ -64,8 +61,7 @@ static int refuse_chip(char why[HOST_GPIO_WHY], const char *name, int reason)
 /* --- a line --------------------------------------------------------------- */
 
 static int find_line(struct host_gpio *gpio, const struct host_cube_pin *pin,
-                     char why[HOST_GPIO_WHY])
-{
+                     char why[HOST_GPIO_WHY]) {
     char what[160], next[80];
     unsigned count = gpiod_chip_num_lines(gpio->chip);
     gpio->line = pin->name[0] != '\0'
@@ -87,8 +83,7 @@ static int find_line(struct host_gpio *gpio, const struct host_cube_pin *pin,
 }
 
 static int request(struct host_gpio *gpio, const struct host_cube_pin *pin,
-                   char why[HOST_GPIO_WHY])
-{
+                   char why[HOST_GPIO_WHY]) {
     char what[160];
     const char *user = gpiod_line_consumer(gpio->line);
     int flags = (pin->active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0) |
@@ -107,8 +102,7 @@ static int request(struct host_gpio *gpio, const struct host_cube_pin *pin,
 }
 
 int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
-                   char why[HOST_GPIO_WHY])
-{
+                   char why[HOST_GPIO_WHY]) {
     struct host_gpio *opened = calloc(1, sizeof *opened);
     *gpio = opened;
     if (opened == NULL) {
@@ -125,13 +119,11 @@ int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
     return status;
 }
 
-int host_gpio_set(struct host_gpio *gpio, bool active)
-{
+int host_gpio_set(struct host_gpio *gpio, bool active) {
     return gpiod_line_set_value(gpio->line, active);
 }
 
-void host_gpio_close(struct host_gpio *gpio)
-{
+void host_gpio_close(struct host_gpio *gpio) {
     if (gpio != NULL && gpio->chip != NULL) {
         gpiod_chip_close(gpio->chip);
     }

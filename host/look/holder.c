@@ -19,8 +19,7 @@
 
 enum { NAME_BYTES = 16, START_FIELD = 22, DAY_S = 86400 };
 
-socklen_t host_holder_address(const char *wire, struct sockaddr_un *address)
-{
+socklen_t host_holder_address(const char *wire, struct sockaddr_un *address) {
     uint8_t digest[NAME_BYTES];
     char hex[2 * NAME_BYTES + 1];
     memset(address, 0, sizeof *address);
@@ -35,8 +34,7 @@ socklen_t host_holder_address(const char *wire, struct sockaddr_un *address)
 }
 
 /* A file of /proc/PID; how many bytes. */
-static size_t read_of(pid_t pid, const char *name, char *text, size_t size)
-{
+static size_t read_of(pid_t pid, const char *name, char *text, size_t size) {
     char path[64];
     snprintf(path, sizeof path, "/proc/%ld/%s", (long)pid, name);
     int file = open(path, O_RDONLY | O_CLOEXEC);
@@ -48,8 +46,7 @@ static size_t read_of(pid_t pid, const char *name, char *text, size_t size)
     return n > 0 ? (size_t)n : 0;
 }
 
-static void find_command(struct host_holder *holder)
-{
+static void find_command(struct host_holder *holder) {
     char line[sizeof holder->command];
     size_t used = read_of(holder->pid, "cmdline", line, sizeof line);
     while (used > 0 && line[used - 1] == '\0') {
@@ -68,8 +65,7 @@ static void find_command(struct host_holder *holder)
     }
 }
 
-static void find_user(struct host_holder *holder)
-{
+static void find_user(struct host_holder *holder) {
     const struct passwd *user = getpwuid(holder->uid);
     if (user != NULL) {
         host_text_printable(holder->user, sizeof holder->user, user->pw_name);
@@ -80,8 +76,7 @@ static void find_user(struct host_holder *holder)
 }
 
 /* The kernel counts ticks from its own start to that of the process. */
-static void find_since(struct host_holder *holder)
-{
+static void find_since(struct host_holder *holder) {
     char text[1024];
     struct timespec up;
     const char *at = NULL;
@@ -98,8 +93,7 @@ static void find_since(struct host_holder *holder)
     }
 }
 
-bool host_holder_of(struct host_holder *holder, int file)
-{
+bool host_holder_of(struct host_holder *holder, int file) {
     struct ucred peer;
     socklen_t size = sizeof peer;
     memset(holder, 0, sizeof *holder);
@@ -119,8 +113,7 @@ bool host_holder_of(struct host_holder *holder, int file)
  */
 
 /* Whether the process still has the user that took the meeting place. */
-static bool is_of_user(const struct host_holder *holder)
-{
+static bool is_of_user(const struct host_holder *holder) {
     char text[2048];
     unsigned long real, effective;
     (void)read_of(holder->pid, "status", text, sizeof text);
@@ -130,8 +123,7 @@ static bool is_of_user(const struct host_holder *holder)
            effective == holder->uid;
 }
 
-static bool is_device(int file, const char *path)
-{
+static bool is_device(int file, const char *path) {
     struct stat device, open_file;
     return stat(path, &device) == 0 && fstat(file, &open_file) == 0 &&
            S_ISCHR(device.st_mode) && S_ISCHR(open_file.st_mode) &&
@@ -140,8 +132,7 @@ static bool is_device(int file, const char *path)
 
 /* The process may have opened the socket by a path relative to its folder. */
 static bool is_called(pid_t pid, const struct sockaddr_un *peer,
-                      const char *path)
-{
+                      const char *path) {
     char called[sizeof peer->sun_path + 64];
     struct stat one, other;
     snprintf(called, sizeof called, "/proc/%ld/%s/%.*s", (long)pid,
@@ -152,8 +143,7 @@ static bool is_called(pid_t pid, const struct sockaddr_un *peer,
            one.st_ino == other.st_ino;
 }
 
-static bool is_at(const struct sockaddr *peer, const char *text)
-{
+static bool is_at(const struct sockaddr *peer, const char *text) {
     struct tcp_address address;
     const struct sockaddr *to = &address.to.any;
     if (tcp_address_parse(&address, text) != 0 ||
@@ -171,8 +161,7 @@ static bool is_at(const struct sockaddr *peer, const char *text)
 }
 
 /* wire: "KIND:PATH" of host/machines/remote.h. */
-static bool is_wire(pid_t pid, int file, const char *wire)
-{
+static bool is_wire(pid_t pid, int file, const char *wire) {
     union {
         struct sockaddr any;
         struct sockaddr_un un;
@@ -196,8 +185,7 @@ static bool is_wire(pid_t pid, int file, const char *wire)
 
 /* Checks each open file of the process by a copy, which the kernel gives to
  * root. */
-static bool has_open(const struct host_holder *holder, const char *wire)
-{
+static bool has_open(const struct host_holder *holder, const char *wire) {
     char path[64];
     int process = pidfd_open(holder->pid, 0);
     snprintf(path, sizeof path, "/proc/%ld/fd", (long)holder->pid);
@@ -222,8 +210,7 @@ static bool has_open(const struct host_holder *holder, const char *wire)
     return found;
 }
 
-bool host_holder_believed(const struct host_holder *holder, const char *wire)
-{
+bool host_holder_believed(const struct host_holder *holder, const char *wire) {
     return holder->uid == geteuid() || holder->uid == 0 ||
            (geteuid() == 0 && has_open(holder, wire));
 }
@@ -233,8 +220,7 @@ bool host_holder_believed(const struct host_holder *holder, const char *wire)
 
 /* One that takes no calls for so long that its queue is full has the wire, and
  * nobody is told who it is. */
-bool host_holder_find(struct host_holder *holder, const char *wire)
-{
+bool host_holder_find(struct host_holder *holder, const char *wire) {
     struct sockaddr_un address;
     socklen_t size = host_holder_address(wire, &address);
     int file = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -255,8 +241,7 @@ bool host_holder_find(struct host_holder *holder, const char *wire)
 }
 
 const char *host_holder_text(const struct host_holder *holder, char *text,
-                             size_t size)
-{
+                             size_t size) {
     char since[48] = "";
     time_t began = (time_t)holder->since_s;
     struct tm tm;

@@ -21,8 +21,7 @@ enum {
 };
 
 static int fail_silent(const struct host_look *look, const char *what,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     char text[HOST_HOLDER_TEXT];
     return host_fail(error, HOST_CUBE,
                      "%s: %s; look again in a moment, and if it says nothing "
@@ -33,8 +32,7 @@ static int fail_silent(const struct host_look *look, const char *what,
 
 /* --- lines ---------------------------------------------------------------- */
 
-static bool make_room(struct host_look *l)
-{
+static bool make_room(struct host_look *l) {
     size_t room = l->room == 0 ? LINE_FIRST : 2 * l->room;
     char *line = room > ANSWER_MAX ? NULL : realloc(l->line, room);
     if (line == NULL) {
@@ -47,8 +45,7 @@ static bool make_room(struct host_look *l)
 
 /* Reads until the line is whole: 0, or HOST_CUBE. */
 static int read_line(struct host_look *l, uint64_t wait_us,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     uint64_t begun_us = host_now_us(), passed_us = 0;
     l->used = 0;
     for (;; passed_us = host_now_us() - begun_us) {
@@ -81,8 +78,7 @@ static int read_line(struct host_look *l, uint64_t wait_us,
 
 /* A line's object, or NULL; *error is told. */
 static json_t *read_object(struct host_look *l, uint64_t wait_us,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     char why[160], text[HOST_HOLDER_TEXT];
     if (read_line(l, wait_us, error) != 0) {
         return NULL;
@@ -101,16 +97,14 @@ static json_t *read_object(struct host_look *l, uint64_t wait_us,
     return object;
 }
 
-static uint64_t number(const json_t *object, const char *key)
-{
+static uint64_t number(const json_t *object, const char *key) {
     json_int_t value = json_integer_value(json_object_get(object, key));
     return value > 0 ? (uint64_t)value : 0;
 }
 
 /* --- opening -------------------------------------------------------------- */
 
-static int take_greeting(struct host_look *l, struct host_error *error)
-{
+static int take_greeting(struct host_look *l, struct host_error *error) {
     json_t *object = read_object(l, GREETING_US, error);
     if (object == NULL) {
         return error->code;
@@ -137,8 +131,7 @@ static int take_greeting(struct host_look *l, struct host_error *error)
 }
 
 int host_look_open(struct host_look *look, const char *wire,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct sockaddr_un address;
     socklen_t size = host_holder_address(wire, &address);
     char text[HOST_HOLDER_TEXT];
@@ -172,8 +165,7 @@ int host_look_open(struct host_look *look, const char *wire,
 
 /* --- asking --------------------------------------------------------------- */
 
-static void take_answer(struct host_look *l, const char *key, const char *hex)
-{
+static void take_answer(struct host_look *l, const char *key, const char *hex) {
     char *end;
     unsigned long node = strtoul(key, &end, 10);
     size_t size;
@@ -188,8 +180,7 @@ static void take_answer(struct host_look *l, const char *key, const char *hex)
 
 static int send_question(const struct host_look *l,
                          const struct host_node_set *set,
-                         enum node_question what, struct host_error *error)
-{
+                         enum node_question what, struct host_error *error) {
     char nodes[HOST_LOOK_QUESTION_BYTES - 64], line[HOST_LOOK_QUESTION_BYTES];
     host_node_set_print(set, nodes, sizeof nodes);
     int size =
@@ -203,8 +194,7 @@ static int send_question(const struct host_look *l,
 
 int host_look_ask(struct host_look *look, const struct host_node_set *set,
                   enum node_question what, uint64_t wait_us,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     struct host_look *l = look;
     const char *key;
     json_t *value;
@@ -226,16 +216,14 @@ int host_look_ask(struct host_look *look, const struct host_node_set *set,
     l->committed = number(object, "committed");
     l->bricks = number(object, "bricks");
     l->tetrahedra = number(object, "tetrahedra");
-    json_object_foreach(json_object_get(object, "answers"), key, value)
-    {
+    json_object_foreach(json_object_get(object, "answers"), key, value) {
         take_answer(l, key, json_string_value(value));
     }
     json_decref(object);
     return 0;
 }
 
-void host_look_close(struct host_look *look)
-{
+void host_look_close(struct host_look *look) {
     if (look->file >= 0) {
         close(look->file);
     }

@@ -20,8 +20,7 @@ enum {
 /* --- the place ------------------------------------------------------------ */
 
 /* Who had the wire before may have the place still. */
-static void take_place(struct host_offer *o, uint64_t now_us)
-{
+static void take_place(struct host_offer *o, uint64_t now_us) {
     struct sockaddr_un address;
     socklen_t size = host_holder_address(o->wire, &address);
     o->tried_us = now_us;
@@ -35,8 +34,7 @@ static void take_place(struct host_offer *o, uint64_t now_us)
     }
 }
 
-static void drop(struct host_offer *o, unsigned i)
-{
+static void drop(struct host_offer *o, unsigned i) {
     struct host_looker *looker = &o->looker[i];
     close(looker->file);
     free(looker->out);
@@ -50,8 +48,7 @@ static void drop(struct host_offer *o, unsigned i)
 /* --- what they are told --------------------------------------------------- */
 
 /* A line of its own, whose text is freed with it.  NULL: no memory. */
-static char *line_of(json_t *object)
-{
+static char *line_of(json_t *object) {
     char *text = json_dumps(object, JSON_COMPACT);
     size_t size = text == NULL ? 0 : strlen(text);
     char *line = text == NULL ? NULL : realloc(text, size + 2);
@@ -65,8 +62,7 @@ static char *line_of(json_t *object)
 }
 
 /* Goes on as far as the looker reads. */
-static void flush(struct host_offer *o, unsigned i, uint64_t now_us)
-{
+static void flush(struct host_offer *o, unsigned i, uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
     while (looker->out != NULL && looker->out_at < looker->out_size) {
         ssize_t n = send(looker->file, looker->out + looker->out_at,
@@ -87,8 +83,7 @@ static void flush(struct host_offer *o, unsigned i, uint64_t now_us)
 }
 
 static void tell(struct host_offer *o, unsigned i, json_t *object,
-                 uint64_t now_us)
-{
+                 uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
     looker->out = object == NULL ? NULL : line_of(object);
     if (looker->out == NULL) {
@@ -101,23 +96,20 @@ static void tell(struct host_offer *o, unsigned i, json_t *object,
     flush(o, i, now_us);
 }
 
-static json_t *greeting(const struct host_offer *o)
-{
+static json_t *greeting(const struct host_offer *o) {
     return json_pack("{ss si si si sI}", "incode", NODE_VERSION, "protocol",
                      NODE_PROTOCOL, "nodes", (int)o->nodes, "dimension",
                      (int)o->dimension, "serial_baud",
                      (json_int_t)o->serial_baud);
 }
 
-static json_t *refusal(const char *why)
-{
+static json_t *refusal(const char *why) {
     return json_pack("{ss}", "error", why);
 }
 
 /* --- who comes ------------------------------------------------------------ */
 
-static void turn_away(int file, const char *why)
-{
+static void turn_away(int file, const char *why) {
     char *line = line_of(refusal(why));
     if (line != NULL) {
         (void)!send(file, line, strlen(line), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -127,8 +119,7 @@ static void turn_away(int file, const char *why)
 }
 
 /* False: nobody else calls. */
-static bool welcome(struct host_offer *o, uint64_t now_us)
-{
+static bool welcome(struct host_offer *o, uint64_t now_us) {
     int file = accept4(o->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     struct ucred peer;
     socklen_t size = sizeof peer;
@@ -155,8 +146,7 @@ static bool welcome(struct host_offer *o, uint64_t now_us)
 
 /* 0, or -1: it is no question. */
 static int read_question(const struct host_offer *o, const char *line,
-                         struct host_onlookers_question *question)
-{
+                         struct host_onlookers_question *question) {
     json_t *object = json_loads(line, 0, NULL);
     const char *ask = json_string_value(json_object_get(object, "ask"));
     const char *nodes = json_string_value(json_object_get(object, "nodes"));
@@ -172,8 +162,7 @@ static int read_question(const struct host_offer *o, const char *line,
     return status;
 }
 
-static void hear(struct host_offer *o, unsigned i, uint64_t now_us)
-{
+static void hear(struct host_offer *o, unsigned i, uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
     ssize_t n = recv(looker->file, looker->line + looker->used,
                      sizeof looker->line - looker->used, MSG_DONTWAIT);
@@ -202,8 +191,7 @@ static void hear(struct host_offer *o, unsigned i, uint64_t now_us)
     }
 }
 
-static void serve(struct host_offer *o, unsigned i, uint64_t now_us)
-{
+static void serve(struct host_offer *o, unsigned i, uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
     if (looker->file >= 0 && looker->out != NULL) {
         flush(o, i, now_us);
@@ -215,8 +203,7 @@ static void serve(struct host_offer *o, unsigned i, uint64_t now_us)
 /* --- as the service sees it ----------------------------------------------- */
 
 static bool ask(void *context, uint64_t now_us,
-                struct host_onlookers_question *question)
-{
+                struct host_onlookers_question *question) {
     struct host_offer *o = context;
     if (o->listener < 0 && now_us - o->tried_us > TRY_US) {
         take_place(o, now_us);
@@ -244,8 +231,7 @@ static bool ask(void *context, uint64_t now_us,
 }
 
 static void answer(void *context, unsigned node, const uint8_t *data,
-                   size_t size)
-{
+                   size_t size) {
     struct host_offer *o = context;
     char key[12], hex[2 * CUBE_PAYLOAD_MAX + 1];
     (void)sodium_bin2hex(hex, sizeof hex, data, size);
@@ -254,8 +240,7 @@ static void answer(void *context, unsigned node, const uint8_t *data,
 }
 
 static void answered(void *context, uint64_t now_us,
-                     const struct host_onlookers_progress *progress)
-{
+                     const struct host_onlookers_progress *progress) {
     struct host_offer *o = context;
     int asked = o->asked;
     o->asked = -1;
@@ -273,8 +258,7 @@ static void answered(void *context, uint64_t now_us,
     o->answers = NULL;
 }
 
-static const char *holder(void *context)
-{
+static const char *holder(void *context) {
     struct host_offer *o = context;
     struct host_holder who;
     return host_holder_find(&who, o->wire)
@@ -282,8 +266,7 @@ static const char *holder(void *context)
                : NULL;
 }
 
-void host_offer_begin(struct host_offer *offer, const char *wire)
-{
+void host_offer_begin(struct host_offer *offer, const char *wire) {
     memset(offer, 0, sizeof *offer);
     snprintf(offer->wire, sizeof offer->wire, "%s", wire);
     offer->asked = -1;
@@ -299,15 +282,13 @@ void host_offer_begin(struct host_offer *offer, const char *wire)
 }
 
 void host_offer_machine(struct host_offer *offer,
-                        const struct host_machine *machine)
-{
+                        const struct host_machine *machine) {
     offer->nodes = machine->nodes;
     offer->dimension = machine->dimension;
     offer->serial_baud = machine->serial_baud;
 }
 
-void host_offer_end(struct host_offer *offer)
-{
+void host_offer_end(struct host_offer *offer) {
     if (offer->onlookers.context == NULL) {
         return; /* it has not begun */
     }

@@ -46,8 +46,7 @@ static struct cube the_cube;
 /* --- boards --------------------------------------------------------------- */
 
 /* In the child. */
-static void become(const void *context, unsigned node)
-{
+static void become(const void *context, unsigned node) {
     const struct cube *cube = context;
     const struct host_cluster *c = &cube->cluster;
     struct host_emulator emulator = cube->board[node].emulator;
@@ -63,16 +62,14 @@ static void become(const void *context, unsigned node)
     host_emulator_become(&emulator, node);
 }
 
-static int refuse(const char *what, struct host_error *error)
-{
+static int refuse(const char *what, struct host_error *error) {
     return host_fail(error, HOST_BROKEN, "%s: %s; free some files, or memory",
                      what, strerror(errno));
 }
 
 static int refuse_file(const char *name,
                        const struct host_cluster_options *options,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s/%s: cannot be written (%s); free %u MB a board there, "
                      "or choose another place",
@@ -83,8 +80,7 @@ static int refuse_file(const char *name,
 /* A file in the folder, or one that has no name. */
 static int open_file(const char *name,
                      const struct host_cluster_options *options,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (options->directory == NULL) {
         int file = memfd_create(name, MFD_CLOEXEC);
         return file >= 0 ? file : (refuse(name, error), -1);
@@ -105,8 +101,7 @@ static int open_file(const char *name,
  * it is. */
 static int make_flash(struct board *board, unsigned node,
                       const struct host_cluster_options *options,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct stat about;
     char name[32];
     bool card = board->emulator.bare->card;
@@ -135,8 +130,7 @@ static int make_flash(struct board *board, unsigned node,
 /* What UART 0 says where no frames go over it. */
 static int make_log(struct board *board, unsigned node,
                     const struct host_cluster_options *options,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     char name[32];
     snprintf(name, sizeof name, "console%u.log", node);
     board->said = open_file(name, options, error);
@@ -151,8 +145,7 @@ static int make_log(struct board *board, unsigned node,
  * nodes that are left out or not joined, and the monitor.  Their paths lead
  * through the open folder, whatever its name leads to meanwhile. */
 static void name_files(struct cube *cube, unsigned node,
-                       const struct host_cluster_options *options)
-{
+                       const struct host_cluster_options *options) {
     struct board *board = &cube->board[node];
     struct host_emulator *e = &board->emulator;
     const size_t size = sizeof board->control;
@@ -172,8 +165,7 @@ static void name_files(struct cube *cube, unsigned node,
     }
 }
 
-void host_emulated_wire(unsigned node, unsigned uart, char name[32])
-{
+void host_emulated_wire(unsigned node, unsigned uart, char name[32]) {
     if (uart == 0) {
         snprintf(name, 32, node == 0 ? "host.socket" : "console%u.socket",
                  node);
@@ -184,8 +176,7 @@ void host_emulated_wire(unsigned node, unsigned uart, char name[32])
 
 static int make_board(struct cube *cube, const struct host_bare *bare,
                       unsigned node, const struct host_cluster_options *options,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct board *board = &cube->board[node];
     host_console_init(&board->console, node, bare->machine);
     if (host_emulator_find(bare, &board->emulator, error) != 0) {
@@ -205,8 +196,7 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
     return make_flash(board, node, options, error);
 }
 
-static void close_boards(struct cube *cube)
-{
+static void close_boards(struct cube *cube) {
     for (unsigned i = 0; i < HOST_EMULATED_MAX; i++) {
         struct board *board = &cube->board[i];
         int *const files[] = {&board->monitor[0], &board->monitor[1],
@@ -227,8 +217,7 @@ static void close_boards(struct cube *cube)
 /* --- as a machine --------------------------------------------------------- */
 
 /* What consoles have said since. */
-static void hear_consoles(struct cube *cube)
-{
+static void hear_consoles(struct cube *cube) {
     uint8_t bytes[1024];
     for (unsigned i = 1; i < cube->cluster.nodes; i++) {
         struct board *board = &cube->board[i];
@@ -244,8 +233,7 @@ static void hear_consoles(struct cube *cube)
     }
 }
 
-static int make_trouble(struct cube *cube, struct host_error *error)
-{
+static int make_trouble(struct cube *cube, struct host_error *error) {
     static const enum host_qmp_request requests[] = {
         [HOST_TROUBLE_RESET] = HOST_QMP_RESET,
         [HOST_TROUBLE_STOP] = HOST_QMP_STOP,
@@ -264,8 +252,7 @@ static int make_trouble(struct cube *cube, struct host_error *error)
 
 /* The last line of what emulators have said of themselves, which begins with
  * their name; a processor's registers may follow. */
-static void tell_errors(const struct cube *cube)
-{
+static void tell_errors(const struct cube *cube) {
     char text[4096];
     const char *said = NULL, *image = "";
     off_t size = lseek(cube->errors, 0, SEEK_END);
@@ -284,8 +271,7 @@ static void tell_errors(const struct cube *cube)
     }
 }
 
-static int machine_check(void *context, struct host_error *error)
-{
+static int machine_check(void *context, struct host_error *error) {
     struct cube *cube = &the_cube;
     hear_consoles(cube);
     if (cube->machine.check(context, error) != 0) {
@@ -302,8 +288,7 @@ static int machine_check(void *context, struct host_error *error)
     return make_trouble(cube, error);
 }
 
-static const char *machine_doubt(void *context, unsigned node)
-{
+static const char *machine_doubt(void *context, unsigned node) {
     static char text[sizeof "its console says: " + HOST_CONSOLE_TEXT];
     const char *fault = host_console_fault(&the_cube.board[node].console);
     (void)context;
@@ -313,22 +298,19 @@ static const char *machine_doubt(void *context, unsigned node)
 }
 
 /* A board has no end: nobody waits for it. */
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     (void)context;
     return true;
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     struct cube *cube = &the_cube;
     cube->machine.stop(context);
     hear_consoles(cube);
     close_boards(cube);
 }
 
-static struct host_machine machine_of(struct cube *cube)
-{
+static struct host_machine machine_of(struct cube *cube) {
     struct host_machine machine = cube->machine;
     machine.pipe = host_console_pipe(&cube->board[0].console, machine.pipe);
     machine.slow = true;
@@ -341,8 +323,8 @@ static struct host_machine machine_of(struct cube *cube)
 
 int host_emulated_start(const struct host_board *board,
                         const struct host_cluster_options *options,
-                        struct host_started *started, struct host_error *error)
-{
+                        struct host_started *started,
+                        struct host_error *error) {
     const struct host_bare *bare = board->bare;
     struct cube *cube = &the_cube;
     struct host_cluster_options mine = *options;

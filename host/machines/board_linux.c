@@ -3,8 +3,7 @@
 
 static int start(const struct host_board *board,
                  const struct host_cluster_options *options,
-                 struct host_started *started, struct host_error *error)
-{
+                 struct host_started *started, struct host_error *error) {
     static struct host_cluster cluster;
     static char program[4096];
     struct host_cluster_options mine = *options;

@@ -14,19 +14,16 @@ static const struct host_board *const boards[] = {BOARDS(POINT)};
 const struct host_board host_board_mixed = {.name = "mixed",
                                             .help = "several boards"};
 
-const struct host_board *host_board_row(unsigned i)
-{
+const struct host_board *host_board_row(unsigned i) {
     return i < sizeof boards / sizeof boards[0] ? boards[i] : NULL;
 }
 
-const char *host_board_name(unsigned i)
-{
+const char *host_board_name(unsigned i) {
     const struct host_board *board = host_board_row(i);
     return board == NULL ? NULL : board->name;
 }
 
-const struct host_board *host_board_named(const char *name)
-{
+const struct host_board *host_board_named(const char *name) {
     const struct host_board *board;
     for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++) {
         if (strcmp(name, board->name) == 0) {

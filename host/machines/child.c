@@ -14,8 +14,7 @@
 
 /* Ends with the reason in `report`, which a program that begins closes. */
 static _Noreturn void become(const struct host_child *child, pid_t host,
-                             int report)
-{
+                             int report) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     (void)setpgid(0, 0);     /* an interrupt from the terminal is the host's */
     if (getppid() == host) { /* else it ended before it could be watched */
@@ -30,8 +29,7 @@ static _Noreturn void become(const struct host_child *child, pid_t host,
 }
 
 int host_child_start(struct host_process *process,
-                     const struct host_child *child, struct host_error *error)
-{
+                     const struct host_child *child, struct host_error *error) {
     int report[2], reason = 0;
     if (pipe2(report, O_CLOEXEC) != 0) {
         return host_fail(error, HOST_BROKEN, "node %u: %s; close some files",
@@ -64,8 +62,7 @@ int host_child_start(struct host_process *process,
 
 /* --- its end -------------------------------------------------------------- */
 
-static bool reap(struct host_process *process, int flags)
-{
+static bool reap(struct host_process *process, int flags) {
     int status;
     if (process->pid == 0 ||
         waitpid(process->pid, &status, flags) != process->pid) {
@@ -76,31 +73,26 @@ static bool reap(struct host_process *process, int flags)
     return true;
 }
 
-bool host_child_any_died(void)
-{
+bool host_child_any_died(void) {
     siginfo_t who = {0};
     return waitid(P_ALL, 0, &who, WEXITED | WNOHANG | WNOWAIT) != 0 ||
            who.si_pid != 0;
 }
 
-bool host_child_died(struct host_process *process)
-{
+bool host_child_died(struct host_process *process) {
     return reap(process, WNOHANG);
 }
 
-bool host_child_kill(const struct host_process *process)
-{
+bool host_child_kill(const struct host_process *process) {
     return process->pid != 0 && kill(process->pid, SIGKILL) == 0;
 }
 
-void host_child_wait(struct host_process *process)
-{
+void host_child_wait(struct host_process *process) {
     (void)reap(process, 0);
 }
 
 static int describe(const struct host_process *process, unsigned node,
-                    unsigned link, struct host_error *error)
-{
+                    unsigned link, struct host_error *error) {
     int status = process->status;
     if (WIFSIGNALED(status)) {
         int number = WTERMSIG(status);
@@ -122,8 +114,7 @@ static int describe(const struct host_process *process, unsigned node,
 /* What kills from without may stop; a node that ends by itself would do so
  * again. */
 int host_child_check(struct host_process *process, unsigned node, unsigned link,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     uint64_t now = host_now_us();
     int status = process->status;
     bool killed = WIFSIGNALED(status) &&
@@ -142,8 +133,7 @@ int host_child_check(struct host_process *process, unsigned node, unsigned link,
                : describe(process, node, link, error);
 }
 
-uint64_t host_child_starved_us(const struct host_process *process)
-{
+uint64_t host_child_starved_us(const struct host_process *process) {
     char path[64];
     unsigned long long ran_ns, waited_ns = 0;
     snprintf(path, sizeof path, "/proc/%ld/schedstat", (long)process->pid);

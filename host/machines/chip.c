@@ -20,14 +20,12 @@ static_assert(LOADER_RAM_SECTORS * LOADER_RAM_SECTOR <= HOST_FLASH_BYTES &&
                       HOST_FLASH_BYTES,
               "what a loader knows of it is there");
 
-static void *map(int fd)
-{
+static void *map(int fd) {
     return mmap(NULL, HOST_FLASH_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED, fd,
                 0);
 }
 
-static int fill(int fd)
-{
+static int fill(int fd) {
     static uint8_t erased[1 << 16];
     memset(erased, 0xff, sizeof erased);
     for (size_t at = 0; at < HOST_FLASH_BYTES; at += sizeof erased) {
@@ -39,8 +37,7 @@ static int fill(int fd)
     return 0;
 }
 
-int host_chip_make(int fd, bool card)
-{
+int host_chip_make(int fd, bool card) {
     if (fill(fd) != 0) {
         return -1;
     }
@@ -58,8 +55,7 @@ int host_chip_make(int fd, bool card)
 
 /* Whether the board would start just this. */
 static bool has(const struct loader_flash *flash,
-                const struct loader_image *image)
-{
+                const struct loader_image *image) {
     const struct loader_rules rules = {.flash = flash,
                                        .suite = &sign_sodium,
                                        .key = image->key,
@@ -76,8 +72,7 @@ static bool has(const struct loader_flash *flash,
 
 static int install(const struct loader_flash *flash,
                    const struct host_source *source, const char *path,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct loader_image image;
     if (source->bytes < LOADER_HEADER_BYTES ||
         loader_image_unpack(&image, source->data) != LOADER_GOOD ||
@@ -100,8 +95,7 @@ static int install(const struct loader_flash *flash,
 /* A card that somebody has given another table has no place for an image. */
 static int install_mapped(void *bytes, bool card,
                           const struct host_source *source, const char *path,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct loader_card table = LOADER_CARD_IN(bytes);
     const struct loader_flash chip = LOADER_RAM(bytes);
     const struct loader_flash on_card = LOADER_CARD(&table);
@@ -114,8 +108,7 @@ static int install_mapped(void *bytes, bool card,
 }
 
 int host_chip_install(int fd, bool card, const char *path,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct host_source source;
     if (host_source_open_bounded(&source, path, LOADER_IMAGE_MAX, "an image",
                                  error) != 0) {

@@ -26,8 +26,7 @@ enum { AWAKE_US = 100 }; /* a page's way to a node, where nobody sleeps */
 extern char **environ;
 
 int host_cluster_program(const char *given, const char *name, char *path,
-                         size_t size, struct host_error *error)
-{
+                         size_t size, struct host_error *error) {
     ssize_t length;
     char *slash;
     if (given != NULL) {
@@ -52,15 +51,13 @@ int host_cluster_program(const char *given, const char *name, char *path,
     return 0;
 }
 
-static bool set_limit(int resource, uint64_t bytes)
-{
+static bool set_limit(int resource, uint64_t bytes) {
     struct rlimit limit = {bytes, bytes};
     return setrlimit((__rlimit_resource_t)resource, &limit) == 0;
 }
 
 /* In the child: becomes the node. */
-static void become_node(const void *context, unsigned node)
-{
+static void become_node(const void *context, unsigned node) {
     const struct host_cluster *c = context;
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
     char *no_environment[] = {NULL};
@@ -110,8 +107,7 @@ static void become_node(const void *context, unsigned node)
 }
 
 static int start_node(struct host_cluster *c, unsigned node,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const struct host_cluster_options *o = &c->options;
     const struct host_child child = {
         node, c->path, "ask for fewer with --nodes",
@@ -123,8 +119,7 @@ static int start_node(struct host_cluster *c, unsigned node,
 
 /* The host's ends of its wires.  A terminal is opened by its name as a real
  * port would be. */
-static int take_wires(struct host_cluster *c, struct host_error *error)
-{
+static int take_wires(struct host_cluster *c, struct host_error *error) {
     const struct host_cluster_options *options = &c->options;
     struct host_wires *wires = &c->wires;
     struct serial_port_settings settings = {.dtr = true, .rts = true};
@@ -144,8 +139,7 @@ static int take_wires(struct host_cluster *c, struct host_error *error)
 }
 
 /* Half of all numbers may follow, so that no start's epoch is 0. */
-static uint32_t first_epoch(void)
-{
+static uint32_t first_epoch(void) {
     uint32_t epoch;
     if (getrandom(&epoch, sizeof epoch, 0) != (ssize_t)sizeof epoch) {
         epoch = (uint32_t)host_now_us();
@@ -157,8 +151,7 @@ static uint32_t first_epoch(void)
  * host: passing on what is another's takes a node a fifteenth of the time in
  * which that other computes.  A board has one UART for it, and what goes over
  * terminals is as on real wires. */
-static unsigned host_ports(const struct host_cluster_options *options)
-{
+static unsigned host_ports(const struct host_cluster_options *options) {
     if (options->become != NULL || options->link->terminals ||
         options->one_wire) {
         return 1;
@@ -169,8 +162,7 @@ static unsigned host_ports(const struct host_cluster_options *options)
 
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     memset(cluster, 0, sizeof *cluster);
     memset(&cluster->wires, -1, sizeof cluster->wires);
     cluster->nodes = options->nodes;
@@ -204,8 +196,7 @@ int host_cluster_start(struct host_cluster *cluster,
     return status;
 }
 
-int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
-{
+int host_cluster_check(struct host_cluster *cluster, struct host_error *error) {
     if (!host_child_any_died()) {
         return 0;
     }
@@ -224,8 +215,7 @@ int host_cluster_check(struct host_cluster *cluster, struct host_error *error)
     return 0;
 }
 
-bool host_cluster_ended(struct host_cluster *cluster)
-{
+bool host_cluster_ended(struct host_cluster *cluster) {
     bool ended = true;
     host_wires_close_nodes(&cluster->wires); /* so that an end is heard */
     for (unsigned i = 0; i < cluster->nodes; i++) {
@@ -235,8 +225,7 @@ bool host_cluster_ended(struct host_cluster *cluster)
     return ended;
 }
 
-void host_cluster_stop(struct host_cluster *cluster)
-{
+void host_cluster_stop(struct host_cluster *cluster) {
     for (unsigned i = 0; i < cluster->nodes; i++) {
         (void)host_child_kill(&cluster->process[i]);
     }
@@ -251,55 +240,46 @@ void host_cluster_stop(struct host_cluster *cluster)
 
 /* --- as a machine --------------------------------------------------------- */
 
-static uint64_t machine_now_us(void *context)
-{
+static uint64_t machine_now_us(void *context) {
     (void)context;
     return host_now_us();
 }
 
-static void machine_idle(void *context, uint64_t wait_us)
-{
+static void machine_idle(void *context, uint64_t wait_us) {
     struct host_cluster *cluster = context;
     host_port_idle(cluster->port, cluster->ports, wait_us);
 }
 
-static int machine_check(void *context, struct host_error *error)
-{
+static int machine_check(void *context, struct host_error *error) {
     return host_cluster_check(context, error);
 }
 
-static unsigned machine_restarts(void *context)
-{
+static unsigned machine_restarts(void *context) {
     const struct host_cluster *cluster = context;
     return cluster->restarts;
 }
 
-static uint64_t machine_starved_us(void *context, unsigned node)
-{
+static uint64_t machine_starved_us(void *context, unsigned node) {
     const struct host_cluster *cluster = context;
     return host_child_starved_us(&cluster->process[node]);
 }
 
 /* As it ends, host_cluster_check finds it. */
-static bool machine_kill(void *context, unsigned node)
-{
+static bool machine_kill(void *context, unsigned node) {
     const struct host_cluster *cluster = context;
     (void)host_child_kill(&cluster->process[node]);
     return true;
 }
 
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     return host_cluster_ended(context);
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     host_cluster_stop(context);
 }
 
-struct host_machine host_cluster_machine(struct host_cluster *cluster)
-{
+struct host_machine host_cluster_machine(struct host_cluster *cluster) {
     struct host_machine machine;
     memset(&machine, 0, sizeof machine);
     machine.context = cluster;

@@ -12,8 +12,7 @@ enum { RECORD = 0xff };
 #define RESTARTING "; restarting"
 
 void host_console_init(struct host_console *console, unsigned node,
-                       const char *board)
-{
+                       const char *board) {
     memset(console, 0, sizeof *console);
     console->node = node;
     console->board = board;
@@ -21,8 +20,7 @@ void host_console_init(struct host_console *console, unsigned node,
 
 /* A record is whole.  Of a report its board's name is left out: here it has a
  * number, too. */
-static void take(struct host_console *c)
-{
+static void take(struct host_console *c) {
     char before[48];
     c->used -= c->used > 0 && c->text[c->used - 1] == ' ';
     c->text[c->used] = '\0';
@@ -41,8 +39,7 @@ static void take(struct host_console *c)
 }
 
 /* A byte that no text has makes a frame of a record. */
-static void hear(struct host_console *c, uint8_t byte)
-{
+static void hear(struct host_console *c, uint8_t byte) {
     bool blank = byte == '\n' || byte == '\r' || byte == '\t' || byte == ' ';
     if (byte == 0) {
         if (c->at == HOST_CONSOLE_RECORD && c->used > 0) {
@@ -63,21 +60,18 @@ static void hear(struct host_console *c, uint8_t byte)
 }
 
 void host_console_hear(struct host_console *console, const uint8_t *bytes,
-                       size_t size)
-{
+                       size_t size) {
     for (size_t i = 0; i < size; i++) {
         hear(console, bytes[i]);
     }
 }
 
-static int pipe_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     const struct host_console *c = context;
     return c->beneath.send(c->beneath.context, bytes, size);
 }
 
-static int pipe_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct host_console *c = context;
     int got = c->beneath.receive(c->beneath.context, bytes, size);
     if (got > 0) {
@@ -87,13 +81,11 @@ static int pipe_receive(void *context, uint8_t *bytes, size_t size)
 }
 
 struct link_pipe host_console_pipe(struct host_console *console,
-                                   struct link_pipe beneath)
-{
+                                   struct link_pipe beneath) {
     console->beneath = beneath;
     return (struct link_pipe){console, pipe_send, pipe_receive};
 }
 
-const char *host_console_fault(const struct host_console *console)
-{
+const char *host_console_fault(const struct host_console *console) {
     return console->faults == 0 ? NULL : console->fault;
 }

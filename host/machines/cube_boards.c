@@ -6,8 +6,7 @@
 
 static const struct host_board *take_board(const struct host_cube_file *file,
                                            const config_setting_t *where,
-                                           struct host_error *error)
-{
+                                           struct host_error *error) {
     const char *name = config_setting_get_string(where);
     const struct host_board *board =
         name == NULL ? NULL : host_board_named(name);
@@ -25,8 +24,7 @@ static const struct host_board *take_board(const struct host_cube_file *file,
 
 /* An entry of `nodes`. */
 static int read_node(struct host_cube_file *file, const config_setting_t *group,
-                     bool named[HOST_NODES_MAX], struct host_error *error)
-{
+                     bool named[HOST_NODES_MAX], struct host_error *error) {
     static const char *const names[] = {"node", "board",  "reset", "boot",
                                         "ssh",  "folder", NULL};
     int node = -1;
@@ -62,8 +60,7 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
 
 int host_cube_read_boards(struct host_cube_file *file,
                           const config_setting_t *root,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     static bool named[HOST_NODES_MAX];
     const config_setting_t *all = config_setting_get_member(root, "board");
     const config_setting_t *list = config_setting_get_member(root, "nodes");
@@ -97,8 +94,7 @@ int host_cube_read_boards(struct host_cube_file *file,
 
 static int check_node(const struct host_cube_file *file,
                       const config_setting_t *root, unsigned node,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const struct host_board *board = file->board_of[node];
     char text[160];
     if (1u << file->dimension > host_bare_nodes_max(board->bare)) {
@@ -128,8 +124,7 @@ static int check_node(const struct host_cube_file *file,
 
 static int check_wire(const struct host_cube_file *file,
                       const struct host_cube_wire *wire, unsigned node,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const struct host_board *board = file->board_of[node];
     const char *what = NULL;
     char text[80];
@@ -150,8 +145,7 @@ static int check_wire(const struct host_cube_file *file,
 
 int host_cube_check_boards(struct host_cube_file *file,
                            const config_setting_t *root,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     for (unsigned i = 0; i < file->nodes && error->code == 0; i++) {
         if (host_cube_is_bare(file, i) &&
             check_node(file, root, i, error) == 0) {

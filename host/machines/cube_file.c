@@ -17,8 +17,7 @@
 enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 
 static int read_key(struct host_cube_file *file, const config_setting_t *where,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     char message[HOST_NODE_OPTION_BYTES + 200];
     if (config_setting_get_string(where) == NULL) {
         return host_cube_wrong(file, where, error,
@@ -51,8 +50,7 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
 
 /* The nodes that the host starts. */
 static int read_start(struct host_cube_file *file, const config_setting_t *root,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const config_setting_t *start = config_setting_get_member(root, "start");
     bool many = start != NULL && (config_setting_is_array(start) ||
                                   config_setting_is_list(start));
@@ -74,8 +72,7 @@ static int read_start(struct host_cube_file *file, const config_setting_t *root,
 }
 
 static int read_memory(struct host_cube_file *file,
-                       const config_setting_t *root, struct host_error *error)
-{
+                       const config_setting_t *root, struct host_error *error) {
     const config_setting_t *memory = config_setting_get_member(root, "memory");
     const char *text =
         memory == NULL ? "4M" : config_setting_get_string(memory);
@@ -90,8 +87,7 @@ static int read_memory(struct host_cube_file *file,
 }
 
 static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const config_setting_t *key = config_setting_get_member(root, "key");
     int dimension = -1, window = 0, dead = 30;
     if (!host_cube_take_number(root, "dimension", 0, CUBE_DIMENSION_MAX,
@@ -126,8 +122,7 @@ static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
 }
 
 static int read_settings(struct host_cube_file *file, const config_t *config,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     static const char *const names[] = {
         "dimension", "board", "memory", "window", "key",
         "start",     "dead",  "links",  "nodes",  NULL};
@@ -174,8 +169,7 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
 
 /* Read here, as libconfig ends the program where it cannot.  The name may be
  * that of a pipe, which would be waited for. */
-static int open_text(const char *path, struct host_error *error)
-{
+static int open_text(const char *path, struct host_error *error) {
     struct stat about;
     int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (fd < 0 || fstat(fd, &about) != 0) {
@@ -194,8 +188,7 @@ static int open_text(const char *path, struct host_error *error)
 }
 
 /* NULL: as the error says. */
-static char *read_text(const char *path, struct host_error *error)
-{
+static char *read_text(const char *path, struct host_error *error) {
     int fd = open_text(path, error);
     char *text = fd < 0 ? NULL : malloc(TEXT_MAX + 1);
     size_t size = 0;
@@ -228,8 +221,7 @@ static char *read_text(const char *path, struct host_error *error)
 }
 
 int host_cube_file_parse(struct host_cube_file *file, const char *path,
-                         const char *text, struct host_error *error)
-{
+                         const char *text, struct host_error *error) {
     config_t config;
     int status;
     memset(file, 0, sizeof *file);
@@ -254,8 +246,7 @@ int host_cube_file_parse(struct host_cube_file *file, const char *path,
 }
 
 int host_cube_file_read(struct host_cube_file *file, const char *path,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     char *text = read_text(path, error);
     int status = text == NULL ? error->code
                               : host_cube_file_parse(file, path, text, error);
@@ -263,8 +254,7 @@ int host_cube_file_read(struct host_cube_file *file, const char *path,
     return status;
 }
 
-void host_cube_file_free(struct host_cube_file *file)
-{
+void host_cube_file_free(struct host_cube_file *file) {
     free(file->wire);
     free(file->pin);
     free(file->ssh);

@@ -97,8 +97,7 @@ void host_cube_file_free(struct host_cube_file *file);
 
 /* Whether the node has no system. */
 static inline bool host_cube_is_bare(const struct host_cube_file *file,
-                                     unsigned node)
-{
+                                     unsigned node) {
     return node < HOST_NODES_MAX && node < file->nodes &&
            file->board_of[node]->bare != NULL;
 }

@@ -14,8 +14,7 @@
 
 enum { TEXT_BYTES = 2 * SECURE_KEY_BYTES + 1 };
 
-static bool draw_digits(char text[TEXT_BYTES])
-{
+static bool draw_digits(char text[TEXT_BYTES]) {
     static const char digits[] = "0123456789abcdef";
     uint8_t key[SECURE_KEY_BYTES];
     if (getrandom(key, sizeof key, 0) != (ssize_t)sizeof key) {
@@ -30,8 +29,7 @@ static bool draw_digits(char text[TEXT_BYTES])
     return true;
 }
 
-static bool write_all(int fd, const char *text, size_t size)
-{
+static bool write_all(int fd, const char *text, size_t size) {
     while (size > 0) {
         ssize_t written = write(fd, text, size);
         if (written < 0 && errno != EINTR) {
@@ -44,14 +42,12 @@ static bool write_all(int fd, const char *text, size_t size)
 }
 
 /* False: errno says why. */
-static bool fill(int fd, const char *text, size_t size, mode_t mode)
-{
+static bool fill(int fd, const char *text, size_t size, mode_t mode) {
     return fchmod(fd, mode) == 0 && write_all(fd, text, size) && fsync(fd) == 0;
 }
 
 int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     int fd = host_create(path, mode & 0600);
     if (fd < 0 && errno == EEXIST) {
         return host_fail(error, HOST_INPUT,
@@ -76,8 +72,7 @@ int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
                      strerror(reason));
 }
 
-int host_key_make(const char *path, struct host_error *error)
-{
+int host_key_make(const char *path, struct host_error *error) {
     char text[TEXT_BYTES];
     int status =
         draw_digits(text)

@@ -46,8 +46,7 @@ struct cube_new {
     struct host_error *error;
 };
 
-static void take_board(struct cube_new *c, const char *name)
-{
+static void take_board(struct cube_new *c, const char *name) {
     c->board = host_board_named(name);
     if (c->board == NULL) {
         host_fail(c->error, HOST_USAGE,
@@ -57,8 +56,7 @@ static void take_board(struct cube_new *c, const char *name)
     }
 }
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct cube_new *c = state->input;
     switch (key) {
     case KEY_NEW:
@@ -86,8 +84,8 @@ static error_t parse(int key, char *value, struct argp_state *state)
 }
 
 /* "pi@10.0.0.11": the k-th of the list; "": there are fewer. */
-static void host_of(const struct cube_new *c, unsigned k, char text[HOST_BYTES])
-{
+static void host_of(const struct cube_new *c, unsigned k,
+                    char text[HOST_BYTES]) {
     const char *at = c->hosts;
     while (k > 0 && at != NULL) {
         at = strchr(at, ',');
@@ -99,8 +97,7 @@ static void host_of(const struct cube_new *c, unsigned k, char text[HOST_BYTES])
 }
 
 /* That stands in quotation marks of a cube file as it is. */
-static bool is_word(const char *text)
-{
+static bool is_word(const char *text) {
     bool good = true;
     for (const char *at = text; *at != '\0'; at++) {
         good = good && *at > ' ' && *at < 0x7f && *at != '"' && *at != '\\';
@@ -108,15 +105,13 @@ static bool is_word(const char *text)
     return good;
 }
 
-static const char *address_of(const char *host)
-{
+static const char *address_of(const char *host) {
     const char *at = strrchr(host, '@');
     return at == NULL ? host : at + 1;
 }
 
 /* One for each node, neither more nor fewer. */
-static int check_hosts(const struct cube_new *c)
-{
+static int check_hosts(const struct cube_new *c) {
     char host[HOST_BYTES];
     bool good = true;
     for (unsigned i = 0; i <= c->nodes; i++) {
@@ -131,8 +126,7 @@ static int check_hosts(const struct cube_new *c)
                             c->hosts, c->nodes);
 }
 
-static int check(struct cube_new *c)
-{
+static int check(struct cube_new *c) {
     if (c->nodes > 0 && c->device != NULL && c->file != NULL) {
         c->device = c->file; /* --serial DEVICE, with a blank */
         c->file = NULL;
@@ -186,8 +180,7 @@ static int check(struct cube_new *c)
 /* Every pair of neighbours, the smaller first; what is between them. */
 static void put_pairs(FILE *out, const struct cube_new *c,
                       void (*put)(FILE *out, const struct cube_new *c,
-                                  unsigned node, unsigned d))
-{
+                                  unsigned node, unsigned d)) {
     for (unsigned i = 0; i < c->nodes; i++) {
         for (unsigned d = 0; d < c->dimension; d++) {
             if ((i & 1u << d) == 0) {
@@ -202,15 +195,13 @@ static void put_pairs(FILE *out, const struct cube_new *c,
 }
 
 static void put_unix(FILE *out, const struct cube_new *c, unsigned node,
-                     unsigned d)
-{
+                     unsigned d) {
     (void)c;
     (void)fprintf(out, "unix = \"%u-%u.socket\";", node, node | 1u << d);
 }
 
 static void put_serial(FILE *out, const struct cube_new *c, unsigned node,
-                       unsigned d)
-{
+                       unsigned d) {
     (void)c;
     (void)node;
     (void)fprintf(out,
@@ -221,16 +212,14 @@ static void put_serial(FILE *out, const struct cube_new *c, unsigned node,
 
 /* A port of its own for each link of a machine. */
 static void put_tcp(FILE *out, const struct cube_new *c, unsigned node,
-                    unsigned d)
-{
+                    unsigned d) {
     char host[HOST_BYTES];
     host_of(c, node, host);
     (void)fprintf(out, "tcp = \"%s:%u\";", address_of(host),
                   FIRST_PORT + 1 + node * c->dimension + d);
 }
 
-static void put_local(FILE *out, const struct cube_new *c)
-{
+static void put_local(FILE *out, const struct cube_new *c) {
     (void)fputs("# The host starts these nodes itself, on its own machine.\n"
                 "start = [",
                 out);
@@ -243,8 +232,7 @@ static void put_local(FILE *out, const struct cube_new *c)
     put_pairs(out, c, put_unix);
 }
 
-static void put_boards(FILE *out, const struct cube_new *c)
-{
+static void put_boards(FILE *out, const struct cube_new *c) {
     const char *device = c->device == NULL ? "/dev/ttyUSB0" : c->device;
     (void)fprintf(out,
                   "board = \"%s\";\n"
@@ -257,8 +245,7 @@ static void put_boards(FILE *out, const struct cube_new *c)
                   c->board->name, device, c->board->bare->serial_baud);
 }
 
-static void put_lines(FILE *out, const struct cube_new *c)
-{
+static void put_lines(FILE *out, const struct cube_new *c) {
     (void)fprintf(out,
                   "# EDIT: serial = [port at `node`, port at `to`], of its own "
                   "machine each.\n"
@@ -268,8 +255,7 @@ static void put_lines(FILE *out, const struct cube_new *c)
     put_pairs(out, c, put_serial);
 }
 
-static void put_machines(FILE *out, const struct cube_new *c, const char *key)
-{
+static void put_machines(FILE *out, const struct cube_new *c, const char *key) {
     char host[HOST_BYTES];
     (void)fprintf(out,
                   "# Whoever has a copy of this key can join the cube.\n"
@@ -293,8 +279,7 @@ static void put_machines(FILE *out, const struct cube_new *c, const char *key)
 }
 
 /* The key of a new cube, beside its file: one that is there is taken. */
-static int make_key(const struct cube_new *c, char *path, size_t size)
-{
+static int make_key(const struct cube_new *c, char *path, size_t size) {
     const char *slash = strrchr(c->output, '/');
     const char *name = slash == NULL ? c->output : slash + 1;
     const char *dot = strrchr(name, '.');
@@ -307,8 +292,7 @@ static int make_key(const struct cube_new *c, char *path, size_t size)
     return access(path, F_OK) == 0 ? 0 : host_key_make(path, c->error);
 }
 
-static int write_new(const struct cube_new *c)
-{
+static int write_new(const struct cube_new *c) {
     char key[4096] = "";
     if (c->hosts != NULL && access(c->output, F_OK) != 0 &&
         make_key(c, key, sizeof key) != 0) {
@@ -349,8 +333,7 @@ static int write_new(const struct cube_new *c)
     return 0;
 }
 
-int host_cube_command(int argc, char **argv, struct host_error *error)
-{
+int host_cube_command(int argc, char **argv, struct host_error *error) {
     static const struct argp argp = {
         options_of_cube,
         parse,

@@ -7,8 +7,7 @@
 #define NEVER UINT64_MAX
 
 static void print_wire(const struct host_cube_wire *wire, unsigned link,
-                       bool first, char text[HOST_NODE_OPTION_BYTES])
-{
+                       bool first, char text[HOST_NODE_OPTION_BYTES]) {
     char address[HOST_NODE_OPTION_BYTES / 2];
     if (wire->serial) {
         snprintf(text, HOST_NODE_OPTION_BYTES, "%u=serial:%s:%u%s", link,
@@ -25,8 +24,7 @@ static void print_wire(const struct host_cube_wire *wire, unsigned link,
 
 unsigned host_cube_node_options(
     const struct host_cube_file *file, unsigned node,
-    char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES])
-{
+    char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES]) {
     unsigned n = 0, count;
     const struct host_cube_wire *second = host_cube_host_wire(file, 1);
     const struct host_cube_wire *host = node == 0 ? host_cube_host_wire(file, 0)
@@ -87,8 +85,7 @@ unsigned host_cube_node_options(
 }
 
 const char *host_cube_start_line(const struct host_cube_file *file,
-                                 unsigned node, char *line, size_t size)
-{
+                                 unsigned node, char *line, size_t size) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     unsigned count = host_cube_node_options(file, node, options);
     const char *program = file->board_of[node]->program;
@@ -107,8 +104,7 @@ const char *host_cube_start_line(const struct host_cube_file *file,
 }
 
 const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
-                                size_t size)
-{
+                                size_t size) {
     if (wire->serial) {
         snprintf(name, size, "%s", wire->device[1]);
     } else {
@@ -118,8 +114,7 @@ const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
 }
 
 /* What a person does who has a board in the hand. */
-static void print_bare(const struct host_cube_file *file, unsigned node)
-{
+static void print_bare(const struct host_cube_file *file, unsigned node) {
     const struct host_board *board = file->board_of[node];
     char name[HOST_NODE_OPTION_BYTES];
     unsigned count;
@@ -145,8 +140,7 @@ static void print_bare(const struct host_cube_file *file, unsigned node)
     printf("\n");
 }
 
-int host_cube_print(const char *path, struct host_error *error)
-{
+int host_cube_print(const char *path, struct host_error *error) {
     /* A byte becomes "$(printf '\\377')" at most. */
     static char line[20 * HOST_NODE_OPTIONS_MAX * HOST_NODE_OPTION_BYTES];
     static struct host_cube_file file;

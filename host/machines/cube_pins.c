@@ -8,15 +8,13 @@
 static const char *const kinds[HOST_LINES] = {
     [HOST_LINE_RESET] = "reset", [HOST_LINE_BOOT] = "boot"};
 
-const char *host_line_name(enum host_line_kind kind)
-{
+const char *host_line_name(enum host_line_kind kind) {
     return kinds[kind];
 }
 
 const struct host_cube_pin *host_cube_pin(const struct host_cube_file *file,
                                           unsigned node,
-                                          enum host_line_kind kind)
-{
+                                          enum host_line_kind kind) {
     for (unsigned i = 0; i < file->pins; i++) {
         if (file->pin[i].node == node && file->pin[i].kind == kind) {
             return &file->pin[i];
@@ -26,8 +24,7 @@ const struct host_cube_pin *host_cube_pin(const struct host_cube_file *file,
 }
 
 int host_cube_make_pins(struct host_cube_file *file, unsigned entries,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     /* Beside them, DTR and RTS of the host's two wires: no more are read, as
      * each is a node's that has none. */
     size_t most = (size_t)HOST_LINES * entries + 4;
@@ -38,16 +35,14 @@ int host_cube_make_pins(struct host_cube_file *file, unsigned entries,
 /* "reset: WHAT" */
 static int wrong(const struct host_cube_file *file,
                  const config_setting_t *where, const char *name,
-                 const char *what, struct host_error *error)
-{
+                 const char *what, struct host_error *error) {
     char text[200];
     snprintf(text, sizeof text, "%s: %s", name, what);
     return host_cube_wrong(file, where, error, text);
 }
 
 static bool is_same(const struct host_cube_pin *a,
-                    const struct host_cube_pin *b)
-{
+                    const struct host_cube_pin *b) {
     return a->wire == b->wire &&
            (a->wire >= 0
                 ? a->rts == b->rts
@@ -57,8 +52,7 @@ static bool is_same(const struct host_cube_pin *a,
 
 /* Adds it, if it is the only one to do that, and does only that. */
 static int add(struct host_cube_file *file, const config_setting_t *where,
-               const struct host_cube_pin *pin, struct host_error *error)
-{
+               const struct host_cube_pin *pin, struct host_error *error) {
     const char *name = kinds[pin->kind];
     char text[160];
     for (unsigned i = 0; i < file->pins; i++) {
@@ -82,8 +76,7 @@ static int add(struct host_cube_file *file, const config_setting_t *where,
 
 /* A name that fits, and is one. */
 static bool take_name(const config_setting_t *setting,
-                      char name[HOST_PIN_NAME_MAX])
-{
+                      char name[HOST_PIN_NAME_MAX]) {
     const char *text =
         setting == NULL ? NULL : config_setting_get_string(setting);
     if (text == NULL || *text == '\0' || strlen(text) >= HOST_PIN_NAME_MAX) {
@@ -95,8 +88,7 @@ static bool take_name(const config_setting_t *setting,
 
 /* Its name, or its number on the chip. */
 static bool take_line(const config_setting_t *setting,
-                      struct host_cube_pin *pin)
-{
+                      struct host_cube_pin *pin) {
     int offset = 0;
     if (take_name(setting, pin->name)) {
         return true;
@@ -109,8 +101,7 @@ static bool take_line(const config_setting_t *setting,
 
 /* What may be left out: false. */
 static bool take_bool(const config_setting_t *group, const char *name,
-                      bool *value)
-{
+                      bool *value) {
     const config_setting_t *setting = config_setting_get_member(group, name);
     *value = setting != NULL && config_setting_get_bool(setting) != 0;
     return setting == NULL || config_setting_type(setting) == CONFIG_TYPE_BOOL;
@@ -118,8 +109,7 @@ static bool take_bool(const config_setting_t *group, const char *name,
 
 static int read_chip_line(struct host_cube_file *file,
                           const config_setting_t *group, unsigned node,
-                          enum host_line_kind kind, struct host_error *error)
-{
+                          enum host_line_kind kind, struct host_error *error) {
     static const char *const names[] = {"chip", "line", "active_low",
                                         "open_drain", NULL};
     struct host_cube_pin pin = {
@@ -154,8 +144,7 @@ static int read_chip_line(struct host_cube_file *file,
 
 int host_cube_read_pins(struct host_cube_file *file,
                         const config_setting_t *group, unsigned node,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     for (int k = 0; k < HOST_LINES && error->code == 0; k++) {
         const config_setting_t *line =
             config_setting_get_member(group, kinds[k]);
@@ -172,8 +161,7 @@ int host_cube_read_pins(struct host_cube_file *file,
 static int read_modem_line(struct host_cube_file *file,
                            const config_setting_t *setting,
                            const struct host_cube_wire *wire, bool rts,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     struct host_cube_pin pin = {.node = wire->node, .rts = rts};
     const char *text = config_setting_get_string(setting), *what = NULL;
     for (unsigned i = 0; i < file->wires; i++) {
@@ -198,8 +186,8 @@ static int read_modem_line(struct host_cube_file *file,
 
 int host_cube_read_modem(struct host_cube_file *file,
                          const config_setting_t *group,
-                         struct host_cube_wire *wire, struct host_error *error)
-{
+                         struct host_cube_wire *wire,
+                         struct host_error *error) {
     const config_setting_t *dtr = config_setting_get_member(group, "dtr");
     const config_setting_t *rts = config_setting_get_member(group, "rts");
     wire->dtr_low = dtr != NULL;

@@ -16,8 +16,7 @@ struct scan {
 };
 
 /* Past a text in quotes or a comment; `at` where there is none. */
-static const char *skip(const char *at)
-{
+static const char *skip(const char *at) {
     if (*at == '"') {
         do {
             at += *at == '\\' && at[1] != '\0' ? 2 : 1;
@@ -35,8 +34,7 @@ static const char *skip(const char *at)
 }
 
 /* What is wrong with the character there, or NULL. */
-static const char *take(struct scan *s)
-{
+static const char *take(struct scan *s) {
     switch (*s->at) {
     case '(':
     case '[':
@@ -65,8 +63,8 @@ static const char *take(struct scan *s)
     }
 }
 
-int host_cube_scan(const char *path, const char *text, struct host_error *error)
-{
+int host_cube_scan(const char *path, const char *text,
+                   struct host_error *error) {
     struct scan s = {.at = text, .line = 1};
     while (*s.at != '\0') {
         const char *end = skip(s.at);

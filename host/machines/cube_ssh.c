@@ -6,8 +6,7 @@
 #include "cube_reader.h"
 
 /* A word that no shell, and no option of ssh, takes for anything else. */
-static bool is_destination(const char *text)
-{
+static bool is_destination(const char *text) {
     bool good = text[0] != '\0' && text[0] != '-';
     for (const char *at = text; *at != '\0'; at++) {
         good =
@@ -17,8 +16,7 @@ static bool is_destination(const char *text)
 }
 
 /* A line feed would end a line of a unit of systemd. */
-static bool is_folder(const char *text)
-{
+static bool is_folder(const char *text) {
     bool good = text[0] != '\0';
     for (const char *at = text; *at != '\0'; at++) {
         good = good && (uint8_t)*at >= ' ' && *at != 0x7f;
@@ -28,8 +26,7 @@ static bool is_folder(const char *text)
 
 int host_cube_read_ssh(struct host_cube_file *file,
                        const config_setting_t *group, unsigned node,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     const config_setting_t *to = config_setting_get_member(group, "ssh");
     const config_setting_t *folder = config_setting_get_member(group, "folder");
     const char *text = to == NULL ? NULL : config_setting_get_string(to);
@@ -61,8 +58,7 @@ int host_cube_read_ssh(struct host_cube_file *file,
 }
 
 int host_cube_check_ssh(const struct host_cube_file *file,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     for (unsigned i = 0; i < file->nodes && error->code == 0; i++) {
         const struct host_cube_ssh *ssh = host_cube_ssh(file, i);
         if (ssh != NULL && (file->local[i] || host_cube_is_bare(file, i))) {
@@ -78,8 +74,7 @@ int host_cube_check_ssh(const struct host_cube_file *file,
 }
 
 const struct host_cube_ssh *host_cube_ssh(const struct host_cube_file *file,
-                                          unsigned node)
-{
+                                          unsigned node) {
     return file->ssh != NULL && node < file->nodes &&
                    file->ssh[node].to[0] != '\0'
                ? &file->ssh[node]

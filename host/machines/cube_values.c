@@ -8,8 +8,7 @@
 
 int host_cube_wrong(const struct host_cube_file *file,
                     const config_setting_t *where, struct host_error *error,
-                    const char *what)
-{
+                    const char *what) {
     return host_fail(error, HOST_INPUT, "%s:%u: %s", file->path,
                      where == NULL ? 1 : config_setting_source_line(where),
                      what);
@@ -17,8 +16,7 @@ int host_cube_wrong(const struct host_cube_file *file,
 
 int host_cube_check_names(const struct host_cube_file *file,
                           const config_setting_t *group,
-                          const char *const names[], struct host_error *error)
-{
+                          const char *const names[], struct host_error *error) {
     for (int i = 0; i < config_setting_length(group); i++) {
         const config_setting_t *member =
             config_setting_get_elem(group, (unsigned)i);
@@ -42,8 +40,7 @@ int host_cube_check_names(const struct host_cube_file *file,
 /* What libconfig reads of a setting of another
  * type, or of one beyond an int, is 0. */
 bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
-                         int *value)
-{
+                         int *value) {
     long long n = config_setting_get_int64(setting);
     int type = config_setting_type(setting);
     if ((type != CONFIG_TYPE_INT && type != CONFIG_TYPE_INT64) || n < lo ||
@@ -55,16 +52,14 @@ bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
 }
 
 bool host_cube_take_number(const config_setting_t *group, const char *name,
-                           int lo, int hi, int *value)
-{
+                           int lo, int hi, int *value) {
     const config_setting_t *member = config_setting_get_member(group, name);
     return member == NULL || host_cube_is_number(member, lo, hi, value);
 }
 
 int host_cube_resolve(const struct host_cube_file *file,
                       const config_setting_t *where,
-                      struct tcp_address *address, struct host_error *error)
-{
+                      struct tcp_address *address, struct host_error *error) {
     const char *text = config_setting_get_string(where);
     char why[400];
     int code = host_resolve(text == NULL ? "" : text, address, why, sizeof why);
@@ -74,8 +69,7 @@ int host_cube_resolve(const struct host_cube_file *file,
 }
 
 int host_cube_beside(const struct host_cube_file *file,
-                     const config_setting_t *where, char *path, size_t size)
-{
+                     const config_setting_t *where, char *path, size_t size) {
     const char *name = config_setting_get_string(where);
     const char *slash = strrchr(file->path, '/');
     if (name == NULL || name[0] == '\0') {
@@ -88,8 +82,7 @@ int host_cube_beside(const struct host_cube_file *file,
 }
 
 void host_cube_print_address(const struct tcp_address *address, char *text,
-                             size_t size)
-{
+                             size_t size) {
     if (tcp_address_path(address) != NULL) {
         snprintf(text, size, "%s", tcp_address_path(address));
         return;

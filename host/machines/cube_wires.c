@@ -9,8 +9,7 @@
 
 static int read_device(const struct host_cube_file *file,
                        const config_setting_t *pair, int end,
-                       char device[SERIAL_NAME_MAX], struct host_error *error)
-{
+                       char device[SERIAL_NAME_MAX], struct host_error *error) {
     const char *name = config_setting_get_string_elem(pair, end);
     if (name == NULL || strlen(name) >= SERIAL_NAME_MAX ||
         config_setting_length(pair) != 2) {
@@ -24,8 +23,7 @@ static int read_device(const struct host_cube_file *file,
 }
 
 static int read_line(struct host_cube_file *file, const config_setting_t *group,
-                     struct host_cube_wire *wire, struct host_error *error)
-{
+                     struct host_cube_wire *wire, struct host_error *error) {
     const config_setting_t *pair = config_setting_get_member(group, "serial");
     const config_setting_t *flow = config_setting_get_member(group, "rtscts");
     int baud = 115200;
@@ -53,8 +51,7 @@ static int read_line(struct host_cube_file *file, const config_setting_t *group,
  * is not. */
 static int read_guard(const struct host_cube_file *file,
                       const config_setting_t *group,
-                      struct host_cube_wire *wire, struct host_error *error)
-{
+                      struct host_cube_wire *wire, struct host_error *error) {
     const config_setting_t *insecure =
         config_setting_get_member(group, "insecure");
     if (insecure != NULL && config_setting_type(insecure) != CONFIG_TYPE_BOOL) {
@@ -75,8 +72,7 @@ static int read_guard(const struct host_cube_file *file,
 
 static int read_net(const struct host_cube_file *file,
                     const config_setting_t *group, struct host_cube_wire *wire,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     const config_setting_t *at = config_setting_get_member(group, "tcp");
     const config_setting_t *via = config_setting_get_member(group, "via");
     if (host_cube_resolve(file, at, &wire->at, error) != 0) {
@@ -91,8 +87,7 @@ static int read_net(const struct host_cube_file *file,
 
 static int read_path(const struct host_cube_file *file,
                      const config_setting_t *group, struct host_cube_wire *wire,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const config_setting_t *unix_path =
         config_setting_get_member(group, "unix");
     char path[TCP_PATH_MAX + 1];
@@ -110,8 +105,7 @@ static int read_path(const struct host_cube_file *file,
 /* A node's number, or the host. */
 static int read_end(const struct host_cube_file *file,
                     const config_setting_t *group, const char *name,
-                    uint16_t *node, struct host_error *error)
-{
+                    uint16_t *node, struct host_error *error) {
     const config_setting_t *end = config_setting_get_member(group, name);
     const char *text = end == NULL ? NULL : config_setting_get_string(end);
     int number = 0;
@@ -136,8 +130,7 @@ static int read_end(const struct host_cube_file *file,
  */
 static int check_beside(const struct host_cube_file *file,
                         const config_setting_t *group, const char *kind,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     static const char *const of[][2] = {
         {"via", "tcp"},       {"insecure", "tcp"}, {"baud", "serial"},
         {"rtscts", "serial"}, {"dtr", "serial"},   {"rts", "serial"}};
@@ -157,8 +150,7 @@ static int check_beside(const struct host_cube_file *file,
 }
 
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     static const char *const names[] = {"node", "to",     "tcp",      "via",
                                         "unix", "serial", "baud",     "rtscts",
                                         "dtr",  "rts",    "insecure", NULL};
@@ -204,8 +196,7 @@ int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
 
 const struct host_cube_wire *
 host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
-                  unsigned *count)
-{
+                  unsigned *count) {
     const struct host_cube_wire *found = NULL;
     *count = 0;
     for (unsigned i = 0; i < file->wires; i++) {
@@ -219,8 +210,7 @@ host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
 }
 
 const struct host_cube_wire *
-host_cube_host_wire(const struct host_cube_file *file, unsigned k)
-{
+host_cube_host_wire(const struct host_cube_file *file, unsigned k) {
     for (unsigned i = 0; i < file->wires; i++) {
         if (file->wire[i].to == CUBE_HOST && k-- == 0) {
             return &file->wire[i];
@@ -230,8 +220,7 @@ host_cube_host_wire(const struct host_cube_file *file, unsigned k)
 }
 
 /* The host's machine has the ports of all nodes that it starts. */
-static unsigned owner(const struct host_cube_file *file, unsigned node)
-{
+static unsigned owner(const struct host_cube_file *file, unsigned node) {
     return node == CUBE_HOST || file->local[node] ? CUBE_HOST : node;
 }
 
@@ -239,8 +228,8 @@ static unsigned owner(const struct host_cube_file *file, unsigned node)
 
 /* Whether both have an end on one machine, as far as that is known. */
 static bool meet(const struct host_cube_file *file,
-                 const struct host_cube_wire *a, const struct host_cube_wire *b)
-{
+                 const struct host_cube_wire *a,
+                 const struct host_cube_wire *b) {
     return owner(file, a->node) == owner(file, b->node) ||
            owner(file, a->node) == owner(file, b->to) ||
            owner(file, a->to) == owner(file, b->node) ||
@@ -250,8 +239,7 @@ static bool meet(const struct host_cube_file *file,
 /* Two that listen at one address: on one machine, or at one address of all. */
 static bool same_address(const struct host_cube_file *file,
                          const struct host_cube_wire *a,
-                         const struct host_cube_wire *b)
-{
+                         const struct host_cube_wire *b) {
     if (a->serial || b->serial || a->at.size != b->at.size ||
         memcmp(&a->at.to, &b->at.to, a->at.size) != 0) {
         return false;
@@ -265,8 +253,7 @@ static bool same_address(const struct host_cube_file *file,
 /* The device at the ends of both that is the same one; NULL: none. */
 static const char *same_device(const struct host_cube_file *file,
                                const struct host_cube_wire *a,
-                               const struct host_cube_wire *b)
-{
+                               const struct host_cube_wire *b) {
     const char *found = NULL;
     for (int i = 0; i < 4 && a->serial && b->serial; i++) {
         unsigned left = i / 2 == 0 ? a->node : a->to;
@@ -280,8 +267,7 @@ static const char *same_device(const struct host_cube_file *file,
 }
 
 /* "nodes 0 and 1", "node 0 and the host" */
-static void name_wire(const struct host_cube_wire *wire, char text[40])
-{
+static void name_wire(const struct host_cube_wire *wire, char text[40]) {
     if (wire->to == CUBE_HOST) {
         snprintf(text, 40, "node %u and the host", wire->node);
     } else {
@@ -290,16 +276,14 @@ static void name_wire(const struct host_cube_wire *wire, char text[40])
 }
 
 void host_cube_name_wire(const struct host_cube_file *file,
-                         const struct host_cube_wire *wire, char text[160])
-{
+                         const struct host_cube_wire *wire, char text[160]) {
     char ends[40];
     name_wire(wire, ends);
     snprintf(text, 160, "%.80s:%u: the wire between %s", file->path, wire->line,
              ends);
 }
 
-const struct host_link *host_cube_link(const struct host_cube_file *file)
-{
+const struct host_link *host_cube_link(const struct host_cube_file *file) {
     const char *first = NULL;
     for (unsigned i = 0; i < file->wires; i++) {
         const struct host_cube_wire *w = &file->wire[i];
@@ -318,8 +302,7 @@ const struct host_link *host_cube_link(const struct host_cube_file *file)
 }
 
 int host_cube_check_ends(const struct host_cube_file *file,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     char address[HOST_NODE_OPTION_BYTES / 2], names[2][40];
     for (unsigned i = 0; i < file->wires; i++) {
         const struct host_cube_wire *w = &file->wire[i];
@@ -353,8 +336,7 @@ int host_cube_check_ends(const struct host_cube_file *file,
 
 int host_cube_check_wires(const struct host_cube_file *file,
                           const config_setting_t *list,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     const struct host_cube_wire *first = host_cube_host_wire(file, 0);
     const struct host_cube_wire *second = host_cube_host_wire(file, 1);
     char text[120];

@@ -18,8 +18,7 @@ extern char **environ;
 /* --- what it needs -------------------------------------------------------- */
 
 static int find_program(const struct host_bare *bare, char path[PATH_MAX],
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     const char *folders = getenv("PATH");
     folders = folders == NULL ? "/usr/bin:/bin" : folders;
     while (*folders != '\0') {
@@ -39,8 +38,7 @@ static int find_program(const struct host_bare *bare, char path[PATH_MAX],
 
 /* Where `make firmware` and `make install` put it. */
 static int find_image(const char *image, char path[PATH_MAX],
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     static const char *const folders[] = {"firmware", "../lib/incode"};
     char here[PATH_MAX - 64];
     ssize_t length = readlink("/proc/self/exe", here, sizeof here - 1);
@@ -64,8 +62,8 @@ static int find_image(const char *image, char path[PATH_MAX],
 }
 
 int host_emulator_find(const struct host_bare *bare,
-                       struct host_emulator *emulator, struct host_error *error)
-{
+                       struct host_emulator *emulator,
+                       struct host_error *error) {
     memset(emulator, 0, sizeof *emulator);
     emulator->bare = bare;
     emulator->flash.fd = emulator->qmp.fd = emulator->errors = -1;
@@ -80,8 +78,7 @@ int host_emulator_find(const struct host_bare *bare,
     return find_image(bare->loader, emulator->kernel, error);
 }
 
-bool host_firmware_find(const char *board, char path[PATH_MAX])
-{
+bool host_firmware_find(const char *board, char path[PATH_MAX]) {
     const struct host_board *row = host_board_named(board);
     struct host_error error = {0};
     char here[PATH_MAX];
@@ -107,8 +104,7 @@ struct words {
 };
 
 static __attribute__((format(printf, 2, 3))) void add(struct words *w,
-                                                      const char *format, ...)
-{
+                                                      const char *format, ...) {
     va_list list;
     va_start(list, format);
     if (w->count < ARGUMENTS_MAX) {
@@ -118,15 +114,14 @@ static __attribute__((format(printf, 2, 3))) void add(struct words *w,
     va_end(list);
 }
 
-static bool is_given(struct host_place place)
-{
+static bool is_given(struct host_place place) {
     return place.fd >= 0 || place.path != NULL;
 }
 
 /* Behind the last word: a name of a file in a list of settings, where a comma
  * is written twice. */
-static void add_file(struct words *w, const char *name, struct host_place place)
-{
+static void add_file(struct words *w, const char *name,
+                     struct host_place place) {
     char *text = w->text[w->count - 1];
     size_t used = strlen(text);
     used += (size_t)snprintf(text + used, ARGUMENT_BYTES - used, ",%s=", name);
@@ -150,8 +145,7 @@ static void add_file(struct words *w, const char *name, struct host_place place)
 
 /* A device of characters: NAME, by which others name it. */
 static void add_device(struct words *w, const char *name, unsigned number,
-                       struct host_place wire, struct host_place log)
-{
+                       struct host_place wire, struct host_place log) {
     add(w, "-chardev");
     if (wire.fd >= 0) {
         (void)fcntl(wire.fd, F_SETFD, 0);
@@ -169,8 +163,7 @@ static void add_device(struct words *w, const char *name, unsigned number,
     }
 }
 
-static void add_flash(struct words *w, struct host_place flash, bool card)
-{
+static void add_flash(struct words *w, struct host_place flash, bool card) {
     if (is_given(flash) && card) {
         add(w, "-drive");
         add(w, "if=sd,format=raw");
@@ -184,8 +177,7 @@ static void add_flash(struct words *w, struct host_place flash, bool card)
 }
 
 /* The one of the processors that are allowed, in turn. */
-static void stay_on_one(unsigned turn)
-{
+static void stay_on_one(unsigned turn) {
     cpu_set_t allowed, one;
     CPU_ZERO(&one);
     if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {
@@ -201,8 +193,7 @@ static void stay_on_one(unsigned turn)
     }
 }
 
-void host_emulator_become(const struct host_emulator *emulator, unsigned turn)
-{
+void host_emulator_become(const struct host_emulator *emulator, unsigned turn) {
     static struct words words;
     static const struct host_place none = {-1, NULL};
     const struct host_emulator *e = emulator;

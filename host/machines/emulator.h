@@ -65,8 +65,7 @@ struct host_emulator {
 };
 
 /* The most nodes in a cube of such boards. */
-static inline unsigned host_bare_nodes_max(const struct host_bare *bare)
-{
+static inline unsigned host_bare_nodes_max(const struct host_bare *bare) {
     return 1u << (bare->uarts - 1);
 }
 

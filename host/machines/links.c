@@ -32,19 +32,16 @@ static const struct host_link of_files[] = {
      .needs = "socket pairs"},
 };
 
-const struct host_link *host_link_row(unsigned i)
-{
+const struct host_link *host_link_row(unsigned i) {
     return i < sizeof rows / sizeof rows[0] ? &rows[i] : NULL;
 }
 
-const char *host_link_name(unsigned i)
-{
+const char *host_link_name(unsigned i) {
     const struct host_link *link = host_link_row(i);
     return link == NULL ? NULL : link->name;
 }
 
-const struct host_link *host_link_named(const char *name)
-{
+const struct host_link *host_link_named(const char *name) {
     const struct host_link *link;
     unsigned i;
     for (i = 0; (link = host_link_row(i)) != NULL; i++) {

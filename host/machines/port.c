@@ -8,8 +8,7 @@
 #include "host/base/clock.h"
 #include "transport/drivers/wait.h"
 
-void host_port_socket(struct host_port *port, int fd)
-{
+void host_port_socket(struct host_port *port, int fd) {
     memset(port, 0, sizeof *port);
     port->kind = fd < 0 ? HOST_PORT_NONE : HOST_PORT_SOCKET;
     tcp_pipe_init(&port->tcp, fd);
@@ -17,8 +16,7 @@ void host_port_socket(struct host_port *port, int fd)
 
 int host_port_serial(struct host_port *port,
                      const struct serial_port_settings *settings,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     memset(port, 0, sizeof *port);
     if (serial_port_open(&port->serial, settings) != 0) {
         return host_fail(error, HOST_CUBE, "%s", port->serial.fault);
@@ -28,8 +26,7 @@ int host_port_serial(struct host_port *port,
 }
 
 int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     memset(port, 0, sizeof *port);
     if (tcp_wire_open(&port->net, config) != 0) {
         return host_fail(error, HOST_CUBE,
@@ -40,15 +37,13 @@ int host_port_net(struct host_port *port, const struct tcp_wire_config *config,
     return 0;
 }
 
-struct link_pipe host_port_pipe(struct host_port *port)
-{
+struct link_pipe host_port_pipe(struct host_port *port) {
     return port->kind == HOST_PORT_SERIAL ? serial_link_pipe(&port->serial.pipe)
            : port->kind == HOST_PORT_NET  ? tcp_wire_pipe(&port->net)
                                           : tcp_link_pipe(&port->tcp);
 }
 
-static void unplug(struct host_port *port)
-{
+static void unplug(struct host_port *port) {
     uint64_t now_us = host_now_us();
     if (port->unplugged_us == 0 || port->serial.pipe.fd < 0) {
         port->unplugged_us = now_us;
@@ -63,8 +58,7 @@ static void unplug(struct host_port *port)
 }
 
 /* Adds what to wait for: the number of entries. */
-static unsigned add_events(const struct host_port *port, struct pollfd *fds)
-{
+static unsigned add_events(const struct host_port *port, struct pollfd *fds) {
     switch (port->kind) {
     case HOST_PORT_NET:
         return tcp_wire_events(&port->net, fds);
@@ -81,8 +75,7 @@ static unsigned add_events(const struct host_port *port, struct pollfd *fds)
     }
 }
 
-void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
-{
+void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us) {
     struct pollfd fds[CUBE_HOST_PORTS_MAX * TCP_WIRE_FDS_MAX];
     nfds_t used = 0;
     for (unsigned i = 0; i < count; i++) {
@@ -100,27 +93,23 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us)
     wait_files(fds, used, wait_us, 0);
 }
 
-void host_port_rest(struct host_port *port, uint64_t rest_us)
-{
+void host_port_rest(struct host_port *port, uint64_t rest_us) {
     if (port->kind == HOST_PORT_NET) {
         tcp_wire_rest(&port->net, rest_us);
     }
 }
 
-int host_port_fault(const struct host_port *port)
-{
+int host_port_fault(const struct host_port *port) {
     return port->kind == HOST_PORT_NET && port->net.tcp.fd < 0 ? port->net.fault
                                                                : 0;
 }
 
-struct tcp_wire_doubt host_port_doubt(const struct host_port *port)
-{
+struct tcp_wire_doubt host_port_doubt(const struct host_port *port) {
     return port->kind == HOST_PORT_NET ? tcp_wire_doubt(&port->net)
                                        : (struct tcp_wire_doubt){NULL, NULL};
 }
 
-void host_port_close(struct host_port *port)
-{
+void host_port_close(struct host_port *port) {
     if (port->kind == HOST_PORT_SERIAL) {
         serial_port_close(&port->serial);
     } else if (port->kind == HOST_PORT_SOCKET) {

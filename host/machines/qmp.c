@@ -10,23 +10,21 @@
 
 #include "host/base/clock.h"
 
-void host_qmp_init(struct host_qmp *qmp, int fd)
-{
+void host_qmp_init(struct host_qmp *qmp, int fd) {
     memset(qmp, 0, sizeof *qmp);
     qmp->fd = fd;
     qmp->wait_us = HOST_QMP_US;
 }
 
-static int fail(struct host_error *error, const char *why)
-{
+static int fail(struct host_error *error, const char *why) {
     return host_fail(error, HOST_CUBE,
                      "the emulator's monitor: %s; is the emulator stopped?",
                      why);
 }
 
 /* False: not before due_us. */
-static bool wait_for(const struct host_qmp *qmp, short events, uint64_t due_us)
-{
+static bool wait_for(const struct host_qmp *qmp, short events,
+                     uint64_t due_us) {
     uint64_t now = host_now_us();
     struct pollfd one = {.fd = qmp->fd, .events = events};
     return now < due_us &&
@@ -34,8 +32,7 @@ static bool wait_for(const struct host_qmp *qmp, short events, uint64_t due_us)
 }
 
 static int say(const struct host_qmp *qmp, const char *text, uint64_t due_us,
-               struct host_error *error)
-{
+               struct host_error *error) {
     size_t size = strlen(text);
     while (size > 0) {
         ssize_t sent = send(qmp->fd, text, size, MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -53,8 +50,7 @@ static int say(const struct host_qmp *qmp, const char *text, uint64_t due_us,
 
 /* The next line as an object, which the caller frees; NULL with the error. */
 static json_t *hear(struct host_qmp *qmp, uint64_t due_us,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     for (;;) {
         char *end = memchr(qmp->line, '\n', qmp->used);
         if (end != NULL) {
@@ -90,8 +86,7 @@ static json_t *hear(struct host_qmp *qmp, uint64_t due_us,
 /* Listens until an object has one of two members: 0 for the first, 1 for the
  * second, or -1 with the error. */
 static int await(struct host_qmp *qmp, const char *good, const char *bad,
-                 uint64_t due_us, struct host_error *error)
-{
+                 uint64_t due_us, struct host_error *error) {
     json_t *object;
     int found = -1;
     while (found < 0 && (object = hear(qmp, due_us, error)) != NULL) {
@@ -106,8 +101,7 @@ static int await(struct host_qmp *qmp, const char *good, const char *bad,
 }
 
 static int request(struct host_qmp *qmp, const char *name, uint64_t due_us,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     char text[64];
     snprintf(text, sizeof text, "{\"execute\":\"%s\"}\n", name);
     if (say(qmp, text, due_us, error) != 0) {
@@ -118,8 +112,7 @@ static int request(struct host_qmp *qmp, const char *name, uint64_t due_us,
 }
 
 int host_qmp_ask(struct host_qmp *qmp, enum host_qmp_request what,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     static const char *const names[] = {[HOST_QMP_STOP] = "stop",
                                         [HOST_QMP_CONT] = "cont",
                                         [HOST_QMP_RESET] = "system_reset"};
@@ -135,8 +128,7 @@ int host_qmp_ask(struct host_qmp *qmp, enum host_qmp_request what,
     return request(qmp, names[what], due_us, error);
 }
 
-void host_qmp_forget(struct host_qmp *qmp)
-{
+void host_qmp_forget(struct host_qmp *qmp) {
     qmp->ready = false;
     qmp->skipping = false;
     qmp->used = 0;

@@ -17,8 +17,7 @@
 #include "transport/drivers/unix_file.h"
 
 /* In the child: becomes the node. */
-static void become_node(const void *context, unsigned node)
-{
+static void become_node(const void *context, unsigned node) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     static char name[HOST_NODE_OPTION_BYTES];
     const struct host_remote *r = context;
@@ -33,8 +32,7 @@ static void become_node(const void *context, unsigned node)
 }
 
 static int start_node(struct host_remote *r, unsigned node,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const struct host_child child = {node, r->program,
                                      "start it yourself and take it from start",
                                      become_node, r};
@@ -42,8 +40,7 @@ static int start_node(struct host_remote *r, unsigned node,
 }
 
 static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const struct host_cube_file *file = r->file;
     struct host_port *port = &r->port[r->ports];
     r->ends[r->ports] = (struct secure_ends){
@@ -79,8 +76,8 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
     return 0;
 }
 
-const struct host_board *host_remote_started(const struct host_cube_file *file)
-{
+const struct host_board *
+host_remote_started(const struct host_cube_file *file) {
     for (unsigned i = 0; i < file->nodes; i++) {
         if (file->local[i]) {
             return file->board_of[i];
@@ -90,8 +87,7 @@ const struct host_board *host_remote_started(const struct host_cube_file *file)
 }
 
 int host_remote_program(const struct host_cube_file *file, const char *given,
-                        char *path, size_t size, struct host_error *error)
-{
+                        char *path, size_t size, struct host_error *error) {
     const struct host_board *board = host_remote_started(file);
     path[0] = '\0';
     return board == NULL
@@ -100,8 +96,7 @@ int host_remote_program(const struct host_cube_file *file, const char *given,
 }
 
 /* What stands for a file's name is such words already. */
-static void tell_where(const struct host_cube_file *file, char *where)
-{
+static void tell_where(const struct host_cube_file *file, char *where) {
     static const char option[] = "--cube ";
     enum { HEAD = sizeof option - 1 };
     memcpy(where, option, sizeof option);
@@ -115,8 +110,7 @@ static void tell_where(const struct host_cube_file *file, char *where)
 
 int host_remote_start(struct host_remote *remote,
                       const struct host_cube_file *file, const char *program,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     char wire[HOST_WIRE_NAME];
     if (sodium_init() < 0) { /* the fastest code for this processor */
         return host_fail(error, HOST_BROKEN,
@@ -149,8 +143,7 @@ enum { PATH_BYTES = PATH_MAX + SERIAL_NAME_MAX + 1, LOOK_AGAIN_US = 50000 };
 
 /* What is there, by whatever name it is called; of a socket that is not there
  * yet, its folder. */
-static void put_path(const char *path, char *name)
-{
+static void put_path(const char *path, char *name) {
     char folder[PATH_MAX], real[PATH_MAX];
     const char *slash = strrchr(path, '/');
     size_t size = slash == NULL ? 0 : (size_t)(slash - path);
@@ -167,8 +160,7 @@ static void put_path(const char *path, char *name)
 }
 
 void host_remote_wire(const struct host_cube_file *file,
-                      char name[HOST_WIRE_NAME])
-{
+                      char name[HOST_WIRE_NAME]) {
     const struct host_cube_wire *wire = host_cube_host_wire(file, 0);
     char path[PATH_BYTES], text[SERIAL_NAME_MAX];
     const char *socket = wire == NULL ? NULL : tcp_address_path(&wire->via);
@@ -187,8 +179,7 @@ void host_remote_wire(const struct host_cube_file *file,
 }
 
 int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     char wire[HOST_WIRE_NAME], text[HOST_HOLDER_TEXT], where[HOST_REMOTE_WHERE];
     struct host_holder holder;
     uint64_t begun_us = host_now_us();
@@ -215,8 +206,7 @@ int host_remote_free(const struct host_cube_file *file, uint64_t wait_us,
     return 0;
 }
 
-void host_remote_stop(struct host_remote *remote)
-{
+void host_remote_stop(struct host_remote *remote) {
     host_offer_end(&remote->offer);
     for (unsigned i = 0; i < remote->file->nodes; i++) {
         (void)host_child_kill(&remote->process[i]);
@@ -236,20 +226,17 @@ void host_remote_stop(struct host_remote *remote)
 
 /* --- as a machine --------------------------------------------------------- */
 
-static uint64_t machine_now_us(void *context)
-{
+static uint64_t machine_now_us(void *context) {
     (void)context;
     return host_now_us();
 }
 
-static void machine_idle(void *context, uint64_t wait_us)
-{
+static void machine_idle(void *context, uint64_t wait_us) {
     struct host_remote *r = context;
     host_port_idle(r->port, r->ports, wait_us);
 }
 
-static int machine_check(void *context, struct host_error *error)
-{
+static int machine_check(void *context, struct host_error *error) {
     struct host_remote *r = context;
     if (!host_child_any_died()) {
         return 0;
@@ -268,26 +255,22 @@ static int machine_check(void *context, struct host_error *error)
     return 0;
 }
 
-static unsigned machine_restarts(void *context)
-{
+static unsigned machine_restarts(void *context) {
     return ((struct host_remote *)context)->restarts;
 }
 
-static uint64_t machine_starved_us(void *context, unsigned node)
-{
+static uint64_t machine_starved_us(void *context, unsigned node) {
     const struct host_remote *r = context;
     return host_child_starved_us(&r->process[node]);
 }
 
-static bool machine_kill(void *context, unsigned node)
-{
+static bool machine_kill(void *context, unsigned node) {
     const struct host_remote *r = context;
     return host_child_kill(&r->process[node]);
 }
 
 /* Which of the host's own wires leads to the node; -1: none. */
-static int port_to(const struct host_remote *r, unsigned node)
-{
+static int port_to(const struct host_remote *r, unsigned node) {
     for (unsigned i = 0; i < r->ports; i++) {
         if (host_cube_host_wire(r->file, i)->node == node) {
             return (int)i;
@@ -296,8 +279,7 @@ static int port_to(const struct host_remote *r, unsigned node)
     return -1;
 }
 
-static const char *machine_doubt(void *context, unsigned node)
-{
+static const char *machine_doubt(void *context, unsigned node) {
     static char text[TCP_PATH_MAX + 160];
     const struct host_remote *r = context;
     int port = port_to(r, node);
@@ -331,8 +313,7 @@ static const char *machine_doubt(void *context, unsigned node)
     return fault == 0 ? NULL : text;
 }
 
-static const char *machine_start_line(void *context, unsigned node)
-{
+static const char *machine_start_line(void *context, unsigned node) {
     static char line[1600];
     const struct host_remote *r = context;
     return r->file->local[node]
@@ -340,8 +321,7 @@ static const char *machine_start_line(void *context, unsigned node)
                : host_cube_start_line(r->file, node, line, sizeof line);
 }
 
-static const char *machine_address(void *context, unsigned node)
-{
+static const char *machine_address(void *context, unsigned node) {
     static char name[SERIAL_NAME_MAX];
     const struct host_remote *r = context;
     int port = port_to(r, node);
@@ -351,8 +331,7 @@ static const char *machine_address(void *context, unsigned node)
                           sizeof name);
 }
 
-static void machine_rest(void *context, uint64_t rest_us)
-{
+static void machine_rest(void *context, uint64_t rest_us) {
     struct host_remote *r = context;
     for (unsigned i = 0; i < r->ports; i++) {
         host_port_rest(&r->port[i], rest_us);
@@ -360,20 +339,17 @@ static void machine_rest(void *context, uint64_t rest_us)
 }
 
 /* Nothing tells of nodes elsewhere, and those here begin anew. */
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     (void)context;
     return true;
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     host_remote_stop(context);
 }
 
 /* A node that starts again may need a moment to find its neighbours. */
-static uint8_t absent_s(const struct host_cube_file *file)
-{
+static uint8_t absent_s(const struct host_cube_file *file) {
     unsigned s = file->dead_s;
     return (uint8_t)(s == 0                  ? 0
                      : s < HOST_ABSENT_MIN_S ? HOST_ABSENT_MIN_S
@@ -383,8 +359,7 @@ static uint8_t absent_s(const struct host_cube_file *file)
 
 /* A bare board's console shares its wire; what is at one that no file names is
  * not known. */
-static struct link_pipe pipe_of(struct host_remote *r, unsigned port)
-{
+static struct link_pipe pipe_of(struct host_remote *r, unsigned port) {
     const struct host_cube_wire *wire = host_cube_host_wire(r->file, port);
     unsigned node = wire->node;
     struct link_pipe pipe = host_port_pipe(&r->port[port]);
@@ -395,8 +370,7 @@ static struct link_pipe pipe_of(struct host_remote *r, unsigned port)
     return host_console_pipe(&r->console[port], pipe);
 }
 
-struct host_machine host_remote_machine(struct host_remote *remote)
-{
+struct host_machine host_remote_machine(struct host_remote *remote) {
     const struct host_cube_wire *second = host_cube_host_wire(remote->file, 1);
     struct host_machine machine;
     memset(&machine, 0, sizeof machine);

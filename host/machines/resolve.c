@@ -7,8 +7,7 @@
 #include "host/base/parse.h"
 
 int host_resolve(const char *text, struct tcp_address *address, char *why,
-                 size_t size)
-{
+                 size_t size) {
     struct addrinfo hints = {.ai_socktype = SOCK_STREAM}, *found = NULL;
     char host[256];
     const char *colon = strrchr(text, ':');

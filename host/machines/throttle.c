@@ -4,35 +4,30 @@
 
 enum { RATE_IDLE_US = 1000 };
 
-static uint64_t draw(uint64_t *state)
-{
+static uint64_t draw(uint64_t *state) {
     *state ^= *state << 13;
     *state ^= *state >> 7;
     *state ^= *state << 17;
     return *state;
 }
 
-static void sleep_us(uint64_t us)
-{
+static void sleep_us(uint64_t us) {
     struct timespec wait = {(time_t)(us / 1000000),
                             (long)(us % 1000000) * 1000};
     (void)nanosleep(&wait, NULL);
 }
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     struct host_throttled *t = context;
     return t->machine.now_us(t->machine.context);
 }
 
-static int send_on(void *context, const uint8_t *bytes, size_t size)
-{
+static int send_on(void *context, const uint8_t *bytes, size_t size) {
     struct host_throttled_wire *wire = context;
     return wire->pipe.send(wire->pipe.context, bytes, size);
 }
 
-static int receive_slowly(void *context, uint8_t *bytes, size_t size)
-{
+static int receive_slowly(void *context, uint8_t *bytes, size_t size) {
     struct host_throttled_wire *wire = context;
     struct host_throttled *t = wire->throttled;
     uint64_t passed = now_us(t) - t->start_us;
@@ -52,8 +47,7 @@ static int receive_slowly(void *context, uint8_t *bytes, size_t size)
 }
 
 /* Bytes that may not be read yet must not wake. */
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     struct host_throttled *t = context;
     if (t->throttle.bytes_a_second != 0) {
         sleep_us(wait_us < RATE_IDLE_US ? wait_us : RATE_IDLE_US);
@@ -62,82 +56,70 @@ static void idle(void *context, uint64_t wait_us)
     }
 }
 
-static int check(void *context, struct host_error *error)
-{
+static int check(void *context, struct host_error *error) {
     struct host_throttled *t = context;
     return t->machine.check(t->machine.context, error);
 }
 
-static void missing(void *context, unsigned node, unsigned link)
-{
+static void missing(void *context, unsigned node, unsigned link) {
     struct host_throttled *t = context;
     t->machine.missing(t->machine.context, node, link);
 }
 
-static void told(void *context, const char *line)
-{
+static void told(void *context, const char *line) {
     struct host_throttled *t = context;
     t->machine.told(t->machine.context, line);
 }
 
-static unsigned restarts(void *context)
-{
+static unsigned restarts(void *context) {
     struct host_throttled *t = context;
     return t->machine.restarts(t->machine.context);
 }
 
-static uint64_t starved_us(void *context, unsigned node)
-{
+static uint64_t starved_us(void *context, unsigned node) {
     struct host_throttled *t = context;
     return t->machine.starved_us(t->machine.context, node);
 }
 
-static bool kill_node(void *context, unsigned node)
-{
+static bool kill_node(void *context, unsigned node) {
     struct host_throttled *t = context;
     return t->machine.kill(t->machine.context, node);
 }
 
-static const char *doubt(void *context, unsigned node)
-{
+static const char *doubt(void *context, unsigned node) {
     struct host_throttled *t = context;
     return t->machine.doubt(t->machine.context, node);
 }
 
-static const char *start_line(void *context, unsigned node)
-{
+static const char *start_line(void *context, unsigned node) {
     struct host_throttled *t = context;
     return t->machine.start_line(t->machine.context, node);
 }
 
-static const char *address(void *context, unsigned node)
-{
+static const char *address(void *context, unsigned node) {
     struct host_throttled *t = context;
     return t->machine.address(t->machine.context, node);
 }
 
-static void rest(void *context, uint64_t rest_us)
-{
+static void rest(void *context, uint64_t rest_us) {
     struct host_throttled *t = context;
     t->machine.rest(t->machine.context, rest_us);
 }
 
-static bool ended(void *context)
-{
+static bool ended(void *context) {
     struct host_throttled *t = context;
     return t->machine.ended(t->machine.context);
 }
 
-static void stop(void *context)
-{
+static void stop(void *context) {
     struct host_throttled *t = context;
     t->machine.stop(t->machine.context);
 }
 
-struct host_machine host_throttle_machine(struct host_throttled *throttled,
-                                          const struct host_machine *machine,
-                                          const struct host_throttle *throttle)
-{
+struct host_machine
+host_throttle_machine(struct host_throttled *throttled,
+                      const struct host_machine *machine,
+                      const struct host_throttle *throttle) {
     struct host_machine result = *machine;
     throttled->machine = *machine;
     throttled->throttle = *throttle;

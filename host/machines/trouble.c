@@ -1,8 +1,7 @@
 #include "trouble.h"
 
 bool host_trouble_due(struct host_troubled *troubled, uint64_t now_us,
-                      enum host_trouble_kind *kind, unsigned *node)
-{
+                      enum host_trouble_kind *kind, unsigned *node) {
     struct host_troubled *t = troubled;
     if (t->stopped && now_us - t->last_us[HOST_TROUBLE_STOP] >=
                           t->trouble.every_us[HOST_TROUBLE_STOP] / 2) {

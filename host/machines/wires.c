@@ -4,8 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-static void close_end(int *end)
-{
+static void close_end(int *end) {
     if (*end >= 0) {
         close(*end);
         *end = -1;
@@ -14,8 +13,7 @@ static void close_end(int *end)
 
 static int make_between_nodes(struct host_wires *wires,
                               const struct host_link *link, unsigned nodes,
-                              unsigned dimension, struct host_error *error)
-{
+                              unsigned dimension, struct host_error *error) {
     int pair[2];
     for (unsigned i = 0; i < nodes; i++) {
         for (unsigned d = 0; d < dimension; d++) {
@@ -39,8 +37,7 @@ static int make_between_nodes(struct host_wires *wires,
 
 static int make_to_host(struct host_wires *wires, const struct host_link *link,
                         unsigned dimension, unsigned node,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     int pair[2];
     if (link->pair(pair) != 0) {
         return host_fail(error, HOST_CUBE,
@@ -60,8 +57,7 @@ static int make_to_host(struct host_wires *wires, const struct host_link *link,
 
 int host_wires_make(struct host_wires *wires, const struct host_link *link,
                     unsigned nodes, unsigned dimension, unsigned host_ports,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     memset(wires, -1, sizeof *wires);
     wires->host_path[0] = '\0';
     int status = make_between_nodes(wires, link, nodes, dimension, error);
@@ -74,8 +70,7 @@ int host_wires_make(struct host_wires *wires, const struct host_link *link,
     return status;
 }
 
-void host_wires_close_nodes(struct host_wires *wires)
-{
+void host_wires_close_nodes(struct host_wires *wires) {
     for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
             close_end(&wires->end[i][d]);
@@ -83,8 +78,7 @@ void host_wires_close_nodes(struct host_wires *wires)
     }
 }
 
-void host_wires_close(struct host_wires *wires)
-{
+void host_wires_close(struct host_wires *wires) {
     host_wires_close_nodes(wires);
     for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
         close_end(&wires->host[i]);

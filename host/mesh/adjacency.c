@@ -5,21 +5,18 @@
 
 #include "host/base/memory.h"
 
-static uint32_t lower(uint32_t a, uint32_t b)
-{
+static uint32_t lower(uint32_t a, uint32_t b) {
     return a < b ? a : b;
 }
 
-static uint32_t higher(uint32_t a, uint32_t b)
-{
+static uint32_t higher(uint32_t a, uint32_t b) {
     return a < b ? b : a;
 }
 
 /* first[p] .. first[p + 1]: where the tetrahedra with vertex p at `rank` stand
  * in `order` (NULL: only count). */
 static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
-                     uint32_t *order)
-{
+                     uint32_t *order) {
     const struct host_tetrahedra *tets = a->tets;
     for (uint64_t i = 0; i < tets->count; i++) {
         first[tets->v[i][rank] + 1]++;
@@ -39,8 +36,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
 
 int host_adjacency_make(struct host_adjacency *a,
                         const struct host_tetrahedra *tets, uint32_t vertices,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     *a = (struct host_adjacency){.tets = tets, .vertices = vertices};
     if (tets->count >= UINT32_MAX) {
         return host_fail(
@@ -64,8 +60,7 @@ int host_adjacency_make(struct host_adjacency *a,
     return 0;
 }
 
-void host_adjacency_free(struct host_adjacency *a)
-{
+void host_adjacency_free(struct host_adjacency *a) {
     size_t first = ((size_t)a->vertices + 1) * sizeof(uint32_t);
     size_t order =
         a->tets == NULL ? 0 : (size_t)a->tets->count * sizeof(uint32_t);
@@ -75,15 +70,13 @@ void host_adjacency_free(struct host_adjacency *a)
     *a = (struct host_adjacency){0};
 }
 
-void host_group_free(struct host_group *group)
-{
+void host_group_free(struct host_group *group) {
     free(group->facet);
     *group = (struct host_group){0};
 }
 
 static int reserve(struct host_group *group, size_t count,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     group->count = 0;
     if (group->capacity >= count) {
         return 0;
@@ -98,8 +91,7 @@ static int reserve(struct host_group *group, size_t count,
     return 0;
 }
 
-static int compare(const void *p, const void *q)
-{
+static int compare(const void *p, const void *q) {
     const struct host_facet *a = p, *b = q;
     if (a->others != b->others) {
         return a->others < b->others ? -1 : 1;
@@ -107,8 +99,7 @@ static int compare(const void *p, const void *q)
     return a->tet < b->tet ? -1 : a->tet > b->tet;
 }
 
-static void sort_group(struct host_group *group)
-{
+static void sort_group(struct host_group *group) {
     enum { INSERTION_MAX = 100 };
     struct host_facet *f = group->facet;
     if (group->count > INSERTION_MAX) {
@@ -127,15 +118,13 @@ static void sort_group(struct host_group *group)
 }
 
 static void add(struct host_group *group, uint32_t q, uint32_t r, uint32_t tet,
-                uint32_t corner)
-{
+                uint32_t corner) {
     group->facet[group->count++] = (struct host_facet){
         (uint64_t)lower(q, r) << 32 | higher(q, r), tet, corner};
 }
 
 int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
-                         struct host_group *group, struct host_error *error)
-{
+                         struct host_group *group, struct host_error *error) {
     uint32_t i = a->first_by_lowest[p], end = a->first_by_lowest[p + 1];
     uint32_t j = a->first_by_second[p], last = a->first_by_second[p + 1];
     if (reserve(group, 3 * (size_t)(end - i) + (last - j), error) != 0) {
@@ -156,8 +145,7 @@ int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
 }
 
 void host_facet_outward(const uint32_t tet[4], uint32_t corner,
-                        uint32_t facet[3])
-{
+                        uint32_t facet[3]) {
     static const uint8_t outward[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     for (int i = 0; i < 3; i++) {

@@ -9,8 +9,7 @@ struct random {
     uint64_t state;
 };
 
-static uint64_t next(struct random *r)
-{
+static uint64_t next(struct random *r) {
     uint64_t z = r->state += UINT64_C(0x9e3779b97f4a7c15);
     z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
     z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
@@ -18,8 +17,7 @@ static uint64_t next(struct random *r)
 }
 
 /* In [0, 1), a multiple of 2^-53. */
-static double draw(struct random *r)
-{
+static double draw(struct random *r) {
     return (double)(next(r) >> 11) * 0x1p-53;
 }
 
@@ -32,15 +30,13 @@ struct maker {
 
 typedef void make(struct maker *m);
 
-static bool put(struct maker *m, double x, double y, double z)
-{
+static bool put(struct maker *m, double x, double y, double z) {
     double xyz[3] = {x, y, z};
     return host_points_append(m->points, xyz, 1, m->error) == 0 &&
            m->points->count < m->n;
 }
 
-static void uniform(struct maker *m)
-{
+static void uniform(struct maker *m) {
     double x, y, z;
     do {
         x = draw(&m->random);
@@ -50,8 +46,7 @@ static void uniform(struct maker *m)
 }
 
 /* Uniform on the unit sphere: a point of the ball, drawn out to it. */
-static void direction(struct random *r, double v[3])
-{
+static void direction(struct random *r, double v[3]) {
     double square;
     do {
         square = 0;
@@ -66,16 +61,14 @@ static void direction(struct random *r, double v[3])
     }
 }
 
-static void sphere(struct maker *m)
-{
+static void sphere(struct maker *m) {
     double v[3];
     do {
         direction(&m->random, v);
     } while (put(m, v[0], v[1], v[2]));
 }
 
-static void hub(struct maker *m)
-{
+static void hub(struct maker *m) {
     if (put(m, 0, 0, 0)) {
         sphere(m);
     }
@@ -83,8 +76,7 @@ static void hub(struct maker *m)
 
 /* Twelve bubbles in the unit cube, nine points of ten in their thin shells, the
  * tenth anywhere. */
-static void bubbles(struct maker *m)
-{
+static void bubbles(struct maker *m) {
     enum { BUBBLES = 12 };
     double centre[BUBBLES][3], radius[BUBBLES], v[3];
     for (int b = 0; b < BUBBLES; b++) {
@@ -112,8 +104,7 @@ static void bubbles(struct maker *m)
 }
 
 /* The smallest side with side^3 * ratio >= n. */
-static uint64_t side_for(uint64_t n, uint64_t times, uint64_t by)
-{
+static uint64_t side_for(uint64_t n, uint64_t times, uint64_t by) {
     uint64_t side = 2;
     while (side * side * (side * times / by) < n) {
         side++;
@@ -121,16 +112,14 @@ static uint64_t side_for(uint64_t n, uint64_t times, uint64_t by)
     return side;
 }
 
-static void lattice(uint64_t i, uint64_t side, double c[3])
-{
+static void lattice(uint64_t i, uint64_t side, double c[3]) {
     uint64_t row = i / side, layer = row / side;
     c[0] = (double)(i % side);
     c[1] = (double)(row % side);
     c[2] = (double)layer;
 }
 
-static void grid(struct maker *m)
-{
+static void grid(struct maker *m) {
     uint64_t side = side_for(m->n, 1, 1), i = 0;
     double c[3];
     do {
@@ -140,8 +129,7 @@ static void grid(struct maker *m)
 
 /* The same out of its axes, by the rotation of the quaternion (4, 1, 2, 3):
  * integers over 30, so each coordinate is rounded once. */
-static void rotated(struct maker *m)
-{
+static void rotated(struct maker *m) {
     static const double rotation[3][3] = {
         {4, -20, 22}, {28, 10, 4}, {-10, 20, 20}};
     uint64_t side = side_for(m->n, 1, 1), i = 0;
@@ -156,23 +144,20 @@ static void rotated(struct maker *m)
 }
 
 /* Cells that grow outward from the wall, u in [0, 1]. */
-static double stretched(double u)
-{
+static double stretched(double u) {
     return u * (0.01 + 0.99 * u * u);
 }
 
 /* To single precision and back.  gcc 12 leaves both away where it is told to
  * tune for Intel's processors and joins several of them in a vector. */
-static double single(double a)
-{
+static double single(double a) {
     volatile float f = (float)a;
     return (double)f;
 }
 
 /* A curvilinear grid of 40 : 32 : 32 around a fin with a round nose, planes
  * upon planes, single precision as in the original. */
-static void bluntfin(struct maker *m)
-{
+static void bluntfin(struct maker *m) {
     uint64_t nj = side_for(m->n, 5, 4), ni = nj * 5 / 4, k = 0;
     bool more = true;
     for (; more; k++) {
@@ -196,8 +181,7 @@ static void bluntfin(struct maker *m)
 }
 
 /* Uniform on the unit circle. */
-static void turn(struct random *r, double v[2])
-{
+static void turn(struct random *r, double v[2]) {
     double square;
     do {
         v[0] = 2 * draw(r) - 1;
@@ -210,8 +194,7 @@ static void turn(struct random *r, double v[2])
 }
 
 /* The side of radius 1 and height 4, without its ends. */
-static void cylinder(struct maker *m)
-{
+static void cylinder(struct maker *m) {
     double v[2], z;
     do {
         turn(&m->random, v);
@@ -220,8 +203,7 @@ static void cylinder(struct maker *m)
 }
 
 /* Of radii 1 and 1/4, uniform in both angles. */
-static void torus(struct maker *m)
-{
+static void torus(struct maker *m) {
     double about[2], across[2], r;
     do {
         turn(&m->random, about);
@@ -230,8 +212,7 @@ static void torus(struct maker *m)
     } while (put(m, r * about[0], r * about[1], 0.25 * across[1]));
 }
 
-static void shell(struct maker *m)
-{
+static void shell(struct maker *m) {
     double v[3], r;
     do {
         direction(&m->random, v);
@@ -241,16 +222,14 @@ static void shell(struct maker *m)
 
 /* At (i, j) of a lattice that the seed and the octave make, in [0, 1). */
 static double knot(const struct maker *m, uint64_t octave, uint64_t i,
-                   uint64_t j)
-{
+                   uint64_t j) {
     struct random r = {m->seed ^ octave << 60 ^ i << 30 ^ j};
     (void)next(&r);
     return draw(&r);
 }
 
 /* Between the four knots about (x, y), smooth across each cell. */
-static double hill(const struct maker *m, uint64_t octave, double x, double y)
-{
+static double hill(const struct maker *m, uint64_t octave, double x, double y) {
     uint64_t i = (uint64_t)x, j = (uint64_t)y;
     double u = x - (double)i, v = y - (double)j;
     u *= u * (3 - 2 * u);
@@ -263,8 +242,7 @@ static double hill(const struct maker *m, uint64_t octave, double x, double y)
 }
 
 /* A square grid, a step of 10, of heights in whole units up to 1,000. */
-static void terrain(struct maker *m)
-{
+static void terrain(struct maker *m) {
     uint64_t side = 2, i = 0;
     double x, y, height;
     while (side * side < m->n) {
@@ -284,15 +262,13 @@ static void terrain(struct maker *m)
 }
 
 /* Of either sign, from 2^-1000 to 2^1000, each power as likely. */
-static double scaled(struct random *r)
-{
+static double scaled(struct random *r) {
     int power = (int)(next(r) % 2000) - 1000;
     double value = ldexp(1 + draw(r), power);
     return draw(r) < 0.5 ? -value : value;
 }
 
-static void scales(struct maker *m)
-{
+static void scales(struct maker *m) {
     double x, y, z;
     do {
         x = scaled(&m->random);
@@ -302,8 +278,7 @@ static void scales(struct maker *m)
 }
 
 /* Half of the points on each of two lines that do not meet. */
-static void lines(struct maker *m)
-{
+static void lines(struct maker *m) {
     double t;
     bool more = true;
     for (uint64_t i = 0; more; i++) {
@@ -328,8 +303,7 @@ const char host_gen_kinds[] =
     "torus, terrain, scales, lines";
 
 int host_gen(const char *kind, uint64_t n, uint64_t seed,
-             struct host_points *points, struct host_error *error)
-{
+             struct host_points *points, struct host_error *error) {
     *points = (struct host_points){0};
     if (n < HOST_GEN_MIN || n > host_gen_max) {
         return host_fail(error, HOST_USAGE,

@@ -13,8 +13,7 @@ enum { ROW_BYTES = 3 * sizeof(double) };
  * beyond the memory that is available, which the kernel would give and then end
  * the program for. */
 static int grow(struct host_points *points, uint64_t rows,
-                struct host_error *error)
-{
+                struct host_error *error) {
     const uint64_t much = ((uint64_t)64 << 20) / ROW_BYTES;
     uint64_t more = points->capacity / 2 + rows + 1024;
     void *grown = NULL;
@@ -40,8 +39,7 @@ static int grow(struct host_points *points, uint64_t rows,
 }
 
 int host_points_append(struct host_points *points, const double *xyz,
-                       uint64_t rows, struct host_error *error)
-{
+                       uint64_t rows, struct host_error *error) {
     if (points->count + rows >= UINT32_MAX) {
         return host_fail(error, HOST_INPUT,
                          "host: more points than row numbers of 32 bits "
@@ -56,8 +54,7 @@ int host_points_append(struct host_points *points, const double *xyz,
     return 0;
 }
 
-void host_points_free(struct host_points *points)
-{
+void host_points_free(struct host_points *points) {
     host_unmap(points->xyz, points->capacity * ROW_BYTES);
     *points = (struct host_points){0};
 }

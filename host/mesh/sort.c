@@ -18,8 +18,7 @@ enum {
 
 typedef uint32_t row_t[4];
 
-static void canonical(row_t r)
-{
+static void canonical(row_t r) {
     /* Ascending, by comparisons whose outcome no branch has to foresee; where
      * they are an odd number of exchanges, one more at the end. */
     uint32_t a = r[0], b = r[1], c = r[2], d = r[3];
@@ -34,8 +33,7 @@ static void canonical(row_t r)
 }
 
 /* Word w of the sorting key of a canonical row. */
-static uint32_t word(const row_t r, int w)
-{
+static uint32_t word(const row_t r, int w) {
     switch (w) {
     case 2:
         return r[2] < r[3] ? r[2] : r[3];
@@ -46,8 +44,7 @@ static uint32_t word(const row_t r, int w)
     }
 }
 
-static bool less(const row_t p, const row_t q)
-{
+static bool less(const row_t p, const row_t q) {
     uint64_t a = (uint64_t)p[0] << 32 | p[1], b = (uint64_t)q[0] << 32 | q[1];
     if (a != b) {
         return a < b;
@@ -57,8 +54,7 @@ static bool less(const row_t p, const row_t q)
     return a != b ? a < b : p[2] < q[2];
 }
 
-static void insertion_sort(row_t *v, size_t n)
-{
+static void insertion_sort(row_t *v, size_t n) {
     for (size_t i = 1; i < n; i++) {
         row_t t;
         memcpy(t, v[i], sizeof t);
@@ -72,8 +68,7 @@ static void insertion_sort(row_t *v, size_t n)
 
 /* The same of at most INSERTION_MAX rows with one first word: mostly the second
  * and the third tell them apart. */
-static void sort_star(row_t *v, size_t n)
-{
+static void sort_star(row_t *v, size_t n) {
     uint64_t key[INSERTION_MAX];
     for (size_t i = 0; i < n; i++) {
         row_t t;
@@ -98,8 +93,7 @@ struct digit {
 };
 
 /* The digit below, of `bits` bits or what is left of the word; false: none. */
-static bool go_down(struct digit *d, int bits)
-{
+static bool go_down(struct digit *d, int bits) {
     if (d->shift == 0) {
         d->word++;
         d->shift = 32;
@@ -114,8 +108,7 @@ static bool go_down(struct digit *d, int bits)
 /* Moves rows to where their digits belong; end[b]: of those with digit b.
  * Inlined, so that it is made for the first word, which nearly all are of. */
 static inline __attribute__((always_inline)) void
-exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS])
-{
+exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
     size_t next[BUCKETS], sum = 0, buckets = (size_t)d.mask + 1;
     memset(end, 0, buckets * sizeof *end);
     for (size_t i = 0; i < n; i++) {
@@ -145,8 +138,7 @@ exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS])
     }
 }
 
-static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS])
-{
+static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS]) {
     if (d.word == 0) {
         exchange_by(v, n, 0, d, end);
     } else {
@@ -155,8 +147,7 @@ static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS])
 }
 
 /* Sorts by a digit and goes on below it.  Depth: at most 16. */
-static void flag_sort(row_t *v, size_t n, struct digit digit, int bits)
-{
+static void flag_sort(row_t *v, size_t n, struct digit digit, int bits) {
     size_t end[BUCKETS], first = 0, buckets = (size_t)digit.mask + 1;
     exchange(v, n, digit, end);
     if (!go_down(&digit, bits)) {
@@ -181,8 +172,7 @@ struct sort {
 };
 
 /* A first word with about half of the rows below it. */
-static uint32_t middle(row_t *v, size_t n)
-{
+static uint32_t middle(row_t *v, size_t n) {
     uint32_t key[SAMPLE] = {0};
     for (size_t i = 0; i < SAMPLE; i++) {
         uint32_t k = v[n / SAMPLE * i][0];
@@ -195,8 +185,7 @@ static uint32_t middle(row_t *v, size_t n)
     return key[SAMPLE / 2];
 }
 
-static void sort_rows(void *argument)
-{
+static void sort_rows(void *argument) {
     struct sort *s = argument;
     if (s->threads > 1 && s->n >= FORK_ROWS) {
         uint32_t pivot = middle(s->v, s->n);
@@ -240,8 +229,7 @@ struct canon {
     bool disordered[16];
 };
 
-static void canonical_part(void *context, unsigned part)
-{
+static void canonical_part(void *context, unsigned part) {
     struct canon *c = context;
     uint64_t each = c->tets->count / c->parts, first = each * part;
     uint64_t last = part + 1 == c->parts ? c->tets->count : first + each;
@@ -254,8 +242,7 @@ static void canonical_part(void *context, unsigned part)
     c->disordered[part] = disordered;
 }
 
-void host_tetrahedra_sort(struct host_tetrahedra *tets)
-{
+void host_tetrahedra_sort(struct host_tetrahedra *tets) {
     struct canon c = {tets, host_threads(), {false}};
     host_fork_all(c.parts, canonical_part, &c);
     bool disordered = false;

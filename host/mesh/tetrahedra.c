@@ -8,8 +8,7 @@
 #include "host/base/parallel.h"
 
 uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
-                                struct host_error *error))[4]
-{
+                                struct host_error *error))[4] {
     if (tets->capacity - tets->count < n) {
         uint64_t capacity = tets->capacity + tets->capacity / 2 + n + 4096;
         void *v = host_remap(tets->v, tets->capacity * sizeof *tets->v,
@@ -24,15 +23,13 @@ uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
     return tets->v + tets->count;
 }
 
-void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count)
-{
+void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count) {
     if (count < tets->count) {
         tets->count = count;
     }
 }
 
-void host_tetrahedra_free(struct host_tetrahedra *tets)
-{
+void host_tetrahedra_free(struct host_tetrahedra *tets) {
     host_unmap(tets->v, tets->capacity * sizeof *tets->v);
     *tets = (struct host_tetrahedra){0};
 }
@@ -43,8 +40,7 @@ struct mapping {
     unsigned parts;
 };
 
-static void map_part(void *context, unsigned part)
-{
+static void map_part(void *context, unsigned part) {
     const struct mapping *m = context;
     uint64_t each = m->tets->count / m->parts;
     uint64_t first = each * part;
@@ -56,14 +52,13 @@ static void map_part(void *context, unsigned part)
     }
 }
 
-void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map)
-{
+void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map) {
     struct mapping m = {tets, map, host_threads()};
     host_fork_all(m.parts, map_part, &m);
 }
 
-void host_digest(const struct host_tetrahedra *tets, struct host_digest *digest)
-{
+void host_digest(const struct host_tetrahedra *tets,
+                 struct host_digest *digest) {
     enum { ROWS = 2048 };
     struct sha256_ctx sha;
     sha256_init(&sha);

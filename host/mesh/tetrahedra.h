@@ -35,8 +35,7 @@ struct host_digest {
 uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
                                 struct host_error *error))[4];
 static inline void host_tetrahedra_keep(struct host_tetrahedra *tets,
-                                        uint64_t n)
-{
+                                        uint64_t n) {
     tets->count += n;
 }
 

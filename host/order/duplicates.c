@@ -36,31 +36,27 @@ struct search {
     double lo[PARTS_MAX][3], hi[PARTS_MAX][3];
 };
 
-static uint64_t bits_of(double c)
-{
+static uint64_t bits_of(double c) {
     uint64_t bits;
     c += 0.0; /* -0.0 becomes 0.0 */
     memcpy(&bits, &c, sizeof bits);
     return bits;
 }
 
-static uint64_t hash(const double *p)
-{
+static uint64_t hash(const double *p) {
     uint64_t h = bits_of(p[0]) * UINT64_C(0x9e3779b97f4a7c15);
     h = ((h ^ (h >> 32)) + bits_of(p[1])) * UINT64_C(0xbf58476d1ce4e5b9);
     h = ((h ^ (h >> 29)) + bits_of(p[2])) * UINT64_C(0x94d049bb133111eb);
     return h ^ (h >> 32);
 }
 
-static bool same(const double *p, const double *q)
-{
+static bool same(const double *p, const double *q) {
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
 /* Enters a row, or finds the equal one that was there before. */
 static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
-                      uint32_t row)
-{
+                      uint32_t row) {
     size_t mask = table->slots - 1, at = (size_t)h & mask;
     uint64_t mark = h & UINT64_C(0xffffffff00000000);
     for (; table->slot[at] != empty; at = (at + 1) & mask) {
@@ -78,8 +74,7 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
 
 /* Rows whose hash belongs to the part, in input order: so the first of equal
  * rows is the lowest. */
-static void search_part(void *context, unsigned part)
-{
+static void search_part(void *context, unsigned part) {
     struct search *s = context;
     struct table *table = &s->table[part];
     memset(table->slot, 0xff, table->slots * sizeof *table->slot);
@@ -112,8 +107,7 @@ static void search_part(void *context, unsigned part)
     s->distinct[part] = distinct;
 }
 
-static bool run_search(struct search *s)
-{
+static bool run_search(struct search *s) {
     s->parts = s->rows < FORK_ROWS ? 1 : host_threads();
     size_t slots = 64;
     while (slots < s->rows / s->parts * 3 / 2 + 64) {
@@ -136,14 +130,12 @@ static bool run_search(struct search *s)
 
 /* --- Records ---------------------------------------------------------- */
 
-static uint64_t part_start(const struct search *s, unsigned part)
-{
+static uint64_t part_start(const struct search *s, unsigned part) {
     return s->rows / s->parts * part +
            (part == s->parts ? s->rows % s->parts : 0);
 }
 
-static void count_part(void *context, unsigned part)
-{
+static void count_part(void *context, unsigned part) {
     struct search *s = context;
     uint64_t count = 0, last = part_start(s, part + 1);
     for (uint64_t row = part_start(s, part); row < last; row++) {
@@ -152,8 +144,7 @@ static void count_part(void *context, unsigned part)
     s->first[part + 1] = count;
 }
 
-static void fill_part(void *context, unsigned part)
-{
+static void fill_part(void *context, unsigned part) {
     struct search *s = context;
     struct host_item *to = s->items + s->first[part];
     uint64_t negative_zeros = 0;
@@ -173,8 +164,7 @@ static void fill_part(void *context, unsigned part)
     host_kd_box(to - count, count, s->lo[part], s->hi[part]);
 }
 
-static void fill_items(struct search *s, struct host_distinct *distinct)
-{
+static void fill_items(struct search *s, struct host_distinct *distinct) {
     s->items = distinct->items;
     s->parts = s->rows < COPY_ROWS ? 1 : s->parts;
     host_fork_all(s->parts, count_part, s);
@@ -196,8 +186,7 @@ static void fill_items(struct search *s, struct host_distinct *distinct)
 }
 
 int host_distinct_make(struct host_distinct *distinct, const double *xyz,
-                       uint64_t rows, struct host_error *error)
-{
+                       uint64_t rows, struct host_error *error) {
     *distinct = (struct host_distinct){0};
     if (rows >= UINT32_MAX) {
         return host_fail(error, HOST_INPUT,
@@ -225,15 +214,14 @@ int host_distinct_make(struct host_distinct *distinct, const double *xyz,
     return error->code;
 }
 
-void host_distinct_free(struct host_distinct *distinct)
-{
+void host_distinct_free(struct host_distinct *distinct) {
     host_unmap(distinct->items, distinct->capacity * sizeof *distinct->items);
     *distinct = (struct host_distinct){0};
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): the threads write it */
-uint64_t host_distinct_rows(const double *xyz, uint64_t rows, uint32_t *lowest)
-{
+uint64_t host_distinct_rows(const double *xyz, uint64_t rows,
+                            uint32_t *lowest) {
     struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};
     uint64_t distinct = 0;
     if (run_search(&s)) {

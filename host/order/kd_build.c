@@ -13,8 +13,7 @@ enum {
 };
 
 void host_kd_box(const struct host_item *items, size_t n, double lo[3],
-                 double hi[3])
-{
+                 double hi[3]) {
     double l0 = INFINITY, l1 = INFINITY, l2 = INFINITY;
     double h0 = -INFINITY, h1 = -INFINITY, h2 = -INFINITY;
     for (size_t i = 0; i < n; i++) {
@@ -30,8 +29,7 @@ void host_kd_box(const struct host_item *items, size_t n, double lo[3],
     hi[0] = h0, hi[1] = h1, hi[2] = h2;
 }
 
-int host_kd_longest(const double lo[3], const double hi[3])
-{
+int host_kd_longest(const double lo[3], const double hi[3]) {
     int longest = 0;
     double best = -1;
     for (int d = 0; d < 3; d++) {
@@ -47,8 +45,7 @@ int host_kd_longest(const double lo[3], const double hi[3])
 
 /* As a whole, in as few registers as hold it: what is stored in parts is not
  * there for the next load of it. */
-static inline void exchange(struct host_item *p, struct host_item *q)
-{
+static inline void exchange(struct host_item *p, struct host_item *q) {
     typedef uint64_t item
         __attribute__((vector_size(sizeof(struct host_item))));
     item a, b;
@@ -61,8 +58,7 @@ static inline void exchange(struct host_item *p, struct host_item *q)
 /* Both partitions move by an unconditional exchange, since the outcome of the
  * comparison is a coin toss that no branch predictor learns. */
 static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
-                             double pivot)
-{
+                             double pivot) {
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
         double key = sign * a[i].c[d];
@@ -73,8 +69,7 @@ static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
 }
 
 static size_t partition_not_greater(struct host_item *a, size_t n, int d,
-                                    double sign, double pivot)
-{
+                                    double sign, double pivot) {
     size_t m = 0;
     for (size_t i = 0; i < n; i++) {
         double key = sign * a[i].c[d];
@@ -84,14 +79,12 @@ static size_t partition_not_greater(struct host_item *a, size_t n, int d,
     return m;
 }
 
-size_t host_kd_below(struct host_item *items, size_t n, int d, double wall)
-{
+size_t host_kd_below(struct host_item *items, size_t n, int d, double wall) {
     return partition_less(items, n, d, 1, wall);
 }
 
 static int less(const struct host_item *a, const struct host_item *b,
-                const int order[3], double sign)
-{
+                const int order[3], double sign) {
     for (int i = 0; i < 3; i++) {
         double p = sign * a->c[order[i]], q = sign * b->c[order[i]];
         if (p != q) {
@@ -102,8 +95,7 @@ static int less(const struct host_item *a, const struct host_item *b,
 }
 
 static void insertion_sort(struct host_item *a, size_t n, const int order[3],
-                           double sign)
-{
+                           double sign) {
     for (size_t i = 1; i < n; i++) {
         struct host_item t = a[i];
         size_t j = i;
@@ -115,8 +107,7 @@ static void insertion_sort(struct host_item *a, size_t n, const int order[3],
     }
 }
 
-static void sort_keys(double *key, size_t n)
-{
+static void sort_keys(double *key, size_t n) {
     for (size_t gap = n < 24    ? 1
                       : n < 120 ? 10
                                 : 57;
@@ -142,8 +133,7 @@ static void sort_keys(double *key, size_t n)
  * that the larger part falls away at once: the median of the sample is taken
  * with a margin of its standard deviation. */
 static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
-                           double sign, uint64_t *state)
-{
+                           double sign, uint64_t *state) {
     double key[SAMPLE_MAX];
     size_t s = n / 64;
     s = s < 5 ? 5 : s > SAMPLE_MAX ? SAMPLE_MAX : s;
@@ -165,8 +155,7 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
 }
 
 void host_kd_rank(struct host_item *a, size_t n, size_t k, int d,
-                  int from_above)
-{
+                  int from_above) {
     int order[3] = {d, d == 0 ? 1 : 0, d == 2 ? 1 : 2};
     double sign = from_above ? -1 : 1;
     uint64_t state = n;
@@ -195,8 +184,7 @@ void host_kd_rank(struct host_item *a, size_t n, size_t k, int d,
 }
 
 /* Cuts n > 8 items into leaves of 8: the first part is a multiple of 8. */
-static void build_leaves(struct host_item *a, size_t n)
-{
+static void build_leaves(struct host_item *a, size_t n) {
     while (n > INCODE_LEAF_POINTS) {
         double lo[3], hi[3];
         host_kd_box(a, n, lo, hi);
@@ -218,8 +206,7 @@ struct task {
     void *context;
 };
 
-static void build(void *argument)
-{
+static void build(void *argument) {
     struct task *t = argument;
     if (t->n <= INCODE_BRICK_POINTS) {
         build_leaves(t->items, t->n);
@@ -255,8 +242,7 @@ static void build(void *argument)
 }
 
 void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
-                    unsigned threads, host_brick_sink *sink, void *context)
-{
+                    unsigned threads, host_brick_sink *sink, void *context) {
     struct task task = {items, n, first_brick, threads, 0, sink, context};
     if (n > 0) {
         build(&task);

@@ -14,8 +14,7 @@ enum { PARTS = 8, GROUPS = PARTS / INCODE_VD_LANES, SUMS = 13 };
 
 /* Of y with w = |y|^2: y, yy, w^2, wy. */
 static void sum_brick(const struct host_lump *lump,
-                      const struct incode_brick *brick, double total[SUMS])
-{
+                      const struct incode_brick *brick, double total[SUMS]) {
     const double *axis[3] = {brick->x, brick->y, brick->z};
     incode_vd inverse = incode_vd_all(1 / lump->unit);
     incode_vd sum[SUMS][GROUPS] = {0};
@@ -45,8 +44,7 @@ static void sum_brick(const struct host_lump *lump,
     }
 }
 
-void host_lump_brick(struct host_lump *lump, const struct incode_brick *brick)
-{
+void host_lump_brick(struct host_lump *lump, const struct incode_brick *brick) {
     const double *axis[3] = {brick->x, brick->y, brick->z};
     double total[SUMS];
     for (int d = 0; d < 3; d++) {
@@ -68,14 +66,12 @@ void host_lump_brick(struct host_lump *lump, const struct incode_brick *brick)
     memcpy(lump->y_cube, total + 10, sizeof lump->y_cube);
 }
 
-static double dot(const double a[3], const double b[3])
-{
+static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* A symmetric matrix as it is stored, times a vector. */
-static void times(double out[3], const double m[6], const double a[3])
-{
+static void times(double out[3], const double m[6], const double a[3]) {
     for (int i = 0; i < 3; i++) {
         int j = (i + 1) % 3, k = (i + 2) % 3;
         out[i] = m[i] * a[i] + m[3 + k] * a[j] + m[3 + j] * a[k];
@@ -83,8 +79,7 @@ static void times(double out[3], const double m[6], const double a[3])
 }
 
 /* Adds the sums of a lump of another frame: its y is here k y + d. */
-static void add(struct host_lump *to, const struct host_lump *from)
-{
+static void add(struct host_lump *to, const struct host_lump *from) {
     double k = from->unit / to->unit, n = from->count, d[3], yyd[3];
     for (int i = 0; i < 3; i++)
         d[i] = (from->origin[i] - to->origin[i]) / to->unit;
@@ -109,8 +104,7 @@ static void add(struct host_lump *to, const struct host_lump *from)
 }
 
 void host_lump_join(struct host_lump *lump, const struct host_lump *of,
-                    uint32_t count)
-{
+                    uint32_t count) {
     struct host_lump all = {.count = 0};
     for (int d = 0; d < 3; d++) {
         all.lo[d] = of[0].lo[d];
@@ -141,8 +135,7 @@ struct shape {
 
 /* m x = b by Cholesky's factors, with a part in 2^40 of its trace added to m,
  * which bounds x where the points leave it open. */
-static void solve(double x[3], const double m[6], const double b[3])
-{
+static void solve(double x[3], const double m[6], const double b[3]) {
     double more = (m[0] + m[1] + m[2]) * 0x1p-40 + 0x1p-900;
     double l00 = sqrt(m[0] + more), l10 = m[5] / l00, l20 = m[4] / l00;
     double l11 = sqrt(fmax(m[1] + more - l10 * l10, more));
@@ -161,8 +154,7 @@ static void solve(double x[3], const double m[6], const double b[3])
  * over a box with half sides h have the variances h^2 / 3, and |y|^2 has 4/45
  * of the sum of all h^4; so much less, as what a linear fit leaves, is flat. */
 static void set_flatness(struct shape *shape, const double spread[6],
-                         double residual)
-{
+                         double residual) {
     double thin = (spread[0] + spread[1] + spread[2]) * 0x1p-24;
     double a = spread[0] + thin, b = spread[1] + thin, c = spread[2] + thin;
     double f = spread[3], g = spread[4], h = spread[5];
@@ -173,8 +165,7 @@ static void set_flatness(struct shape *shape, const double spread[6],
     shape->flat = turned < VOLUME * VOLUME * a * b * c;
 }
 
-static void find_shape(struct shape *shape, const struct host_lump *lump)
-{
+static void find_shape(struct shape *shape, const struct host_lump *lump) {
     double n = lump->count, mean[3], w = 0, along[3];
     for (int d = 0; d < 3; d++) {
         mean[d] = lump->y[d] / n;
@@ -195,8 +186,7 @@ static void find_shape(struct shape *shape, const struct host_lump *lump)
 
 /* Turns the plane of axes i and j until m has nothing off its diagonal there:
  * one rotation of Jacobi's. */
-static void rotate(double m[3][3], double axis[3][3], int i, int j)
-{
+static void rotate(double m[3][3], double axis[3][3], int i, int j) {
     if (m[i][j] == 0)
         return;
     double theta = (m[j][j] - m[i][i]) / (2 * m[i][j]);
@@ -221,8 +211,7 @@ static void rotate(double m[3][3], double axis[3][3], int i, int j)
 enum { SWEEPS = 4 };
 
 /* About the principal axes: any will do. */
-static void principal_axes(double axis[3][3], const double spread[6])
-{
+static void principal_axes(double axis[3][3], const double spread[6]) {
     double m[3][3] = {{spread[0], spread[5], spread[4]},
                       {spread[5], spread[1], spread[3]},
                       {spread[4], spread[3], spread[2]}};
@@ -242,8 +231,7 @@ static void principal_axes(double axis[3][3], const double spread[6])
 /* Of the 24 rotations that give the same box, the least: where w is far from 0
  * (here 0.85 at least), what x, y and z lose by being rounded does not matter.
  */
-static void least_turn(double turned[3][3], double axis[3][3])
-{
+static void least_turn(double turned[3][3], double axis[3][3]) {
     static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                     {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
     double most = -1;
@@ -272,8 +260,7 @@ static void least_turn(double turned[3][3], double axis[3][3])
 }
 
 static void set_turn(struct incode_boxes *boxes, unsigned child,
-                     double axis[3][3])
-{
+                     double axis[3][3]) {
     double a[3][3], q[3];
     least_turn(a, axis);
     double w4 = 2 * sqrt(1 + a[0][0] + a[1][1] + a[2][2]);
@@ -287,8 +274,7 @@ static void set_turn(struct incode_boxes *boxes, unsigned child,
 /* ---- encoding ---- */
 
 /* The least number of half precision that is not less; a is below 2^15. */
-static uint16_t half_rounded_up(double a)
-{
+static uint16_t half_rounded_up(double a) {
     int exponent;
     (void)frexp(a, &exponent); /* a < 2^exponent */
     exponent = exponent < -13 ? -13 : exponent;
@@ -306,8 +292,7 @@ struct cloud {
 
 INCODE_INLINE void relative(const struct cloud *cloud,
                             const struct incode_brick *brick, int i,
-                            const double from[3], incode_vd t[3])
-{
+                            const double from[3], incode_vd t[3]) {
     const double *axis[3] = {brick->x, brick->y, brick->z};
     for (int d = 0; d < 3; d++)
         t[d] = (incode_vd_load(axis[d] + i) - incode_vd_all(cloud->origin[d])) *
@@ -317,8 +302,7 @@ INCODE_INLINE void relative(const struct cloud *cloud,
 
 /* How far the points reach along each axis from a point on. */
 static void extents(const struct cloud *cloud, const double from[3],
-                    double axis[3][3], double lo[3], double hi[3])
-{
+                    double axis[3][3], double lo[3], double hi[3]) {
     incode_vd least[3], most[3];
     for (int k = 0; k < 3; k++) {
         least[k] = incode_vd_all(INFINITY);
@@ -345,8 +329,7 @@ static void extents(const struct cloud *cloud, const double from[3],
 
 /* The least of |p - o|^2 - q . (p - o). */
 static double least_above(const struct cloud *cloud, const double o[3],
-                          const double q[3])
-{
+                          const double q[3]) {
     incode_vd least = incode_vd_all(INFINITY);
     for (uint32_t b = 0; b < cloud->bricks; b++) {
         for (int i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
@@ -362,8 +345,7 @@ static double least_above(const struct cloud *cloud, const double o[3],
     return incode_vd_least_of(least);
 }
 
-static double clamped(double a, double most)
-{
+static double clamped(double a, double most) {
     return rint(a > most ? most : a > -most ? a : -most);
 }
 
@@ -379,8 +361,7 @@ static const double slack = 0x1p-46;
 
 /* Centre and half axes from the extents along the axes. */
 static void set_halves(struct incode_boxes *boxes, unsigned child,
-                       const struct cloud *cloud, double e)
-{
+                       const struct cloud *cloud, double e) {
     struct incode_lifted middle;
     double axis[3][3], lo[3], hi[3], o[3];
     (void)incode_boxes_lifted(boxes, child, &middle); /* o is m as yet */
@@ -406,8 +387,7 @@ static void set_halves(struct incode_boxes *boxes, unsigned child,
 /* Slopes of the half axes, from what |y|^2 is fitted by in the lump's frame. */
 static void set_slopes(struct incode_boxes *boxes, unsigned child,
                        const struct host_lump *lump, const struct shape *shape,
-                       double e)
-{
+                       double e) {
     struct incode_lifted l;
     (void)incode_boxes_lifted(boxes, child, &l);
     double ratio = lump->unit / boxes->unit;
@@ -432,8 +412,7 @@ static void set_slopes(struct incode_boxes *boxes, unsigned child,
  * with the rounding of q's own terms, and the difference by u (r^2 + c r).
  * False: it is too low to be told. */
 static bool set_lid(struct incode_boxes *boxes, unsigned child,
-                    const struct cloud *cloud, double e)
-{
+                    const struct cloud *cloud, double e) {
     struct incode_lifted l;
     double q[3] = {0}, c = 0;
     (void)incode_boxes_lifted(boxes, child, &l);
@@ -452,8 +431,7 @@ static bool set_lid(struct incode_boxes *boxes, unsigned child,
 
 void host_lift(struct incode_boxes *boxes, unsigned child,
                const struct host_lump *lump, const struct incode_brick *brick,
-               uint32_t bricks)
-{
+               uint32_t bricks) {
     struct shape shape;
     double axis[3][3], e = 0;
     find_shape(&shape, lump);

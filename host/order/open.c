@@ -10,8 +10,7 @@ enum { SAMPLE = 2000, STEP = 4, CELLS_A_POINT = 14, ROUNDS = 5 };
 
 /* Adds `count` of the points, evenly spread over the order, numbered from 0. */
 static void add_some(struct incode_complex *x, const struct host_order *order,
-                     uint32_t count)
-{
+                     uint32_t count) {
     uint64_t rank = 0, points = order->points;
     uint32_t added = 0;
     for (uint32_t b = 0; b < order->bricks && added < count; b++) {
@@ -31,8 +30,7 @@ static void add_some(struct incode_complex *x, const struct host_order *order,
 
 /* Begins with four that span space, far apart; false: there are none. */
 static bool begin(struct incode_complex *x, struct incode_tally *tally,
-                  uint32_t count)
-{
+                  uint32_t count) {
     const struct incode_complex_point *p = x->point;
     uint32_t four[4] = {1, 1 + count / 2, 0, 0};
     for (uint32_t i = 1; i <= count && four[3] == 0; i++) {
@@ -49,8 +47,7 @@ static bool begin(struct incode_complex *x, struct incode_tally *tally,
 }
 
 /* A half of the points in the last round, a half of the rest in that before. */
-static unsigned round_of(uint32_t v)
-{
+static unsigned round_of(uint32_t v) {
     uint32_t h = v * UINT32_C(0x9e3779b1);
     h ^= h >> 15;
     unsigned zeros = h == 0 ? ROUNDS : (unsigned)__builtin_ctz(h);
@@ -58,8 +55,7 @@ static unsigned round_of(uint32_t v)
 }
 
 static bool insert_all(struct incode_complex *x, struct incode_tally *tally,
-                       uint32_t count)
-{
+                       uint32_t count) {
     uint32_t near = 1;
     for (unsigned round = 0; round <= ROUNDS; round++) {
         for (uint32_t v = 1; v <= count; v++) {
@@ -76,8 +72,7 @@ static bool insert_all(struct incode_complex *x, struct incode_tally *tally,
 /* The most tetrahedra that have points on both sides of a place in the order.
  * change: [count + 1], 0. */
 static uint32_t widest(const struct incode_complex *x, int32_t *change,
-                       uint32_t count)
-{
+                       uint32_t count) {
     int32_t open = 0, most = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
@@ -102,8 +97,7 @@ static uint32_t widest(const struct incode_complex *x, int32_t *change,
 
 /* Of a sample of so many; as many as there is room for where they do not fit,
  * as those of two lines askew; 0: there are none. */
-static uint32_t open_of(const struct host_order *order, uint32_t count)
-{
+static uint32_t open_of(const struct host_order *order, uint32_t count) {
     struct incode_tally tally = {0};
     struct incode_complex x;
     size_t bytes = (count + 1) * (sizeof(struct incode_complex_point) +
@@ -124,8 +118,7 @@ static uint32_t open_of(const struct host_order *order, uint32_t count)
     return open;
 }
 
-uint64_t host_order_open(const struct host_order *order)
-{
+uint64_t host_order_open(const struct host_order *order) {
     uint32_t count = order->points < SAMPLE ? order->points : SAMPLE;
     double all = open_of(order, count), part = open_of(order, count / STEP);
     if (all < 1 || part < 1) {

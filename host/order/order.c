@@ -37,8 +37,7 @@ struct cut {
  * side of the lower one.  Of uniform points, a point has 6.8 tetrahedra, and a
  * cut crosses some 7 for each point beside it. */
 static size_t owned_shift(const struct cut *c, const double lo[3],
-                          const double hi[3], int d)
-{
+                          const double hi[3], int d) {
     int sides = 2 - (int)(c->above >> d & 1) - (int)(c->below >> d & 1);
     double length = 0.5 * hi[d] - 0.5 * lo[d], across = 1;
     for (int e = 0; e < 3; e++) {
@@ -51,8 +50,7 @@ static size_t owned_shift(const struct cut *c, const double lo[3],
 
 /* Equal counts, in whole bricks and whole box pages where that costs at most
  * one part in 64 of the balance. */
-static size_t half_rank(size_t n)
-{
+static size_t half_rank(size_t n) {
     size_t half = (n + 1) / 2;
     const size_t page = (size_t)INCODE_BRICK_POINTS * INCODE_FANOUT;
     size_t step = n >= 32 * page                          ? page
@@ -61,8 +59,7 @@ static size_t half_rank(size_t n)
     return (half + step / 2) / step * step;
 }
 
-static void cut_regions(void *argument)
-{
+static void cut_regions(void *argument) {
     struct cut *c = argument;
     struct host_item *items = c->items + c->first;
     if (c->regions == 1) {
@@ -124,8 +121,7 @@ struct spread {
 };
 
 static void store_brick(void *context, uint32_t number,
-                        const struct host_item *items, size_t count)
-{
+                        const struct host_item *items, size_t count) {
     const struct spread *spread = context;
     struct host_order *order = spread->order;
     struct incode_brick *brick = &order->brick[number];
@@ -142,8 +138,7 @@ static void store_brick(void *context, uint32_t number,
 }
 
 /* Builds a run of regions, forking where there are threads and points. */
-static void build_regions(void *argument)
-{
+static void build_regions(void *argument) {
     struct spread *s = argument;
     if (s->regions == 1) {
         host_kd_bricks(s->items + s->first, s->n,
@@ -172,8 +167,7 @@ static void build_regions(void *argument)
     }
 }
 
-static uint64_t number_bricks(struct host_order *order)
-{
+static uint64_t number_bricks(struct host_order *order) {
     uint64_t bricks = 0;
     for (uint32_t r = 0; r < order->regions; r++) {
         struct host_region *region = &order->region[r];
@@ -195,20 +189,17 @@ struct level {
     unsigned parts;
 };
 
-static uint32_t share(uint32_t count, unsigned part, unsigned parts)
-{
+static uint32_t share(uint32_t count, unsigned part, unsigned parts) {
     return (uint32_t)((uint64_t)count * part / parts);
 }
 
-static struct incode_boxes *boxes_above(const struct level *l, uint32_t child)
-{
+static struct incode_boxes *boxes_above(const struct level *l, uint32_t child) {
     const struct incode_tree *tree = &l->order->tree;
     return l->order->boxes + (tree->base[l->level] - tree->base[1]) +
            child / INCODE_FANOUT;
 }
 
-static void make_pages(void *context, unsigned part)
-{
+static void make_pages(void *context, unsigned part) {
     const struct level *l = context;
     const struct incode_tree *tree = &l->order->tree;
     const struct host_lump *below = l->lump + tree->base[l->level - 1];
@@ -229,8 +220,7 @@ static void make_pages(void *context, unsigned part)
     }
 }
 
-static void lift_children(void *context, unsigned part)
-{
+static void lift_children(void *context, unsigned part) {
     const struct level *l = context;
     const struct host_order *order = l->order;
     const struct incode_tree *tree = &order->tree;
@@ -247,8 +237,7 @@ static void lift_children(void *context, unsigned part)
     }
 }
 
-static void make_boxes(struct host_order *order, struct host_lump *lump)
-{
+static void make_boxes(struct host_order *order, struct host_lump *lump) {
     struct level l = {.order = order, .lump = lump};
     l.parts = order->points >= FORK_POINTS ? host_threads() : 1;
     for (l.level = 1; l.level < order->tree.levels; l.level++) {
@@ -259,15 +248,13 @@ static void make_boxes(struct host_order *order, struct host_lump *lump)
 
 /* --- The uniform grid ------------------------------------------------- */
 
-static uint32_t cells_along(double extent, double side)
-{
+static uint32_t cells_along(double extent, double side) {
     double cells = extent / side;
     return cells >= 1e9 ? 1000000000u : cells > 1 ? (uint32_t)cells : 1;
 }
 
 /* Cubic cells, as many as points or a few less. */
-static void choose_cells(struct host_order *order)
-{
+static void choose_cells(struct host_order *order) {
     double extent[3], longest = 0;
     for (int d = 0; d < 3; d++) {
         extent[d] = 0.5 * order->hi[d] - 0.5 * order->lo[d];
@@ -296,8 +283,7 @@ static void choose_cells(struct host_order *order)
     }
 }
 
-static int make_grid(struct host_order *order, struct host_error *error)
-{
+static int make_grid(struct host_order *order, struct host_error *error) {
     choose_cells(order);
     size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
     order->first_of_cell = host_map((cells + 1) * sizeof(uint32_t));
@@ -334,8 +320,7 @@ static int make_grid(struct host_order *order, struct host_error *error)
  * first that is off that plane.  Neighbours in this order are close, so
  * the second point is taken from the far end. */
 static int check_dimension(const struct host_order *order, const char *where,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     struct incode_tally tally = {0};
     double a[3], b[3], c[3], d[3];
     host_vertex(order, 0, a);
@@ -361,8 +346,7 @@ static int check_dimension(const struct host_order *order, const char *where,
 
 /* --- All together ----------------------------------------------------- */
 
-static int allocate(struct host_order *order, struct host_error *error)
-{
+static int allocate(struct host_order *order, struct host_error *error) {
     size_t bricks = order->bricks;
     order->brick = host_map(bricks * sizeof *order->brick);
     order->fill = host_map(bricks);
@@ -377,8 +361,8 @@ static int allocate(struct host_order *order, struct host_error *error)
 }
 
 static int build_items(struct host_order *order, struct host_item *items,
-                       enum host_partition partition, struct host_error *error)
-{
+                       enum host_partition partition,
+                       struct host_error *error) {
     struct cut cut = {.order = order,
                       .items = items,
                       .partition = partition,
@@ -421,8 +405,7 @@ static int build_items(struct host_order *order, struct host_item *items,
 int host_order_make(struct host_order *order, const char *where,
                     const double *xyz, uint64_t rows,
                     enum host_partition partition, uint32_t regions, bool grid,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     *order = (struct host_order){.rows = rows, .regions = regions};
     struct host_distinct distinct;
     if (host_distinct_make(&distinct, xyz, rows, error) != 0) {
@@ -459,8 +442,7 @@ int host_order_make(struct host_order *order, const char *where,
     return error->code;
 }
 
-void host_order_join(struct host_order *order)
-{
+void host_order_join(struct host_order *order) {
     struct host_region *all = &order->region[0];
     *all = (struct host_region){.last = order->bricks, .points = order->points};
     memcpy(all->lo, order->lo, sizeof all->lo);
@@ -468,8 +450,7 @@ void host_order_join(struct host_order *order)
     order->regions = 1;
 }
 
-void host_order_free(struct host_order *order)
-{
+void host_order_free(struct host_order *order) {
     size_t bricks = order->bricks;
     size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
     host_unmap(order->brick, bricks * sizeof *order->brick);
@@ -484,8 +465,7 @@ void host_order_free(struct host_order *order)
 }
 
 static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
-                         void *buffer)
-{
+                         void *buffer) {
     size_t first = (size_t)page * INCODE_PAGE_WORDS;
     size_t n = first < count ? count - first : 0;
     n = n > INCODE_PAGE_WORDS ? INCODE_PAGE_WORDS : n;
@@ -496,8 +476,7 @@ static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
     return sizeof(struct incode_words);
 }
 
-size_t host_page(const struct host_order *order, uint32_t page, void *buffer)
-{
+size_t host_page(const struct host_order *order, uint32_t page, void *buffer) {
     const struct incode_tree *tree = &order->tree;
     if (page < order->bricks) {
         const struct incode_brick *brick = &order->brick[page];

@@ -76,8 +76,7 @@ size_t host_page(const struct host_order *order, uint32_t page, void *buffer);
 
 /* Coordinates of a vertex. */
 static inline void host_vertex(const struct host_order *order, uint32_t vertex,
-                               double xyz[3])
-{
+                               double xyz[3]) {
     const struct incode_brick *b = &order->brick[vertex / INCODE_BRICK_POINTS];
     uint32_t slot = vertex % INCODE_BRICK_POINTS;
     xyz[0] = b->x[slot];

@@ -120,16 +120,14 @@ static const struct argp_option options_of_run[] = {
 
 typedef const char *row_name(unsigned i);
 
-static const char *name_at(const void *context, unsigned i)
-{
+static const char *name_at(const void *context, unsigned i) {
     return (*(row_name *const *)context)(i);
 }
 
 /* Which of the rows that `name` gives, up to NULL, `value` is, or -1 with the
  * error: what is allowed. */
 static int choose(struct host_arguments *p, const char *option,
-                  const char *value, row_name *name)
-{
+                  const char *value, row_name *name) {
     char allowed[sizeof p->error->text] = "";
     size_t used = 0;
     for (unsigned i = 0; name(i) != NULL; i++) {
@@ -149,28 +147,23 @@ static int choose(struct host_arguments *p, const char *option,
     return -1;
 }
 
-static const char *partition_name(unsigned i)
-{
+static const char *partition_name(unsigned i) {
     return host_partitions[i];
 }
 
-static const char *index_name(unsigned i)
-{
+static const char *index_name(unsigned i) {
     return host_indexes[i];
 }
 
-static const char *build_name(unsigned i)
-{
+static const char *build_name(unsigned i) {
     return host_builds[i];
 }
 
-static const char *face_rule_name(unsigned i)
-{
+static const char *face_rule_name(unsigned i) {
     return host_face_rules[i];
 }
 
-static void parse_memory(struct host_arguments *p, const char *value)
-{
+static void parse_memory(struct host_arguments *p, const char *value) {
     uint64_t *bytes = &p->options->memory;
     if (host_parse_bytes(value, bytes) != 0 || *bytes < HOST_MEMORY_MIN ||
         *bytes > HOST_MEMORY_MAX) {
@@ -182,8 +175,7 @@ static void parse_memory(struct host_arguments *p, const char *value)
     *bytes = *bytes / 4096 * 4096;
 }
 
-static void parse_output(struct host_arguments *p, const char *value)
-{
+static void parse_output(struct host_arguments *p, const char *value) {
     if (p->options->outputs == HOST_OUTPUTS_MAX) {
         host_fail(p->error, HOST_USAGE,
                   "-o %s: more than %d outputs; use "
@@ -194,8 +186,7 @@ static void parse_output(struct host_arguments *p, const char *value)
     p->options->output[p->options->outputs++] = value;
 }
 
-static bool parse_names(int key, const char *value, struct host_arguments *p)
-{
+static bool parse_names(int key, const char *value, struct host_arguments *p) {
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_STRATEGY:
@@ -233,8 +224,8 @@ static bool parse_names(int key, const char *value, struct host_arguments *p)
 }
 
 /* How a strategy shares the work: keys from KEY_CLUSTER on. */
-static bool parse_sharing(int key, const char *value, struct host_arguments *p)
-{
+static bool parse_sharing(int key, const char *value,
+                          struct host_arguments *p) {
     struct host_sharing *s = &p->options->sharing;
     const struct {
         const char *name;
@@ -255,8 +246,8 @@ static bool parse_sharing(int key, const char *value, struct host_arguments *p)
     return true;
 }
 
-static bool parse_testing(int key, const char *value, struct host_arguments *p)
-{
+static bool parse_testing(int key, const char *value,
+                          struct host_arguments *p) {
     struct host_run_options *o = p->options;
     uint64_t n = 0;
     switch (key) {
@@ -307,8 +298,7 @@ static bool parse_testing(int key, const char *value, struct host_arguments *p)
 }
 
 static error_t parse_report(int key, const char *value,
-                            struct host_arguments *p)
-{
+                            struct host_arguments *p) {
     struct host_run_options *o = p->options;
     switch (key) {
     case KEY_VERIFY:
@@ -358,8 +348,7 @@ static error_t parse_report(int key, const char *value,
     }
 }
 
-static error_t parse_option(int key, char *value, struct argp_state *state)
-{
+static error_t parse_option(int key, char *value, struct argp_state *state) {
     struct host_arguments *p = state->input;
     if (key >= KEY_STRATEGY && key < KEY_END) {
         p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
@@ -398,8 +387,8 @@ static error_t parse_option(int key, char *value, struct argp_state *state)
 
 /* flags: of argp_parse. */
 static int parse_run(int argc, char **argv, unsigned flags,
-                     struct host_run_options *options, struct host_error *error)
-{
+                     struct host_run_options *options,
+                     struct host_error *error) {
     static const struct argp argp = {
         options_of_run,
         parse_option,
@@ -441,13 +430,12 @@ static int parse_run(int argc, char **argv, unsigned flags,
 }
 
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     return parse_run(argc, argv, 0, options, error);
 }
 
-int host_arguments_try(int argc, char **argv, struct host_run_options *options)
-{
+int host_arguments_try(int argc, char **argv,
+                       struct host_run_options *options) {
     struct host_error error = {0};
     return parse_run(argc, argv, ARGP_SILENT, options, &error);
 }

@@ -6,21 +6,18 @@
 #include "arguments_parts.h"
 #include "host/formats/formats.h"
 
-static const char *link_help(unsigned i)
-{
+static const char *link_help(unsigned i) {
     return host_link_row(i)->help;
 }
 
-static const char *board_help(unsigned i)
-{
+static const char *board_help(unsigned i) {
     return host_board_row(i)->help;
 }
 
 /* Option's help with the rows of the table that its values are from; usual: the
  * default's name. */
 static char *list_rows(const char *text, const char *(*name)(unsigned i),
-                       const char *(*help)(unsigned i), const char *usual)
-{
+                       const char *(*help)(unsigned i), const char *usual) {
     size_t size = strlen(text) + 1;
     for (unsigned i = 0; name(i) != NULL; i++) {
         size += strlen(name(i)) + strlen(help(i)) + sizeof " (; the default),";
@@ -44,8 +41,7 @@ static char *list_rows(const char *text, const char *(*name)(unsigned i),
  */
 static char *list_formats(const char *text, enum host_use use,
                           void (*put)(enum host_use use, char *text,
-                                      size_t size))
-{
+                                      size_t size)) {
     char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
     const char *place = strstr(text, "%s");
     put(use, list, sizeof list);
@@ -55,8 +51,7 @@ static char *list_formats(const char *text, enum host_use use,
                : whole;
 }
 
-char *host_arguments_help(int key, const char *text, void *input)
-{
+char *host_arguments_help(int key, const char *text, void *input) {
     (void)input;
     switch (key) {
     case 'o':

@@ -2,14 +2,12 @@
 
 #include "arguments_parts.h"
 
-bool host_arguments_given(const struct host_arguments *p, int key)
-{
+bool host_arguments_given(const struct host_arguments *p, int key) {
     return (p->given >> (key - KEY_STRATEGY) & 1) != 0;
 }
 
 /* What a bare board settles: the wires, the memory, the most nodes. */
-static int settle_bare(const struct host_arguments *p)
-{
+static int settle_bare(const struct host_arguments *p) {
     struct host_run_options *o = p->options;
     unsigned most = host_bare_nodes_max(o->board->bare);
     if (o->nodes > most) {
@@ -29,8 +27,7 @@ static int settle_bare(const struct host_arguments *p)
     return 0;
 }
 
-int host_arguments_together(const struct host_arguments *p)
-{
+int host_arguments_together(const struct host_arguments *p) {
     const struct host_run_options *o = p->options;
     bool cube = o->cube != NULL, bare = !cube && o->board->bare != NULL;
     bool ranks = !cube && !bare && o->link->ranks;

@@ -8,8 +8,7 @@
 #include "host/files/output.h"
 
 /* Of what was closed, nothing is read, and writing to it remains an error. */
-static void open_standard(void)
-{
+static void open_standard(void) {
     int file;
     do {
         file = open("/dev/null", O_RDONLY);
@@ -19,8 +18,7 @@ static void open_standard(void)
     }
 }
 
-void host_begin(const char *name)
-{
+void host_begin(const char *name) {
     (void)prctl(PR_SET_NAME, name);
     open_standard();
     (void)signal(SIGCHLD, SIG_DFL);

@@ -66,8 +66,7 @@ struct emulate {
 
 /* --- the arguments -------------------------------------------------------- */
 
-static void parse_board(struct emulate *e, const char *value)
-{
+static void parse_board(struct emulate *e, const char *value) {
     char allowed[120] = "";
     e->board = NULL;
     for (unsigned i = 0; host_board_name(i) != NULL; i++) {
@@ -89,8 +88,7 @@ static void parse_board(struct emulate *e, const char *value)
 }
 
 /* "2,3" */
-static void parse_linux(struct emulate *e, const char *value)
-{
+static void parse_linux(struct emulate *e, const char *value) {
     const char *at = value;
     char *end = NULL;
     e->list = value;
@@ -111,8 +109,7 @@ static void parse_linux(struct emulate *e, const char *value)
     } while (*end == ',');
 }
 
-static error_t parse(int key, char *value, struct argp_state *state)
-{
+static error_t parse(int key, char *value, struct argp_state *state) {
     struct emulate *e = state->input;
     switch (key) {
     case KEY_BOARD:
@@ -144,8 +141,7 @@ static error_t parse(int key, char *value, struct argp_state *state)
     }
 }
 
-static int check(const struct emulate *e)
-{
+static int check(const struct emulate *e) {
     uint64_t all = (UINT64_C(1) << e->nodes) - 1;
     if (e->board == NULL || e->nodes == 0 || e->file == NULL ||
         *e->file == '\0' || strcmp(e->file, "-") == 0) {
@@ -172,8 +168,7 @@ static int check(const struct emulate *e)
 /* --- what it leaves ------------------------------------------------------- */
 
 /* The directory beside the file, for one program at a time. */
-static int take_directory(struct emulate *e)
-{
+static int take_directory(struct emulate *e) {
     struct tcp_address longest;
     char path[PATH_MAX + 32];
     int size = snprintf(e->directory, sizeof e->directory, "%s.d", e->file);
@@ -202,8 +197,7 @@ static int take_directory(struct emulate *e)
 #define FIRST_LINE "# Boards that incode emulate runs"
 
 /* What a person has written is neither replaced nor, in the end, removed. */
-static int check_file(const struct emulate *e)
-{
+static int check_file(const struct emulate *e) {
     char text[sizeof FIRST_LINE] = "";
     int file = open(e->file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (file < 0 && errno != ELOOP) {
@@ -221,15 +215,13 @@ static int check_file(const struct emulate *e)
                            e->file);
 }
 
-static bool is_linux(const struct emulate *e, unsigned node)
-{
+static bool is_linux(const struct emulate *e, unsigned node) {
     return (e->linux_nodes >> node & 1) != 0;
 }
 
 /* A link that somebody else than two boards has an end of.  A board listens. */
 static void put_link(struct host_output *out, const char *folder, unsigned node,
-                     int to, const char *name)
-{
+                     int to, const char *name) {
     char line[PATH_MAX + 100], other[16] = "\"host\"";
     if (to >= 0) {
         snprintf(other, sizeof other, "%d", to);
@@ -241,8 +233,7 @@ static void put_link(struct host_output *out, const char *folder, unsigned node,
 }
 
 static void put_links(struct host_output *out, const struct emulate *e,
-                      const char *folder)
-{
+                      const char *folder) {
     char name[32];
     host_output_text(out, "links = (\n");
     put_link(out, folder, 0, -1, "host.socket");
@@ -261,8 +252,7 @@ static void put_links(struct host_output *out, const struct emulate *e,
 }
 
 /* Names in it are beside it. */
-static int write_file(const struct emulate *e)
-{
+static int write_file(const struct emulate *e) {
     struct host_output out;
     char text[400];
     unsigned dimension = (unsigned)__builtin_ctz(e->nodes);
@@ -298,16 +288,14 @@ static int write_file(const struct emulate *e)
 
 static volatile sig_atomic_t ended;
 
-static void end(int signal)
-{
+static void end(int signal) {
     (void)signal;
     ended = 1;
 }
 
 /* A shell that runs no terminal has SIGINT ignored by what it puts behind it:
  * that is how such boards end, all the same.  SIGHUP stays as nohup has it. */
-static void expect_end(void)
-{
+static void expect_end(void) {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     const struct sigaction action = {.sa_handler = end};
     struct sigaction before;
@@ -321,8 +309,7 @@ static void expect_end(void)
     }
 }
 
-static int start(const struct emulate *e, struct host_started *started)
-{
+static int start(const struct emulate *e, struct host_started *started) {
     struct host_cluster_options options = {.nodes = e->nodes,
                                            .memory = HOST_BOARD_MEMORY,
                                            .link = host_link_named("uart"),
@@ -336,8 +323,7 @@ static int start(const struct emulate *e, struct host_started *started)
 
 /* Sockets lead nowhere any more; a folder that nothing was put to is not kept.
  */
-static void remove_leftovers(const struct emulate *e)
-{
+static void remove_leftovers(const struct emulate *e) {
     char name[32];
     for (unsigned i = 0; i < e->nodes; i++) {
         for (unsigned u = 0; u < HOST_UARTS_MAX; u++) {
@@ -351,8 +337,7 @@ static void remove_leftovers(const struct emulate *e)
 }
 
 /* Until a signal, or a board that cannot be kept running. */
-static int keep(const struct emulate *e, struct host_machine *machine)
-{
+static int keep(const struct emulate *e, struct host_machine *machine) {
     const struct timespec look = {.tv_nsec = 1000L * LOOK_US};
     unsigned restarts = 0;
     int status = 0;
@@ -368,8 +353,7 @@ static int keep(const struct emulate *e, struct host_machine *machine)
 }
 
 /* The commands that go on from here. */
-static void say_next(const struct emulate *e)
-{
+static void say_next(const struct emulate *e) {
     char image[PATH_MAX], from[PATH_MAX], file[PATH_MAX];
     bool known = host_firmware_find(e->board->name, image) &&
                  host_text_quote(from, sizeof from, image) == 0;
@@ -386,8 +370,7 @@ static void say_next(const struct emulate *e)
     (void)fflush(stdout);
 }
 
-int host_emulate(int argc, char **argv, struct host_error *error)
-{
+int host_emulate(int argc, char **argv, struct host_error *error) {
     static const struct argp argp = {
         options_of_emulate,
         parse,

@@ -53,15 +53,13 @@ struct launch {
 
 static volatile sig_atomic_t caught;
 
-static void catch (int signal)
-{
+static void catch (int signal) {
     caught = signal;
 }
 
 /* --- in a rank ------------------------------------------------------------ */
 
-int host_launch_rank(void)
-{
+int host_launch_rank(void) {
     static const char *const names[] = {"OMPI_COMM_WORLD_RANK", "PMIX_RANK",
                                         "PMI_RANK"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
@@ -76,8 +74,7 @@ int host_launch_rank(void)
 
 /* The file of another program of this project, beside this one. */
 static int beside(const char *name, char *path, size_t size,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     ssize_t length = readlink("/proc/self/exe", path, size - 32);
     if (length <= 0) {
         return host_fail(error, HOST_BROKEN,
@@ -91,8 +88,7 @@ static int beside(const char *name, char *path, size_t size,
 }
 
 /* The launcher's address, which vanishes with it. */
-static socklen_t address_of(const char *name, struct sockaddr_un *address)
-{
+static socklen_t address_of(const char *name, struct sockaddr_un *address) {
     memset(address, 0, sizeof *address);
     address->sun_family = AF_UNIX;
     strcpy(address->sun_path + 1, name);
@@ -102,8 +98,7 @@ static socklen_t address_of(const char *name, struct sockaddr_un *address)
 
 /* The launcher's socket, from its name in the environment; -1: there is none,
  * or not on this machine. */
-static int call_launcher(void)
-{
+static int call_launcher(void) {
     struct sockaddr_un address;
     const char *name = getenv(SOCKET_NAME);
     struct ucred peer;
@@ -123,8 +118,7 @@ static int call_launcher(void)
 }
 
 /* Takes the launcher's own standard streams in the place of mpirun's. */
-static void take_streams(void)
-{
+static void take_streams(void) {
     union {
         struct cmsghdr header;
         char bytes[CMSG_SPACE(STREAMS * sizeof(int))];
@@ -154,8 +148,7 @@ static void take_streams(void)
     (void)setenv(REPORT_NAME, text, 1);
 }
 
-int host_launch_become(int rank, char **argv, struct host_error *error)
-{
+int host_launch_become(int rank, char **argv, struct host_error *error) {
     char path[4096];
     const char *name = rank == 0 ? "incode-mpi" : "incode-node-mpi";
     if (beside(name, path, sizeof path, error) != 0) {
@@ -171,8 +164,7 @@ int host_launch_become(int rank, char **argv, struct host_error *error)
                      path, strerror(errno));
 }
 
-bool host_launch_report(int status, int lost, bool ended)
-{
+bool host_launch_report(int status, int lost, bool ended) {
     struct report report = {status, lost, ended};
     const char *text = getenv(REPORT_NAME);
     uint64_t fd;
@@ -183,8 +175,7 @@ bool host_launch_report(int status, int lost, bool ended)
 
 /* --- before mpirun -------------------------------------------------------- */
 
-static int listen_for_host(struct launch *l, struct host_error *error)
-{
+static int listen_for_host(struct launch *l, struct host_error *error) {
     uint64_t random = 0;
     struct sockaddr_un address;
     char name[64];
@@ -205,8 +196,7 @@ static int listen_for_host(struct launch *l, struct host_error *error)
 }
 
 /* Whether a scheduler or the user says where ranks go: slots are theirs. */
-static bool placed(void)
-{
+static bool placed(void) {
     static const char *const names[] = {"SLURM_JOB_ID",
                                         "PBS_JOBID",
                                         "LSB_JOBID",
@@ -223,8 +213,7 @@ static bool placed(void)
 }
 
 /* The arguments of mpirun, and after them those of this program. */
-static char **command_for(char **argv, char *ranks, char *self)
-{
+static char **command_for(char **argv, char *ranks, char *self) {
     static char *const always[] = {
         "mpirun", "--oversubscribe", "--bind-to", "none", "-x", SOCKET_NAME};
     static char *const as_root[] = {"--allow-run-as-root"};
@@ -259,8 +248,7 @@ static char **command_for(char **argv, char *ranks, char *self)
 /* In the child: becomes mpirun, in a group of its own, so that an interrupt at
  * the terminal comes to it once, from its parent. */
 static _Noreturn void become_mpirun(pid_t parent, char **argv, unsigned nodes,
-                                    int said)
-{
+                                    int said) {
     char ranks[16], self[4096];
     ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
     int null = open("/dev/null", O_RDONLY);
@@ -284,8 +272,7 @@ static _Noreturn void become_mpirun(pid_t parent, char **argv, unsigned nodes,
 }
 
 static int start_mpirun(struct launch *l, char **argv, unsigned nodes,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     int pair[2];
     pid_t self = getpid();
     if (pipe2(pair, O_CLOEXEC) != 0) {
@@ -307,8 +294,7 @@ static int start_mpirun(struct launch *l, char **argv, unsigned nodes,
 
 /* A terminal answers only those in its foreground, which ranks are not: what
  * is typed is copied by a process that is. */
-static int input_for_host(bool wanted)
-{
+static int input_for_host(bool wanted) {
     int pair[2];
     char bytes[4096];
     ssize_t n;
@@ -335,8 +321,7 @@ static int input_for_host(bool wanted)
 /* --- while it runs -------------------------------------------------------- */
 
 /* Gives rank 0 the standard streams of this process. */
-static void welcome(struct launch *l, bool input)
-{
+static void welcome(struct launch *l, bool input) {
     union {
         struct cmsghdr header;
         char bytes[CMSG_SPACE(STREAMS * sizeof(int))];
@@ -373,8 +358,7 @@ static void welcome(struct launch *l, bool input)
 }
 
 /* What rank 0 says, or that it is gone. */
-static void hear_host(struct launch *l)
-{
+static void hear_host(struct launch *l) {
     struct report report;
     ssize_t n = recv(l->host, &report, sizeof report, MSG_DONTWAIT);
     if (n == (ssize_t)sizeof report) {
@@ -388,8 +372,7 @@ static void hear_host(struct launch *l)
 }
 
 /* Keeps the beginning of what mpirun says.  False at its end. */
-static bool hear_mpirun(struct launch *l)
-{
+static bool hear_mpirun(struct launch *l) {
     char bytes[4096];
     ssize_t n = read(l->said_file, bytes, sizeof bytes);
     size_t room = SAID_BYTES - 1 - l->said_size;
@@ -403,8 +386,7 @@ static bool hear_mpirun(struct launch *l)
 }
 
 /* mpirun ends its ranks when it is told to, and must not outlive rank 0. */
-static void look_after(struct launch *l)
-{
+static void look_after(struct launch *l) {
     uint64_t now = host_now_us();
     bool late = l->gone_us != 0 && now - l->gone_us > END_US_MAX;
     if (l->ended_us == 0 && (caught != 0 || late)) {
@@ -416,8 +398,7 @@ static void look_after(struct launch *l)
 }
 
 /* Until mpirun has ended: its status as waitpid gives it. */
-static int watch(struct launch *l, bool input)
-{
+static int watch(struct launch *l, bool input) {
     bool speaks = true;
     int status = 0;
     while (speaks) {
@@ -449,8 +430,7 @@ static int watch(struct launch *l, bool input)
 /* --- after it ------------------------------------------------------------- */
 
 /* The first words that mpirun has said, between its rules. */
-static void first_words(const char *said, char *words, size_t size)
-{
+static void first_words(const char *said, char *words, size_t size) {
     size_t at = 0;
     while (*said == '-' || *said == '\n') {
         said++;
@@ -465,8 +445,7 @@ static void first_words(const char *said, char *words, size_t size)
 
 /* Which rank, by mpirun's own account, was the first to end badly, and how.
  * -1: it does not say. */
-static int rank_lost(const char *said, char *how, size_t size)
-{
+static int rank_lost(const char *said, char *how, size_t size) {
     const char *rank = strstr(said, "process rank ");
     const char *on = rank == NULL ? NULL : strstr(rank, "exited on signal ");
     unsigned number = 0, signal = 0, code = 0;
@@ -488,8 +467,7 @@ static int rank_lost(const char *said, char *how, size_t size)
 }
 
 static int explain(const struct launch *l, unsigned nodes, int status,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     char words[400], how[80] = "its process has ended";
     int rank = rank_lost(l->said, how, sizeof how);
     if (l->reported && l->report.lost != 0) {
@@ -536,8 +514,7 @@ static int explain(const struct launch *l, unsigned nodes, int status,
 }
 
 int host_launch_mpi(char **argv, const struct host_run_options *options,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     static struct launch launch = {.listener = -1, .host = -1};
     struct launch *l = &launch;
     struct sigaction action = {.sa_handler = catch}, before[2];

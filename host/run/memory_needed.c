@@ -4,8 +4,7 @@
 
 #include "node/node.h"
 
-static unsigned cube_dimension(unsigned nodes)
-{
+static unsigned cube_dimension(unsigned nodes) {
     unsigned dimension = 0;
     while (1u << dimension < nodes) {
         dimension++;
@@ -15,8 +14,7 @@ static unsigned cube_dimension(unsigned nodes)
 
 static bool does_with(const struct host_run_options *options,
                       const struct host_strategy *strategy, unsigned dimension,
-                      const struct node_setup_message *setup, uint64_t memory)
-{
+                      const struct node_setup_message *setup, uint64_t memory) {
     struct node_identity identity = {.dimension = (uint8_t)dimension,
                                      .window = (uint8_t)options->window,
                                      .epoch = 1};
@@ -30,8 +28,7 @@ static bool does_with(const struct host_run_options *options,
 static uint64_t memory_needed(const struct host_run_options *options,
                               const struct host_strategy *strategy,
                               unsigned dimension,
-                              const struct node_setup_message *setup)
-{
+                              const struct node_setup_message *setup) {
     uint64_t memory = HOST_MEMORY_MIN;
     while (!does_with(options, strategy, dimension, setup, memory)) {
         memory += 16384;
@@ -43,8 +40,7 @@ static uint64_t memory_needed(const struct host_run_options *options,
 static const char *memory_advice(const struct host_run_options *options,
                                  const struct host_strategy *strategy,
                                  unsigned nodes,
-                                 const struct node_setup_message *setup)
-{
+                                 const struct node_setup_message *setup) {
     struct host_run_options narrow = *options;
     narrow.window = 0;
     bool fewer = nodes > 1 &&
@@ -62,8 +58,7 @@ static const char *memory_advice(const struct host_run_options *options,
 
 static struct node_setup_message
 setup_of(const struct host_run_options *options, uint32_t bricks,
-         const uint32_t cells[3])
-{
+         const uint32_t cells[3]) {
     struct node_setup_message setup = {0};
     setup.setup.bricks = bricks;
     setup.setup.index = (uint8_t)options->index;
@@ -73,8 +68,7 @@ setup_of(const struct host_run_options *options, uint32_t bricks,
 
 bool host_memory_fits(const struct host_run_options *options,
                       const struct host_strategy *strategy, unsigned nodes,
-                      uint32_t bricks, const uint32_t cells[3])
-{
+                      uint32_t bricks, const uint32_t cells[3]) {
     struct node_setup_message setup = setup_of(options, bricks, cells);
     return does_with(options, strategy, cube_dimension(nodes), &setup,
                      options->memory);
@@ -83,8 +77,7 @@ bool host_memory_fits(const struct host_run_options *options,
 int host_memory_check(const struct host_run_options *options,
                       const struct host_strategy *strategy, unsigned nodes,
                       uint32_t bricks, const uint32_t cells[3],
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct node_setup_message setup = setup_of(options, bricks, cells);
     uint64_t needed =
         memory_needed(options, strategy, cube_dimension(nodes), &setup);

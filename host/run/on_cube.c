@@ -11,16 +11,14 @@ static struct host_cube_file the_file;
 static void (*stop_remote)(void *context);
 
 /* Its wires are closed: nothing needs the key. */
-static void stop(void *context)
-{
+static void stop(void *context) {
     stop_remote(context);
     secure_wipe(the_file.key, sizeof the_file.key);
 }
 
 static int begin(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     static struct host_remote remote;
     static char program[4096];
     (void)result;
@@ -36,8 +34,8 @@ static int begin(const struct host_run_options *options,
     return 0;
 }
 
-int host_run_on_cube(struct host_run_options *options, struct host_error *error)
-{
+int host_run_on_cube(struct host_run_options *options,
+                     struct host_error *error) {
     unsigned asked = options->nodes;
     if (host_cube_file_read(&the_file, options->cube, error) != 0) {
         return error->code;

@@ -10,8 +10,7 @@
 
 /* The processor time of the busiest node: what t_max would be if every node
  * had a processor to itself. */
-static double busiest(const struct host_run_result *r)
-{
+static double busiest(const struct host_run_result *r) {
     double most = 0.0;
     for (unsigned i = 0; i < r->nodes; i++) {
         double s = 1e-6 * (double)r->node[i].statistics.busy_us;
@@ -20,13 +19,11 @@ static double busiest(const struct host_run_result *r)
     return most;
 }
 
-static double ratio(double a, double b)
-{
+static double ratio(double a, double b) {
     return b > 0.0 ? a / b : 0.0;
 }
 
-void host_report_head(FILE *file, const char *title)
-{
+void host_report_head(FILE *file, const char *title) {
     fprintf(file,
             "\n%s\n"
             "%5s %8s %8s %8s %8s %5s %10s %6s %8s %8s %5s\n",
@@ -35,8 +32,7 @@ void host_report_head(FILE *file, const char *title)
 }
 
 void host_report_row(FILE *file, const struct host_run_result *r,
-                     const struct host_run_result *alone)
-{
+                     const struct host_run_result *alone) {
     double wall = ratio(alone->t_max_s, r->t_max_s);
     double cpu = ratio(busiest(alone), busiest(r));
     fprintf(file,
@@ -48,8 +44,7 @@ void host_report_row(FILE *file, const struct host_run_result *r,
             cpu / r->nodes);
 }
 
-void host_report_notes(FILE *file)
-{
+void host_report_notes(FILE *file) {
     fprintf(file,
             "Seconds; t_min, t_max: of the fastest and the slowest node, on "
             "the clock, %ld\nprocessors shared by all.  cpu_max: processor "
@@ -58,8 +53,7 @@ void host_report_notes(FILE *file)
             sysconf(_SC_NPROCESSORS_ONLN));
 }
 
-static void node_lines(FILE *file, const struct host_run_result *r)
-{
+static void node_lines(FILE *file, const struct host_run_result *r) {
     fprintf(file, "\n%4s %10s %10s %8s %8s %8s %8s %8s %10s\n", "node", "built",
             "kept", "pages", "faults", "evicted", "AFL max", "spilled",
             "memory");
@@ -81,15 +75,13 @@ static void node_lines(FILE *file, const struct host_run_result *r)
             r->memory_held == NULL ? "" : r->memory_held);
 }
 
-uint64_t host_node_stack_bytes(const struct host_node_report *report)
-{
+uint64_t host_node_stack_bytes(const struct host_node_report *report) {
     uint32_t told = report->statistics.stack_bytes;
     return told > 0 ? told : HOST_STACK_BYTES;
 }
 
 static void map_line(FILE *file, uint64_t bytes, const char *what,
-                     uint64_t count, const char *unit)
-{
+                     uint64_t count, const char *unit) {
     fprintf(file, "%12llu  %s", (unsigned long long)bytes, what);
     if (count > 0) {
         fprintf(file, " (%llu %s)", (unsigned long long)count, unit);
@@ -97,8 +89,7 @@ static void map_line(FILE *file, uint64_t bytes, const char *what,
     fputc('\n', file);
 }
 
-void host_report_map(FILE *file, const struct host_run_result *result)
-{
+void host_report_map(FILE *file, const struct host_run_result *result) {
     const struct node_map *m = &result->node[0].map.map;
     const struct node_role *role = node_role_named(result->node[0].map.role);
     uint64_t stack = host_node_stack_bytes(&result->node[0]);
@@ -133,8 +124,7 @@ void host_report_map(FILE *file, const struct host_run_result *result)
 
 void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *result,
-                     const struct host_run_result *alone)
-{
+                     const struct host_run_result *alone) {
     const struct host_run_result *r = result;
     host_say(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
              (unsigned long long)r->points,

@@ -23,8 +23,7 @@
 #include "settle.h"
 #include "stats.h"
 
-void host_run_defaults(struct host_run_options *options)
-{
+void host_run_defaults(struct host_run_options *options) {
     memset(options, 0, sizeof *options);
     options->partition = HOST_ADAPTIVE;
     options->index = INCODE_KD;
@@ -37,14 +36,12 @@ void host_run_defaults(struct host_run_options *options)
     options->progress = true;
 }
 
-static double seconds_since(uint64_t start_us)
-{
+static double seconds_since(uint64_t start_us) {
     return 1e-6 * (double)(host_now_us() - start_us);
 }
 
 /* Of this process, all its threads, or of this thread. */
-static double used_seconds(clockid_t clock)
-{
+static double used_seconds(clockid_t clock) {
     struct timespec used;
     clock_gettime(clock, &used);
     return (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
@@ -57,23 +54,20 @@ struct stretch {
     double cpu_s;
 };
 
-static struct stretch begin_stretch(void)
-{
+static struct stretch begin_stretch(void) {
     return (struct stretch){host_now_us(),
                             used_seconds(CLOCK_PROCESS_CPUTIME_ID)};
 }
 
 static void end_stretch(const struct stretch *stretch,
-                        struct host_run_result *result)
-{
+                        struct host_run_result *result) {
     result->time_triangulation_s += seconds_since(stretch->start_us);
     result->host_triangulation_cpu_s +=
         used_seconds(CLOCK_PROCESS_CPUTIME_ID) - stretch->cpu_s;
 }
 
 void host_run_sum(const struct host_service *service,
-                  struct host_run_result *result)
-{
+                  struct host_run_result *result) {
     struct host_run_result *r = result;
     memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
     r->retransmitted = service->retransmitted;
@@ -108,14 +102,12 @@ void host_run_sum(const struct host_service *service,
     }
 }
 
-static uint64_t at_least(uint64_t count, uint64_t least)
-{
+static uint64_t at_least(uint64_t count, uint64_t least) {
     return count > least ? count : least;
 }
 
 /* It need not be secret from nodes: page_check.h. */
-static uint64_t draw_key(void)
-{
+static uint64_t draw_key(void) {
     uint64_t key;
     if (getrandom(&key, sizeof key, 0) != (ssize_t)sizeof key) {
         key = host_now_us();
@@ -128,8 +120,8 @@ static int run_service(const struct host_run_options *options,
                        const struct host_order *order,
                        struct host_service *service,
                        struct host_tetrahedra *tets,
-                       struct host_run_result *result, struct host_error *error)
-{
+                       struct host_run_result *result,
+                       struct host_error *error) {
     service->order = order;
     service->tets = tets;
     service->setup.setup.index = (uint8_t)options->index;
@@ -149,8 +141,7 @@ static int run_service(const struct host_run_options *options,
 
 static int check_strategy(const struct host_run_options *options,
                           const struct host_run_result *result,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     return host_strategy_check(result->strategy, result->nodes,
                                &options->sharing, options->face_rule,
                                options->build, error);
@@ -162,8 +153,7 @@ static int order_points(const struct host_run_options *options,
                         const struct host_points *points,
                         struct host_order *order,
                         struct host_run_result *result,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct stretch stretch = begin_stretch();
     unsigned regions = options->strategy == NULL
                            ? result->nodes
@@ -193,8 +183,7 @@ static int order_points(const struct host_run_options *options,
 /* What the check has found, and its time, which is no part of the
  * triangulation's. */
 static void take_check(struct host_service *service,
-                       struct host_run_result *result, int status)
-{
+                       struct host_run_result *result, int status) {
     struct host_audit *audit = &service->audit;
     host_audit_free(audit); /* if the run failed, the check may still run */
     double spent = 1e-6 * (double)audit->spent_us;
@@ -216,8 +205,7 @@ static int on_nodes(const struct host_run_options *options,
                     struct host_machine *machine,
                     const struct host_order *order,
                     struct host_tetrahedra *tets,
-                    struct host_run_result *result, struct host_error *error)
-{
+                    struct host_run_result *result, struct host_error *error) {
     static struct host_service service;
     struct host_throttled throttled;
     struct host_machine slowed;
@@ -265,8 +253,7 @@ int host_triangulate_on(const struct host_run_options *options,
                         const struct host_points *points,
                         struct host_tetrahedra *tets,
                         struct host_run_result *result,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_order order;
     int status = order_points(options, points, &order, result, error);
     if (status == 0) {
@@ -282,8 +269,7 @@ int host_triangulate_on(const struct host_run_options *options,
 static int begin_on_board(const struct host_run_options *options,
                           struct host_run_result *result,
                           struct host_machine *machine,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct host_cluster_options nodes = {0};
     struct host_started started;
     memset(&started, 0, sizeof started);
@@ -311,8 +297,8 @@ static int begin_on_board(const struct host_run_options *options,
 static int start_nodes(const struct host_run_options *options,
                        const struct host_order *order,
                        struct host_tetrahedra *tets,
-                       struct host_run_result *result, struct host_error *error)
-{
+                       struct host_run_result *result,
+                       struct host_error *error) {
     struct host_machine machine;
     uint64_t start = host_now_us();
     host_progress_phase("starting nodes", NULL);
@@ -327,8 +313,7 @@ static int start_nodes(const struct host_run_options *options,
 int host_triangulate(const struct host_run_options *options,
                      const struct host_points *points,
                      struct host_tetrahedra *tets,
-                     struct host_run_result *result, struct host_error *error)
-{
+                     struct host_run_result *result, struct host_error *error) {
     static const uint32_t no_cells[3] = {0, 0, 0};
     struct host_order order;
     host_settle(options, points->count, result);
@@ -346,8 +331,7 @@ int host_triangulate(const struct host_run_options *options,
 }
 
 /* Whether standard output takes tetrahedra or statistics. */
-static bool stdout_is_data(const struct host_run_options *options)
-{
+static bool stdout_is_data(const struct host_run_options *options) {
     bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
     for (unsigned i = 0; i < options->outputs; i++) {
         data = data || strcmp(options->output[i], "-") == 0;
@@ -358,15 +342,14 @@ static bool stdout_is_data(const struct host_run_options *options)
 /* The summary, which has to arrive where it goes to standard output. */
 static int report(const struct host_run_options *options,
                   const struct host_run_result *result,
-                  const struct host_run_result *alone, struct host_error *error)
-{
+                  const struct host_run_result *alone,
+                  struct host_error *error) {
     FILE *file = stdout_is_data(options) ? stderr : stdout;
     host_report_run(file, options, result, alone);
     return file == stdout ? host_output_printed(error) : 0;
 }
 
-void host_run_clean(const struct host_run_options *options, pid_t writer)
-{
+void host_run_clean(const struct host_run_options *options, pid_t writer) {
     char name[HOST_PATH_MAX];
     const char *file;
     for (unsigned i = 0; i < options->outputs; i++) {
@@ -384,15 +367,13 @@ void host_run_clean(const struct host_run_options *options, pid_t writer)
 
 /* The file of the points, if its name tells its format: such a .node beside an
  * .ele is not written again. */
-static const char *points_file(const struct host_run_options *options)
-{
+static const char *points_file(const struct host_run_options *options) {
     return options->format == NULL ? options->input : NULL;
 }
 
 /* No output may be a file that is read, nor be another output. */
 static int check_claims(const struct host_run_options *options,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_claims claims = {0};
     host_claims_read(&claims, options->input, error);
     if (options->cube != NULL) {
@@ -410,8 +391,7 @@ static int check_claims(const struct host_run_options *options,
 }
 
 static int check_outputs(const struct host_run_options *options,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     if (check_claims(options, error) != 0) {
         return error->code;
     }
@@ -436,8 +416,7 @@ struct digest {
     double cpu_s;
 };
 
-static void make_digest(void *argument)
-{
+static void make_digest(void *argument) {
     struct digest *d = argument;
     d->cpu_s = -used_seconds(CLOCK_THREAD_CPUTIME_ID);
     host_digest(d->tets, d->digest);
@@ -448,8 +427,7 @@ static int write_outputs(const struct host_run_options *options,
                          const struct host_points *points,
                          const struct host_tetrahedra *tets,
                          struct host_run_result *result,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     uint64_t start = host_now_us();
     for (unsigned i = 0; i < options->outputs; i++) {
         if (host_write(options->output[i], points_file(options), points, tets,
@@ -465,8 +443,7 @@ static int write_outputs(const struct host_run_options *options,
 static int finish(const struct host_run_options *options,
                   const struct host_points *points,
                   struct host_tetrahedra *tets, struct host_run_result *result,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     struct digest digest = {.tets = tets, .digest = &result->digest};
     struct host_fork fork;
     uint64_t start = host_now_us();
@@ -486,8 +463,7 @@ static int finish(const struct host_run_options *options,
 /* The same on one node, for the table's speed-up. */
 static int run_alone(const struct host_run_options *options,
                      const struct host_points *points,
-                     struct host_run_result *alone, struct host_error *error)
-{
+                     struct host_run_result *alone, struct host_error *error) {
     struct host_run_options one = *options;
     struct host_tetrahedra tets = {0};
     one.nodes = 1;
@@ -500,8 +476,7 @@ static int run_alone(const struct host_run_options *options,
 static int run_on(const struct host_run_options *options,
                   const struct host_points *points,
                   struct host_run_result *result, struct host_run_result *alone,
-                  struct host_error *error)
-{
+                  struct host_error *error) {
     struct host_tetrahedra tets = {0};
     alone->time_io_s = result->time_read_s;
     if (options->table && run_alone(options, points, alone, error) != 0) {
@@ -521,8 +496,7 @@ static int run_on(const struct host_run_options *options,
  * expect, before the run takes time. */
 static int look_at_points(const struct host_run_options *options,
                           const struct host_points *points,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     char list[HOST_FORMAT_LIST_MAX];
     if (points->count == 3 && points->wide) {
         return host_fail(error, HOST_INPUT,
@@ -546,8 +520,7 @@ static int look_at_points(const struct host_run_options *options,
 }
 
 int host_run(const struct host_run_options *options,
-             struct host_run_result *result, struct host_error *error)
-{
+             struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
     struct host_points points = {0};
     uint64_t start = host_now_us();

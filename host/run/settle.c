@@ -8,8 +8,7 @@
 #include "memory_needed.h"
 
 /* The largest power of two of nodes that have a processor each. */
-static unsigned suitable_nodes(void)
-{
+static unsigned suitable_nodes(void) {
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned nodes = 1;
     while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors) {
@@ -18,8 +17,7 @@ static unsigned suitable_nodes(void)
     return nodes;
 }
 
-unsigned host_run_nodes(const struct host_run_options *options)
-{
+unsigned host_run_nodes(const struct host_run_options *options) {
     if (options->nodes != 0) {
         return options->nodes;
     }
@@ -40,24 +38,21 @@ struct run {
     const uint32_t *cells;
 };
 
-static bool fits(const void *context, const struct host_strategy *strategy)
-{
+static bool fits(const void *context, const struct host_strategy *strategy) {
     const struct run *run = context;
     return host_memory_fits(run->options, strategy, run->nodes, run->bricks,
                             run->cells);
 }
 
 /* Whether a node may insert points, as far as the options go. */
-static bool may_insert(const struct host_run_options *options)
-{
+static bool may_insert(const struct host_run_options *options) {
     return options->build != INCODE_BUILD_FACES &&
            options->index == INCODE_KD && options->face_rule == INCODE_FACE_OWN;
 }
 
 /* What `auto` is told.  Nodes of this machine share its processors, with the
  * host. */
-static struct host_task task_of(const struct run *run, uint64_t points)
-{
+static struct host_task task_of(const struct run *run, uint64_t points) {
     const struct host_run_options *options = run->options;
     unsigned nodes = run->nodes;
     long here = sysconf(_SC_NPROCESSORS_ONLN);
@@ -79,15 +74,14 @@ static struct host_task task_of(const struct run *run, uint64_t points)
                               .by_points = may_insert(options)};
 }
 
-static void choose(const struct host_task *task, struct host_run_result *result)
-{
+static void choose(const struct host_task *task,
+                   struct host_run_result *result) {
     result->strategy = host_strategy_auto(task);
     host_strategy_why(task, result->why);
 }
 
 void host_settle(const struct host_run_options *options, uint64_t points,
-                 struct host_run_result *result)
-{
+                 struct host_run_result *result) {
     result->strategy = options->strategy;
     result->partition = options->partition;
     result->index = options->index;
@@ -106,8 +100,7 @@ void host_settle(const struct host_run_options *options, uint64_t points,
 
 /* Whether it is thinner by far along one axis than along another, or a quarter
  * of its points have a coordinate of the one before, as in a lattice. */
-static bool is_thin(const struct host_order *order, uint32_t brick)
-{
+static bool is_thin(const struct host_order *order, uint32_t brick) {
     const struct incode_brick *b = &order->brick[brick];
     const double *const axis[3] = {b->x, b->y, b->z};
     double least = INFINITY, most = 0;
@@ -132,8 +125,7 @@ static bool is_thin(const struct host_order *order, uint32_t brick)
 /* Whether points fill a volume evenly, for all that their bricks tell: a few of
  * them, spread over all, are looked at.  Of surfaces lifted boxes tell more
  * than those along the axes. */
-static bool is_uneven(const struct host_order *order)
-{
+static bool is_uneven(const struct host_order *order) {
     enum { LOOKS = 1024, FEW = 20 };
     uint32_t step = order->bricks / LOOKS + 1, looked = 0, uneven = 0;
     for (uint32_t i = 0; i < order->bricks; i += step, looked++) {
@@ -147,8 +139,7 @@ static bool is_uneven(const struct host_order *order)
  * where nodes have so much memory: all tetrahedra fit, or those that are open
  * at a time do.  Each takes a cell and a fourth of a point, and there are some
  * 6.5 a point; a part of the memory has other uses. */
-static bool is_room(const struct host_order *order, uint64_t memory)
-{
+static bool is_room(const struct host_order *order, uint64_t memory) {
     enum { CELL = 40, HALF_CELLS_A_POINT = 13, OTHER = 256 << 10 };
     uint64_t room = memory - memory / 8;
     uint64_t cells = room > OTHER ? (room - OTHER) / CELL : 0;
@@ -158,8 +149,7 @@ static bool is_room(const struct host_order *order, uint64_t memory)
 
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
-                         struct host_run_result *result)
-{
+                         struct host_run_result *result) {
     const struct host_strategy *before = result->strategy;
     bool uneven = is_uneven(order);
     if (options->build == INCODE_BUILD_AUTO && may_insert(options) && uneven &&

@@ -9,15 +9,13 @@
 #include "node/roles/roles.h"
 #include "report.h"
 
-double host_candidates_mean(const struct host_run_result *result)
-{
+double host_candidates_mean(const struct host_run_result *result) {
     return result->make_tetra_calls == 0
                ? 0.0
                : (double)result->candidates / (double)result->make_tetra_calls;
 }
 
-double host_candidates_p99(const struct host_run_result *result)
-{
+double host_candidates_p99(const struct host_run_result *result) {
     uint64_t calls = 0, seen = 0;
     for (unsigned k = 0; k < 24; k++) {
         calls += result->candidates_histogram[k];
@@ -31,24 +29,20 @@ double host_candidates_p99(const struct host_run_result *result)
     return 0.0;
 }
 
-static void put(json_t *object, const char *name, uint64_t value)
-{
+static void put(json_t *object, const char *name, uint64_t value) {
     json_object_set_new(object, name, json_integer((json_int_t)value));
 }
 
-static void put_real(json_t *object, const char *name, double value)
-{
+static void put_real(json_t *object, const char *name, double value) {
     json_object_set_new(object, name, json_real(value));
 }
 
-static void put_text(json_t *object, const char *name, const char *value)
-{
+static void put_text(json_t *object, const char *name, const char *value) {
     json_object_set_new(object, name, json_string(value));
 }
 
 /* How a node found its tetrahedra, over all of its jobs. */
-static const char *built_by(const struct incode_statistics *s)
-{
+static const char *built_by(const struct incode_statistics *s) {
     return s->tetrahedra_built == 0                         ? "none"
            : s->tetrahedra_by_points == 0                   ? "faces"
            : s->tetrahedra_by_points == s->tetrahedra_built ? "points"
@@ -56,8 +50,7 @@ static const char *built_by(const struct incode_statistics *s)
 }
 
 /* How the node's memory is filled, in bytes. */
-static json_t *map_object(const struct host_run_result *r, unsigned i)
-{
+static json_t *map_object(const struct host_run_result *r, unsigned i) {
     const struct node_map *m = &r->node[i].map.map;
     const struct node_role *role = node_role_named(r->node[i].map.role);
     uint64_t stack = host_node_stack_bytes(&r->node[i]);
@@ -77,8 +70,7 @@ static json_t *map_object(const struct host_run_result *r, unsigned i)
     return o;
 }
 
-static json_t *node_object(const struct host_run_result *r, unsigned i)
-{
+static json_t *node_object(const struct host_run_result *r, unsigned i) {
     const struct host_node_report *report = &r->node[i];
     const struct node_finished_message *f = &report->statistics;
     const struct incode_statistics *s = &f->statistics;
@@ -124,8 +116,7 @@ static json_t *node_object(const struct host_run_result *r, unsigned i)
     return o;
 }
 
-static void put_times(json_t *o, const struct host_run_result *r)
-{
+static void put_times(json_t *o, const struct host_run_result *r) {
     put_real(o, "time_total_s", r->time_total_s);
     put_real(o, "time_io_s", r->time_io_s);
     put_real(o, "time_triangulation_s", r->time_triangulation_s);
@@ -138,8 +129,7 @@ static void put_times(json_t *o, const struct host_run_result *r)
     put_real(o, "t_max_s", r->t_max_s);
 }
 
-static json_t *run_object(const struct host_run_result *r)
-{
+static json_t *run_object(const struct host_run_result *r) {
     json_t *o = json_object();
     json_t *nodes = json_array();
     put(o, "points", r->rows);
@@ -200,15 +190,13 @@ static json_t *run_object(const struct host_run_result *r)
     return o;
 }
 
-static int put_bytes(const char *bytes, size_t n, void *out)
-{
+static int put_bytes(const char *bytes, size_t n, void *out) {
     host_output_bytes(out, bytes, n);
     return 0;
 }
 
 int host_stats_write(const char *path, const struct host_run_result *result,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     size_t flags = JSON_INDENT(2) | JSON_REAL_PRECISION(9);
     json_t *object = run_object(result);
     struct host_output out;

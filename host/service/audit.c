@@ -28,8 +28,7 @@ struct inquiry {
 };
 
 static void note_place(void *context, const uint64_t *tets, int tet_count,
-                       const uint32_t *vertices, int count, const char *what)
-{
+                       const uint32_t *vertices, int count, const char *what) {
     struct host_audit *a = context;
     (void)what;
     /* Points without a tetrahedron prove nothing against a node: facets do. */
@@ -47,15 +46,13 @@ static void note_place(void *context, const uint64_t *tets, int tet_count,
     }
 }
 
-static bool is_point(const struct host_order *order, uint32_t vertex)
-{
+static bool is_point(const struct host_order *order, uint32_t vertex) {
     uint32_t brick = vertex / INCODE_BRICK_POINTS;
     return brick < order->bricks &&
            vertex % INCODE_BRICK_POINTS < order->fill[brick];
 }
 
-static void redo(struct inquiry *q, uint32_t vertex)
-{
+static void redo(struct inquiry *q, uint32_t vertex) {
     if (is_point(q->s->order, vertex)) {
         q->audit->redo[vertex / INCODE_BRICK_POINTS] = 1;
     }
@@ -63,8 +60,7 @@ static void redo(struct inquiry *q, uint32_t vertex)
 
 /* The node is at fault; the reason is as of printf. */
 __attribute__((format(printf, 3, 4))) static void
-accuse_of(struct inquiry *q, uint32_t node, const char *format, ...)
-{
+accuse_of(struct inquiry *q, uint32_t node, const char *format, ...) {
     struct host_audit *a = q->audit;
     if (a->guilty[node] != 0) {
         return;
@@ -81,23 +77,20 @@ accuse_of(struct inquiry *q, uint32_t node, const char *format, ...)
 
 /* what: about a tetrahedron of these vertices. */
 static void accuse(struct inquiry *q, uint32_t node, const char *what,
-                   const uint32_t v[4])
-{
+                   const uint32_t v[4]) {
     const uint32_t *row = q->s->order->row;
     accuse_of(q, node, "%s the tetrahedron of rows %u, %u, %u and %u", what,
               row[v[0]], row[v[1]], row[v[2]], row[v[3]]);
 }
 
-static uint32_t owner(const struct inquiry *q, const uint32_t v[4])
-{
+static uint32_t owner(const struct inquiry *q, const uint32_t v[4]) {
     return host_ledger_owner(&q->s->ledger, q->s->order, v);
 }
 
 /* The work on a brick is wrong.  If the node that committed the brick worked
  * alone, that node is at fault. */
 static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
-                        const uint32_t v[4])
-{
+                        const uint32_t v[4]) {
     uint16_t by = q->s->ledger.by[brick];
     if ((by & HOST_LEDGER_ALONE) != 0) {
         accuse(q, host_ledger_by(&q->s->ledger, brick), what, v);
@@ -105,16 +98,14 @@ static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
     q->audit->redo[brick] = 1;
 }
 
-static int compare_tets(const void *p, const void *q)
-{
+static int compare_tets(const void *p, const void *q) {
     uint64_t a = *(const uint64_t *)p, b = *(const uint64_t *)q;
     return a < b ? -1 : a > b;
 }
 
 /* The tetrahedra of all places, each once, ascending; returns how many. */
 static unsigned collect(const struct host_audit *a,
-                        uint64_t tets[2 * HOST_AUDIT_PLACES])
-{
+                        uint64_t tets[2 * HOST_AUDIT_PLACES]) {
     unsigned count = 0, kept = 0;
     for (unsigned i = 0; i < a->places; i++) {
         for (unsigned k = 0; k < a->place[i].tets; k++) {
@@ -130,13 +121,11 @@ static unsigned collect(const struct host_audit *a,
     return kept;
 }
 
-static bool has_vertex(const uint32_t v[4], uint32_t vertex)
-{
+static bool has_vertex(const uint32_t v[4], uint32_t vertex) {
     return v[0] == vertex || v[1] == vertex || v[2] == vertex || v[3] == vertex;
 }
 
-static bool same_vertices(const uint32_t v[4], const uint32_t w[4])
-{
+static bool same_vertices(const uint32_t v[4], const uint32_t w[4]) {
     return has_vertex(v, w[0]) && has_vertex(v, w[1]) && has_vertex(v, w[2]) &&
            has_vertex(v, w[3]);
 }
@@ -156,8 +145,7 @@ struct missing {
 };
 
 /* The same for every order of the vertices. */
-static uint32_t hash_of(const uint32_t v[4])
-{
+static uint32_t hash_of(const uint32_t v[4]) {
     uint32_t sum = 0;
     for (int i = 0; i < 4; i++) {
         uint32_t mixed = (v[i] + 1) * UINT32_C(2654435761);
@@ -166,8 +154,7 @@ static uint32_t hash_of(const uint32_t v[4])
     return (sum ^ sum >> 15) % TABLE;
 }
 
-static void add_missing(struct missing *m, const uint32_t v[4])
-{
+static void add_missing(struct missing *m, const uint32_t v[4]) {
     uint32_t at = hash_of(v);
     for (unsigned i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
         if (same_vertices(m->v[i], v)) {
@@ -183,8 +170,7 @@ static void add_missing(struct missing *m, const uint32_t v[4])
 }
 
 static void look_beyond(const struct inquiry *q, struct missing *m,
-                        const uint32_t t[4])
-{
+                        const uint32_t t[4]) {
     static const uint8_t outward[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     for (int i = 0; i < 4; i++) {
@@ -200,8 +186,7 @@ static void look_beyond(const struct inquiry *q, struct missing *m,
 
 /* A tetrahedron that is missing in the result was left out by the node that
  * committed its brick. */
-static void judge_missing(struct inquiry *q, struct missing *m)
-{
+static void judge_missing(struct inquiry *q, struct missing *m) {
     const struct host_tetrahedra *all = q->s->tets;
     for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
         for (unsigned i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
@@ -218,8 +203,7 @@ static void judge_missing(struct inquiry *q, struct missing *m)
 
 /* --- what is there -------------------------------------------------------- */
 
-static bool is_judged(const struct inquiry *q, const uint32_t t[4])
-{
+static bool is_judged(const struct inquiry *q, const uint32_t t[4]) {
     bool points = true;
     for (int i = 0; i < 4; i++) {
         points = points && is_point(q->s->order, t[i]);
@@ -230,8 +214,7 @@ static bool is_judged(const struct inquiry *q, const uint32_t t[4])
 /* A tetrahedron that is not Delaunay proves its sender at fault if the sender
  * worked alone.  Else the node that found it, or the node that passed it on, is
  * at fault. */
-static void judge_wrong(struct inquiry *q, uint64_t tet)
-{
+static void judge_wrong(struct inquiry *q, uint64_t tet) {
     const struct host_service *s = q->s;
     struct host_audit *a = q->audit;
     const uint32_t *t = s->tets->v[tet];
@@ -248,8 +231,7 @@ static void judge_wrong(struct inquiry *q, uint64_t tet)
 
 /* Tetrahedron i of those at faults. */
 static void judge_tet(struct inquiry *q, struct missing *m,
-                      const uint64_t *tets, unsigned i)
-{
+                      const uint64_t *tets, unsigned i) {
     const uint32_t *t = q->s->tets->v[tets[i]];
     if (!is_judged(q, t)) {
         judge_wrong(q, tets[i]);
@@ -265,8 +247,7 @@ static void judge_tet(struct inquiry *q, struct missing *m,
 
 /* If points have no tetrahedron at all, and one node has committed all of their
  * bricks, that node has left out their tetrahedra, or those around them. */
-static void judge_points(struct inquiry *q)
-{
+static void judge_points(struct inquiry *q) {
     const struct host_ledger *ledger = &q->s->ledger;
     uint32_t by = UINT32_MAX, vertex = 0;
     bool one = true;
@@ -287,8 +268,7 @@ static void judge_points(struct inquiry *q)
     }
 }
 
-static void judge_places(struct inquiry *q, struct missing *m)
-{
+static void judge_places(struct inquiry *q, struct missing *m) {
     uint64_t tets[2 * HOST_AUDIT_PLACES];
     unsigned count = collect(q->audit, tets);
     for (unsigned i = 0; i < count; i++) {
@@ -309,8 +289,7 @@ static void judge_places(struct inquiry *q, struct missing *m)
 /* --- what is to be done again --------------------------------------------- */
 
 /* Nothing from nodes at fault is trusted. */
-static void redo_guilty(struct inquiry *q)
-{
+static void redo_guilty(struct inquiry *q) {
     const struct host_service *s = q->s;
     const struct host_ledger *ledger = &s->ledger;
     for (uint32_t b = 0; b < ledger->bricks; b++) {
@@ -330,8 +309,7 @@ static void redo_guilty(struct inquiry *q)
 /* No node could be named.  The first time the bricks near the faults are done
  * again; the second time, all bricks that nodes did together as well; from the
  * third time on, or if no brick is near, all bricks. */
-static void redo_unclear(struct inquiry *q)
-{
+static void redo_unclear(struct inquiry *q) {
     const struct host_ledger *ledger = &q->s->ledger;
     struct host_audit *a = q->audit;
     uint32_t marked = 0;
@@ -348,8 +326,7 @@ static void redo_unclear(struct inquiry *q)
     }
 }
 
-static void analyse(struct host_service *s, struct host_audit *a)
-{
+static void analyse(struct host_service *s, struct host_audit *a) {
     struct inquiry q = {.s = s, .audit = a};
     const struct host_sites sites = host_sites_of_order(s->order);
     struct missing *missing = malloc(sizeof *missing);
@@ -373,8 +350,7 @@ static void analyse(struct host_service *s, struct host_audit *a)
     free(missing);
 }
 
-static void check(void *argument)
-{
+static void check(void *argument) {
     struct host_service *s = argument;
     struct host_audit *a = &s->audit;
     const struct host_sites sites = host_sites_of_order(s->order);
@@ -394,15 +370,13 @@ static void check(void *argument)
 
 /* --- what follows --------------------------------------------------------- */
 
-static bool is_exact_due(const struct host_service *s)
-{
+static bool is_exact_due(const struct host_service *s) {
     return s->verifying == HOST_VERIFY_ALWAYS ||
            (s->verifying == HOST_VERIFY_WHERE_DUE &&
             (s->foreign || s->audit.lost_work));
 }
 
-static void begin(struct host_service *s)
-{
+static void begin(struct host_service *s) {
     struct host_audit *a = &s->audit;
     a->exact = is_exact_due(s);
     a->places = 0;
@@ -419,15 +393,13 @@ static void begin(struct host_service *s)
     }
 }
 
-void host_audit_alone(struct host_service *service)
-{
+void host_audit_alone(struct host_service *service) {
     service->strategy = &host_redo;
     service->ledger.alone = true;
 }
 
 void host_audit_exclude(struct host_service *service, unsigned node,
-                        const char *what)
-{
+                        const char *what) {
     struct host_service *s = service;
     s->excluded += !s->node[node].aside;
     s->node[node].left = s->node[node].aside = true;
@@ -440,8 +412,7 @@ void host_audit_exclude(struct host_service *service, unsigned node,
                 what);
 }
 
-bool host_audit_is_other(const struct host_service *service, unsigned node)
-{
+bool host_audit_is_other(const struct host_service *service, unsigned node) {
     const struct host_service *s = service;
     const uint8_t *guilty = s->audit.guilty;
     bool other = false;
@@ -452,8 +423,7 @@ bool host_audit_is_other(const struct host_service *service, unsigned node)
     return other;
 }
 
-static int give_up(struct host_service *s, struct host_error *error)
-{
+static int give_up(struct host_service *s, struct host_error *error) {
     const struct host_audit *a = &s->audit;
     if (a->why[0] != '\0') {
         return host_fail(error, HOST_UNVERIFIED,
@@ -469,8 +439,7 @@ static int give_up(struct host_service *s, struct host_error *error)
                      (int)strcspn(a->report.text, "\n"), a->report.text);
 }
 
-static int begin_again(struct host_service *s, struct host_error *error)
-{
+static int begin_again(struct host_service *s, struct host_error *error) {
     struct host_audit *a = &s->audit;
     char what[HOST_AUDIT_WHY_BYTES + 40];
     a->failed++;
@@ -510,16 +479,14 @@ static int begin_again(struct host_service *s, struct host_error *error)
     return 0;
 }
 
-static void free_verdict(struct host_audit *a)
-{
+static void free_verdict(struct host_audit *a) {
     free(a->redo);
     free(a->guilty);
     a->redo = a->guilty = NULL;
 }
 
 int host_audit_step(struct host_service *service, bool *passed,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_service *s = service;
     struct host_audit *a = &s->audit;
     int status = 0;
@@ -548,8 +515,7 @@ int host_audit_step(struct host_service *service, bool *passed,
     return status;
 }
 
-void host_audit_free(struct host_audit *audit)
-{
+void host_audit_free(struct host_audit *audit) {
     host_fork_join(&audit->fork);
     free_verdict(audit);
 }

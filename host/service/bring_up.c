@@ -19,8 +19,7 @@ enum {
 
 #define NO_ANSWER "no answer"
 
-uint64_t host_bring_up_patience(const struct host_service *service)
-{
+uint64_t host_bring_up_patience(const struct host_service *service) {
     const struct host_machine *m = service->machine;
     return m->restarts != NULL && !m->slow ? STARTED_HERE_US
                                            : service->patience_us;
@@ -29,8 +28,7 @@ uint64_t host_bring_up_patience(const struct host_service *service)
 /* How many nodes are not there, and the first of them, nearest first.  by_wire:
  * one whose wire was up is there. */
 static unsigned count(const struct host_service *s, bool by_wire,
-                      unsigned *first)
-{
+                      unsigned *first) {
     unsigned sum = 0, least = UINT32_MAX;
     unsigned gateway = cube_wiring(s->cube)->gateway;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -47,16 +45,14 @@ static unsigned count(const struct host_service *s, bool by_wire,
 }
 
 /* Wires tell of nodes that cannot answer yet, and of some that are gone. */
-static unsigned count_missing(const struct host_service *s, unsigned *first)
-{
+static unsigned count_missing(const struct host_service *s, unsigned *first) {
     unsigned missing = count(s, true, first);
     return missing > 0 ? missing : count(s, false, first);
 }
 
 /* A neighbour that has met somebody with another key where the node should be;
  * -1: none has. */
-static int refused_by(const struct host_service *s, unsigned node)
-{
+static int refused_by(const struct host_service *s, unsigned node) {
     for (unsigned d = 0; d < s->machine->dimension; d++) {
         if ((s->node[node ^ 1u << d].refused >> d & 1) != 0) {
             return (int)(node ^ 1u << d);
@@ -66,15 +62,13 @@ static int refused_by(const struct host_service *s, unsigned node)
 }
 
 /* Whether the node at the host's wire says that a host has it already. */
-static bool is_with_another(const struct host_service *s, unsigned node)
-{
+static bool is_with_another(const struct host_service *s, unsigned node) {
     return node == cube_wiring(s->cube)->gateway &&
            cube_link_peer(s->cube, host_detector_wire(s))->refusal ==
                LINK_IN_USE;
 }
 
-static void tell_holder(const struct host_service *s, char *text, size_t size)
-{
+static void tell_holder(const struct host_service *s, char *text, size_t size) {
     const struct host_onlookers *them = s->machine->onlookers;
     const char *holder = them == NULL ? NULL : them->holder(them->context);
     if (holder == NULL) {
@@ -89,8 +83,7 @@ static void tell_holder(const struct host_service *s, char *text, size_t size)
 
 /* Why the node is not heard, as "WHAT" or "WHAT; NEXT". */
 static const char *reason(const struct host_service *s, unsigned node,
-                          char *text, size_t size)
-{
+                          char *text, size_t size) {
     const struct host_machine *m = s->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
     int other = refused_by(s, node);
@@ -110,8 +103,7 @@ static const char *reason(const struct host_service *s, unsigned node,
 
 /* Writes who is waited for: "node 3 at ADDRESS: WHY, 2 of 4 nodes are there;
  * start it with: LINE". */
-static void describe(const struct host_service *s, char *line, size_t size)
-{
+static void describe(const struct host_service *s, char *line, size_t size) {
     const struct host_machine *m = s->machine;
     char why[WHY_BYTES], more[80] = "";
     unsigned node = 0, missing = count_missing(s, &node);
@@ -139,8 +131,7 @@ static void describe(const struct host_service *s, char *line, size_t size)
              next || start == NULL ? "" : start);
 }
 
-static void tell(struct host_service *s, uint64_t now_us)
-{
+static void tell(struct host_service *s, uint64_t now_us) {
     char line[HOST_NOTICE_BYTES];
     /* A generation begins without anybody, and all come again one by one. */
     if (now_us - s->opened_us < TELL_US || now_us - s->news_us < NEWS_US ||
@@ -157,8 +148,7 @@ static void tell(struct host_service *s, uint64_t now_us)
     }
 }
 
-static int fail(const struct host_service *s, struct host_error *error)
-{
+static int fail(const struct host_service *s, struct host_error *error) {
     const struct host_machine *m = s->machine;
     char why[WHY_BYTES], next[START_BYTES + 40];
     unsigned first = 0, missing = count_missing(s, &first);
@@ -191,8 +181,7 @@ static int fail(const struct host_service *s, struct host_error *error)
 
 /* The longest time that any node's process has waited for a processor since the
  * last call.  Any node may be on the path to the missing one. */
-static uint64_t starved_us(struct host_service *s)
-{
+static uint64_t starved_us(struct host_service *s) {
     const struct host_machine *m = s->machine;
     uint64_t most = 0;
     for (unsigned i = 0; m->starved_us != NULL && i < m->nodes; i++) {
@@ -205,8 +194,7 @@ static uint64_t starved_us(struct host_service *s)
     return most;
 }
 
-static void count_time(struct host_service *s, uint64_t elapsed_us)
-{
+static void count_time(struct host_service *s, uint64_t elapsed_us) {
     s->step_us += elapsed_us;
     if (s->step_us < STEP_US) {
         return;
@@ -217,8 +205,7 @@ static void count_time(struct host_service *s, uint64_t elapsed_us)
 }
 
 int host_bring_up_check(struct host_service *service, uint64_t now_us,
-                        uint64_t elapsed_us, struct host_error *error)
-{
+                        uint64_t elapsed_us, struct host_error *error) {
     struct host_service *s = service;
     unsigned first = 0;
     if (s->started || s->up == s->work.living) {
@@ -234,8 +221,7 @@ int host_bring_up_check(struct host_service *service, uint64_t now_us,
     return s->waited_us < host_bring_up_patience(s) ? 0 : fail(s, error);
 }
 
-void host_bring_up_done(struct host_service *service)
-{
+void host_bring_up_done(struct host_service *service) {
     if (service->waiting[0] != '\0') {
         host_notice_line(service, "host: all nodes are there; the run begins");
     }

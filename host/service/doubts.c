@@ -17,23 +17,20 @@ enum {
 
 /* What may be on the way before an answer: a window each way of the slowest
  * wire, 10 bits a byte. */
-static uint64_t wire_us(const struct host_service *s)
-{
+static uint64_t wire_us(const struct host_service *s) {
     enum { WINDOWS_BITS = 10 * 2 * 8192 };
     uint32_t baud = s->machine->serial_baud;
     return baud == 0 ? 0 : UINT64_C(1000000) * WINDOWS_BITS / baud;
 }
 
 /* For how long a node may be silent before anybody is told. */
-static uint64_t doubt_us(const struct host_service *s)
-{
+static uint64_t doubt_us(const struct host_service *s) {
     uint64_t us = DOUBT_US + wire_us(s);
     return s->machine->slow && us < SLOW_US ? SLOW_US : us;
 }
 
 /* Notes the silences that have ended since the last check. */
-static void note_silences(struct host_service *s, uint64_t elapsed_us)
-{
+static void note_silences(struct host_service *s, uint64_t elapsed_us) {
     bool doubted = false;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         doubted = doubted || (s->node[i].doubted && !s->work.lost[i]);
@@ -53,8 +50,7 @@ static void note_silences(struct host_service *s, uint64_t elapsed_us)
 }
 
 /* Silence up to this is usual for the node and its neighbours. */
-static uint64_t usual_us(const struct host_service *s, unsigned i)
-{
+static uint64_t usual_us(const struct host_service *s, unsigned i) {
     uint64_t most = s->node[i].slow_us;
     for (unsigned d = 0; d < s->machine->dimension; d++) {
         uint64_t other = s->node[i ^ 1u << d].slow_us;
@@ -63,8 +59,7 @@ static uint64_t usual_us(const struct host_service *s, unsigned i)
     return TIMES * most;
 }
 
-static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
-{
+static void look_at_wire(struct host_service *s, uint64_t elapsed_us) {
     uint64_t frames =
         cube_link_statistics(s->cube, host_detector_wire(s))->frames_received;
     s->wire_quiet_us =
@@ -73,8 +68,7 @@ static void look_at_wire(struct host_service *s, uint64_t elapsed_us)
 }
 
 /* Whether the node has answered of late. */
-static bool is_heard(const struct host_service *s, unsigned i)
-{
+static bool is_heard(const struct host_service *s, unsigned i) {
     return !s->work.lost[i] && s->report[i].up && !s->node[i].doubted &&
            s->node[i].silent_us < (DOUBT_US + wire_us(s)) / 2;
 }
@@ -82,8 +76,7 @@ static bool is_heard(const struct host_service *s, unsigned i)
 /* How many say that the node is silent, and have not said since that it is not;
  * *others: how many are heard and say nothing of the kind. */
 static unsigned witnesses(const struct host_service *s, unsigned i,
-                          unsigned *others)
-{
+                          unsigned *others) {
     unsigned silent = 0;
     *others = 0;
     if (i == cube_wiring(s->cube)->gateway) {
@@ -101,8 +94,7 @@ static unsigned witnesses(const struct host_service *s, unsigned i,
     return silent;
 }
 
-static void doubt(struct host_service *s, unsigned i)
-{
+static void doubt(struct host_service *s, unsigned i) {
     const struct host_machine *m = s->machine;
     const char *why = m->doubt == NULL ? NULL : m->doubt(m->context, i);
     bool next = why != NULL && strchr(why, ';') != NULL;
@@ -121,8 +113,7 @@ static void doubt(struct host_service *s, unsigned i)
                 start == NULL ? "" : start);
 }
 
-static void doubt_wire(struct host_service *s, unsigned i, unsigned d)
-{
+static void doubt_wire(struct host_service *s, unsigned i, unsigned d) {
     s->node[i].wires_doubted |= 1u << d;
     s->node[i ^ 1u << d].wires_doubted |= 1u << d;
     host_notice_of(s, i, d,
@@ -134,8 +125,7 @@ static void doubt_wire(struct host_service *s, unsigned i, unsigned d)
 /* Wires that one end says are silent, while the node at the other is heard: for
  * a while, as one that comes back is heard before it is told so. */
 static void look_at_links(struct host_service *s, unsigned i,
-                          uint64_t elapsed_us)
-{
+                          uint64_t elapsed_us) {
     struct host_node *node = &s->node[i];
     uint32_t wires = node->silent & ~node->wires_doubted;
     for (unsigned d = 0; d < s->machine->dimension; d++) {
@@ -153,8 +143,7 @@ static void look_at_links(struct host_service *s, unsigned i,
     }
 }
 
-void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
-{
+void host_doubts_check(struct host_service *service, uint64_t elapsed_us) {
     struct host_service *s = service;
     unsigned others;
     look_at_wire(s, elapsed_us);
@@ -175,8 +164,7 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us)
     }
 }
 
-void host_doubts_heard(struct host_service *service, unsigned node, bool anew)
-{
+void host_doubts_heard(struct host_service *service, unsigned node, bool anew) {
     struct host_service *s = service;
     struct host_node *n = &s->node[node];
     n->wires_doubted &= n->silent;

@@ -22,8 +22,7 @@ enum {
     WIRE_DOWN_US_MAX = 8000000
 };
 
-unsigned host_detector_wire(const struct host_service *service)
-{
+unsigned host_detector_wire(const struct host_service *service) {
     const struct host_service *s = service;
     uint16_t gateway = cube_wiring(s->cube)->gateway;
     return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
@@ -33,8 +32,7 @@ unsigned host_detector_wire(const struct host_service *service)
 
 /* A start of a node is over.  Of what it did and no statistics tell, this much
  * is known: it built the tetrahedra that it sent. */
-static void close_start(struct host_service *s, unsigned i)
-{
+static void close_start(struct host_service *s, unsigned i) {
     struct host_node *node = &s->node[i];
     struct incode_statistics *sum = &s->report[i].statistics.statistics;
     sum->tetrahedra_built += node->unreported;
@@ -44,15 +42,13 @@ static void close_start(struct host_service *s, unsigned i)
     node->before = s->report[i].statistics;
 }
 
-static unsigned distance(const struct host_service *s, unsigned node)
-{
+static unsigned distance(const struct host_service *s, unsigned node) {
     return (unsigned)__builtin_popcount(node ^ cube_wiring(s->cube)->gateway);
 }
 
 /* Pings one more node: of those that have not answered one that is nearest to
  * the gateway, so that the way to it leads over nodes that have. */
-static void ping_next(struct host_service *s)
-{
+static void ping_next(struct host_service *s) {
     unsigned best = UINT32_MAX;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (!s->work.lost[i] && !s->report[i].up &&
@@ -67,16 +63,14 @@ static void ping_next(struct host_service *s)
 }
 
 /* The last part of the patience, in which a silent node is pinged alone. */
-static uint64_t probe_us(const struct host_service *s)
-{
+static uint64_t probe_us(const struct host_service *s) {
     uint64_t half = s->patience_us / 2;
     uint64_t probe = PROBE_US_MIN + s->patience_us / 16;
     probe = probe < PROBE_US_MAX ? probe : PROBE_US_MAX;
     return probe < half ? probe : half;
 }
 
-void host_detector_begin(struct host_service *service, uint64_t now_us)
-{
+void host_detector_begin(struct host_service *service, uint64_t now_us) {
     struct host_service *s = service;
     s->generation = cube_wiring(s->cube)->generation;
     s->loss = false;
@@ -117,8 +111,7 @@ void host_detector_begin(struct host_service *service, uint64_t now_us)
     host_faults_begin(s);
 }
 
-void host_detector_end(struct host_service *service)
-{
+void host_detector_end(struct host_service *service) {
     for (unsigned i = 0; i < service->machine->nodes; i++) {
         close_start(service, i);
     }
@@ -126,8 +119,7 @@ void host_detector_end(struct host_service *service)
 
 /* --- pings and pongs ------------------------------------------------------ */
 
-bool host_detector_ping(struct host_service *service, uint16_t to)
-{
+bool host_detector_ping(struct host_service *service, uint16_t to) {
     struct host_node *node = &service->node[to];
     struct node_ping_message ping = {node->sent};
     if (cube_write(service->cube, to, NODE_PING, &ping, sizeof ping) != 0) {
@@ -142,8 +134,7 @@ bool host_detector_ping(struct host_service *service, uint16_t to)
 
 int host_detector_pong(struct host_service *service,
                        const struct cube_message *message,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_service *s = service;
     struct host_node *node = &s->node[message->source];
     struct host_node_report *report = &s->report[message->source];
@@ -201,8 +192,7 @@ int host_detector_pong(struct host_service *service,
                : host_faults_answered(s, message->source, pong.pinged, error);
 }
 
-static unsigned pings_due(const struct host_service *s)
-{
+static unsigned pings_due(const struct host_service *s) {
     unsigned due = 0;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         due += s->node[i].ping_due;
@@ -212,8 +202,7 @@ static unsigned pings_due(const struct host_service *s)
 
 /* Has each node pinged once a period, one after the other; less often where
  * the wire is too slow for that and for the work. */
-static void ping_in_turn(struct host_service *s, uint64_t now_us)
-{
+static void ping_in_turn(struct host_service *s, uint64_t now_us) {
     if (s->probing) {
         return;
     }
@@ -242,14 +231,12 @@ static void ping_in_turn(struct host_service *s, uint64_t now_us)
 
 /* --- what is wrong -------------------------------------------------------- */
 
-unsigned host_detector_link(const struct host_service *service, unsigned node)
-{
+unsigned host_detector_link(const struct host_service *service, unsigned node) {
     return host_link_to(node, cube_wiring(service->cube)->gateway,
                         service->machine->dimension);
 }
 
-static int fail_wrong(const struct host_service *s, struct host_error *error)
-{
+static int fail_wrong(const struct host_service *s, struct host_error *error) {
     const struct cube_wrong *wrong = &cube_wiring(s->cube)->wrong[0];
     char text[CUBE_FAULT_BYTES];
     (void)cube_wiring_fault(s->cube, text);
@@ -260,8 +247,7 @@ static int fail_wrong(const struct host_service *s, struct host_error *error)
 }
 
 /* A node that was silent for as long as the user has patience. */
-static void give_up(struct host_service *s, unsigned i)
-{
+static void give_up(struct host_service *s, unsigned i) {
     struct host_node *node = &s->node[i];
     node->silent_us = 0;
     s->probe = true;
@@ -286,8 +272,7 @@ static void give_up(struct host_service *s, unsigned i)
 /* How long a node may be silent.  The run ends with the one node by which the
  * host speaks: where the wire to it was heard meanwhile, it has twice the time,
  * as its answers may have been lost with what was behind them. */
-static uint64_t silence_us_max(const struct host_service *s, unsigned i)
-{
+static uint64_t silence_us_max(const struct host_service *s, unsigned i) {
     bool last_resort = i == cube_wiring(s->cube)->gateway &&
                        s->machine->spare_node == 0 &&
                        s->wire_quiet_us < s->patience_us / 2;
@@ -298,8 +283,8 @@ static uint64_t silence_us_max(const struct host_service *s, unsigned i)
  * links holds up all that is on the way to it and behind, and so makes others
  * silent: at first nobody is blamed, but each is pinged alone, for the last
  * part of the patience.  One that no live wire leads to needs no such proof. */
-static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
-{
+static void listen(struct host_service *s, uint64_t now_us,
+                   uint64_t elapsed_us) {
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];
         bool alone = s->probing || node->cut_off;
@@ -330,8 +315,7 @@ static void listen(struct host_service *s, uint64_t now_us, uint64_t elapsed_us)
 }
 
 static int check_wire(struct host_service *s, uint64_t now_us,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     unsigned wire = host_detector_wire(s);
     enum link_state state = cube_link_state(s->cube, wire);
     uint16_t gateway = cube_wiring(s->cube)->gateway;
@@ -358,8 +342,7 @@ static int check_wire(struct host_service *s, uint64_t now_us,
 }
 
 int host_detector_doubt(const struct host_service *service, unsigned node,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     const struct host_machine *m = service->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
     if (doubt == NULL) {
@@ -372,8 +355,7 @@ int host_detector_doubt(const struct host_service *service, unsigned node,
 }
 
 int host_detector_check(struct host_service *service, uint64_t now_us,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct host_service *s = service;
     const struct cube_wiring *wiring = cube_wiring(s->cube);
     if (now_us - s->check_us < CHECK_EVERY_US) {

@@ -5,8 +5,7 @@
 
 #include "notices.h"
 
-void host_faults_begin(struct host_service *service)
-{
+void host_faults_begin(struct host_service *service) {
     service->fault.told = false;
     for (unsigned i = 0; i < service->machine->nodes; i++) {
         service->node[i].vouches = HOST_VOUCHES;
@@ -15,8 +14,7 @@ void host_faults_begin(struct host_service *service)
 
 /* What to do about a fault that a node reports, by a word of its text; NULL: a
  * loss may explain it. */
-static const char *advice(const char *text)
-{
+static const char *advice(const char *text) {
     static const char *const known[][2] = {
         {"takes no record", "mend that, then reset the board"},
         {"memory", "give the nodes more memory"},
@@ -30,8 +28,7 @@ static const char *advice(const char *text)
     return NULL;
 }
 
-static int fail(const struct host_service *s, struct host_error *error)
-{
+static int fail(const struct host_service *s, struct host_error *error) {
     const char *next = advice(s->fault.text);
     if (strstr(s->fault.text, "no program is running") != NULL) {
         return host_fail(error, HOST_CUBE,
@@ -48,16 +45,14 @@ static int fail(const struct host_service *s, struct host_error *error)
 
 /* A list that nodes share may be too small for what they send each other, where
  * the one of a node that works alone is not. */
-static bool may_go_on(const struct host_service *s)
-{
+static bool may_go_on(const struct host_service *s) {
     return !s->ledger.alone &&
            strstr(s->fault.text, "active face list") != NULL;
 }
 
 int host_faults_take(struct host_service *service,
                      const struct cube_message *message,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_service *s = service;
     size_t size = message->size < NODE_FAULT_TEXT_MAX ? message->size
                                                       : NODE_FAULT_TEXT_MAX;
@@ -81,8 +76,7 @@ int host_faults_take(struct host_service *service,
 }
 
 void host_faults_pinged(struct host_service *service, unsigned node,
-                        uint32_t count)
-{
+                        uint32_t count) {
     struct host_node *n = &service->node[node];
     if (n->vouches == HOST_DOUBTED) {
         n->vouches = HOST_ASKED;
@@ -91,8 +85,7 @@ void host_faults_pinged(struct host_service *service, unsigned node,
 }
 
 /* Nodes that have left are not asked. */
-static bool all_vouch(const struct host_service *s)
-{
+static bool all_vouch(const struct host_service *s) {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (s->node[i].vouches != HOST_VOUCHES && !s->node[i].left) {
             return false;
@@ -104,8 +97,7 @@ static bool all_vouch(const struct host_service *s)
 /* If nodes work together, another node's message may have caused the fault; a
  * node that works alone is itself at fault.  The run goes on as long as another
  * node is left. */
-static int believe(struct host_service *s, struct host_error *error)
-{
+static int believe(struct host_service *s, struct host_error *error) {
     char why[NODE_FAULT_TEXT_MAX + 40];
     unsigned node = s->fault.node;
     s->fault.told = false;
@@ -125,8 +117,7 @@ static int believe(struct host_service *s, struct host_error *error)
 }
 
 int host_faults_answered(struct host_service *service, unsigned node,
-                         uint32_t count, struct host_error *error)
-{
+                         uint32_t count, struct host_error *error) {
     struct host_node *n = &service->node[node];
     if (n->vouches == HOST_ASKED && (int32_t)(count - n->asked) >= 0) {
         n->vouches = HOST_VOUCHES;

@@ -14,8 +14,7 @@ enum {
 
 /* Whether the host can speak by that node: by a wire, and on to another. */
 static bool speaks(const struct host_service *s, const struct cube_wiring *w,
-                   uint16_t gateway)
-{
+                   uint16_t gateway) {
     unsigned dimension = s->machine->dimension;
     bool on = dimension == 0;
     for (unsigned d = 0; d < dimension; d++) {
@@ -26,8 +25,7 @@ static bool speaks(const struct host_service *s, const struct cube_wiring *w,
 }
 
 uint16_t host_generation_gateway(const struct host_service *service,
-                                 const struct cube_wiring *next)
-{
+                                 const struct cube_wiring *next) {
     const struct host_service *s = service;
     uint16_t other = next->gateway != 0 ? 0 : s->machine->spare_node;
     return !speaks(s, next, next->gateway) && speaks(s, next, other)
@@ -37,8 +35,8 @@ uint16_t host_generation_gateway(const struct host_service *service,
 
 /* The gateway must be there, and what was given up must not be on the way.
  * What is dead only since is looked at later. */
-static int check_renewed(const struct host_service *s, struct host_error *error)
-{
+static int check_renewed(const struct host_service *s,
+                         struct host_error *error) {
     const struct cube_wiring *w = cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -59,8 +57,8 @@ static int check_renewed(const struct host_service *s, struct host_error *error)
 
 /* Nodes that come back to another host's generation, whatever is answered,
  * would have the run begin for ever. */
-static int check_outdone(const struct host_service *s, struct host_error *error)
-{
+static int check_outdone(const struct host_service *s,
+                         struct host_error *error) {
     unsigned gateway = cube_wiring(s->cube)->gateway;
     return cube_statistics(s->cube)->outdone <= OUTDONE_MAX
                ? 0
@@ -72,8 +70,7 @@ static int check_outdone(const struct host_service *s, struct host_error *error)
 }
 
 int host_generation_begin(struct host_service *service, uint64_t now_us,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct host_service *s = service;
     host_detector_begin(s, now_us);
     host_onlooking_again(&s->onlooking);
@@ -91,8 +88,7 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
 }
 
 /* Boards that reset themselves would have the run begin for ever. */
-static int check_progress(struct host_service *s, struct host_error *error)
-{
+static int check_progress(struct host_service *s, struct host_error *error) {
     s->fruitless =
         s->ledger.committed == s->committed_before ? s->fruitless + 1 : 0;
     s->committed_before = s->ledger.committed;
@@ -107,8 +103,7 @@ static int check_progress(struct host_service *s, struct host_error *error)
 }
 
 int host_generation_renew(struct host_service *service, uint64_t now_us,
-                          struct host_error *error)
-{
+                          struct host_error *error) {
     struct host_service *s = service;
     struct cube_wiring next = *cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;

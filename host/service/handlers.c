@@ -16,8 +16,7 @@
 /* A message that no sound node sends: what is wrong with it, as printf. */
 __attribute__((format(printf, 3, 4))) static int
 unsound(const struct cube_message *message, struct host_error *error,
-        const char *format, ...)
-{
+        const char *format, ...) {
     char what[160];
     va_list arguments;
     va_start(arguments, format);
@@ -31,8 +30,7 @@ unsound(const struct cube_message *message, struct host_error *error,
 
 /* A message whose layout another version may have changed. */
 static int wrong_size(const struct cube_message *message, const char *what,
-                      size_t expected, struct host_error *error)
-{
+                      size_t expected, struct host_error *error) {
     return unsound(message, error, "%s in %u bytes, expected %zu", what,
                    message->size, expected);
 }
@@ -40,8 +38,7 @@ static int wrong_size(const struct cube_message *message, const char *what,
 /* Whether messages of that node have been lost before this one: then what it
  * says is a part that must not be taken for the whole. */
 static bool missing(struct host_service *s, const struct host_node *node,
-                    uint32_t sent)
-{
+                    uint32_t sent) {
     if (sent == node->received) {
         return false;
     }
@@ -52,8 +49,7 @@ static bool missing(struct host_service *s, const struct host_node *node,
 /* Page numbers from byte `at` on, which `node` has asked for. */
 static int queue_pages(struct host_service *s, struct host_node *node,
                        const struct cube_message *message, uint32_t at,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     uint32_t count = (message->size - at) / 4u;
     if (message->size % 4 != 0) {
         return unsound(message, error,
@@ -80,8 +76,7 @@ static int queue_pages(struct host_service *s, struct host_node *node,
 /* Pages that another has asked the node for. */
 static int take_passed(struct host_service *s,
                        const struct cube_message *message,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     uint32_t node;
     if (message->size < sizeof node) {
         return wrong_size(message, "requests of another node", sizeof node,
@@ -97,8 +92,7 @@ static int take_passed(struct host_service *s,
 
 static int take_results(struct host_service *s,
                         const struct cube_message *message,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     struct node_result_header header;
     if (message->size < sizeof header) {
         return wrong_size(message, "results", sizeof header, error);
@@ -120,8 +114,7 @@ static int take_results(struct host_service *s,
 
 static int take_spill(struct host_service *s,
                       const struct cube_message *message,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (message->size < sizeof header) {
@@ -149,8 +142,7 @@ static int take_spill(struct host_service *s,
 
 static int take_unspill_request(struct host_service *s,
                                 const struct cube_message *message,
-                                struct host_error *error)
-{
+                                struct host_error *error) {
     struct host_node *node = &s->node[message->source];
     struct node_spill_header header;
     if (message->size != sizeof header) {
@@ -182,8 +174,7 @@ static int take_unspill_request(struct host_service *s,
  * that it told before. */
 static int take_finished(struct host_service *s,
                          const struct cube_message *message,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     struct host_node_report *report = &s->report[message->source];
     struct host_node *node = &s->node[message->source];
     struct node_finished_message finished;
@@ -222,8 +213,7 @@ static int take_finished(struct host_service *s,
 
 static int take_ready(struct host_service *s,
                       const struct cube_message *message,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct host_node_report *report = &s->report[message->source];
     uint32_t protocol = NODE_PROTOCOL;
     if (message->size >= sizeof protocol) {
@@ -248,8 +238,8 @@ static int take_ready(struct host_service *s,
  * the host.  If the sender is the host, the page was altered on its way or by
  * the reporter, and the reporter is refused. */
 static int doubt_page(struct host_service *s, unsigned reporter,
-                      unsigned sender, uint32_t page, struct host_error *error)
-{
+                      unsigned sender, uint32_t page,
+                      struct host_error *error) {
     char which[32] = "a page cut short", why[120];
     if (s->work.lost[reporter] || s->node[reporter].left) {
         return 0;
@@ -274,8 +264,7 @@ static int doubt_page(struct host_service *s, unsigned reporter,
 
 static int take_wrong_page(struct host_service *s,
                            const struct cube_message *message,
-                           struct host_error *error)
-{
+                           struct host_error *error) {
     struct node_wrong_page_message wrong;
     if (message->size != sizeof wrong) {
         return wrong_size(message, "report of a wrong page", sizeof wrong,
@@ -292,8 +281,7 @@ static int take_wrong_page(struct host_service *s,
 /* What the strategy's roles have to say.  An error that it has set stays. */
 static int take_other(struct host_service *s,
                       const struct cube_message *message,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     const struct host_strategy *strategy = s->strategy;
     struct node_result_header header;
     if (strategy->take == NULL) {
@@ -316,8 +304,7 @@ static int take_other(struct host_service *s,
 }
 
 static int take(struct host_service *service,
-                const struct cube_message *message, struct host_error *error)
-{
+                const struct cube_message *message, struct host_error *error) {
     switch (message->type) {
     case NODE_READY:
         return take_ready(service, message, error);
@@ -351,14 +338,12 @@ static int take(struct host_service *service,
 }
 
 /* What a node says of itself in any state, and is no sign of its work. */
-static bool is_of_itself(uint8_t type)
-{
+static bool is_of_itself(uint8_t type) {
     return type == NODE_PONG || type == NODE_ANSWER;
 }
 
 int host_handle(struct host_service *service,
-                const struct cube_message *message, struct host_error *error)
-{
+                const struct cube_message *message, struct host_error *error) {
     if (message->source >= service->machine->nodes) {
         return unsound(message, error, "not in this cube");
     }

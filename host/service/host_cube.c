@@ -6,8 +6,7 @@
 enum { WINDOW_DEFAULT = 32 };
 
 struct cube *host_cube_make(const struct host_machine *machine, unsigned window,
-                            void **memory, struct host_error *error)
-{
+                            void **memory, struct host_error *error) {
     struct cube_config config;
     memset(&config, 0, sizeof config);
     config.self = CUBE_HOST;

@@ -7,14 +7,12 @@
 
 enum { SILENT_US = 1000000 };
 
-void host_idle_progress(struct host_service *service, unsigned node)
-{
+void host_idle_progress(struct host_service *service, unsigned node) {
     service->node[node].still_us = 0;
 }
 
 /* What the node has to work for. */
-static bool owes(const struct host_service *s, unsigned i)
-{
+static bool owes(const struct host_service *s, unsigned i) {
     const struct host_node *node = &s->node[i];
     bool ready = !node->setup_due && !s->report[i].ready;
     bool results =
@@ -27,8 +25,7 @@ static bool owes(const struct host_service *s, unsigned i)
 }
 
 /* What it waits for is the host's to send. */
-static bool is_owed(const struct host_service *s, unsigned i)
-{
+static bool is_owed(const struct host_service *s, unsigned i) {
     const struct host_node *node = &s->node[i];
     uint32_t credits = node->results + s->setup.credits - node->credit;
     return node->pages_count > 0 || node->unspills_count > 0 ||
@@ -37,8 +34,7 @@ static bool is_owed(const struct host_service *s, unsigned i)
 
 /* The living node that this one waits for: who keeps its page, or owes it
  * answers; or CUBE_HOST. */
-static unsigned awaits(const struct host_service *s, unsigned i)
-{
+static unsigned awaits(const struct host_service *s, unsigned i) {
     struct node_setup_message setup = s->setup;
     s->strategy->set_up(&s->work, i, &setup);
     uint32_t page = s->node[i].awaited;
@@ -51,8 +47,7 @@ static unsigned awaits(const struct host_service *s, unsigned i)
 
 /* Who holds this node up: the last of those who wait for each other, be it
  * itself; or CUBE_HOST: one of them goes on, so that all may. */
-static unsigned culprit(const struct host_service *s, unsigned i)
-{
+static unsigned culprit(const struct host_service *s, unsigned i) {
     unsigned next = awaits(s, i);
     for (unsigned k = 0; k < s->machine->nodes && next != CUBE_HOST; k++) {
         if (s->node[next].still_us <= s->patience_us / 2) {
@@ -64,15 +59,13 @@ static unsigned culprit(const struct host_service *s, unsigned i)
     return i;
 }
 
-static const char *work_of_one_left(const struct host_service *s)
-{
+static const char *work_of_one_left(const struct host_service *s) {
     return s->work.living > 1 ? "its work is given to others"
                               : "no other node is left to do its work";
 }
 
 bool host_idle_leave(struct host_service *service, unsigned node,
-                     const char *why)
-{
+                     const char *why) {
     struct host_service *s = service;
     struct host_node *n = &s->node[node];
     n->still_us = 0;
@@ -96,8 +89,7 @@ bool host_idle_leave(struct host_service *service, unsigned node,
 
 /* The same, but a node that has had its new start already is put aside. */
 static void leave_for_good(struct host_service *s, unsigned node,
-                           const char *why)
-{
+                           const char *why) {
     if (!host_idle_leave(s, node, why)) {
         s->node[node].aside = true;
         s->loss = true;
@@ -107,8 +99,7 @@ static void leave_for_good(struct host_service *s, unsigned node,
     }
 }
 
-void host_idle_check(struct host_service *service, uint64_t elapsed_us)
-{
+void host_idle_check(struct host_service *service, uint64_t elapsed_us) {
     struct host_service *s = service;
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];

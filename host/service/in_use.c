@@ -12,8 +12,7 @@ enum {
 enum host_in_use_state host_in_use_look(struct host_in_use *in_use,
                                         const struct host_machine *machine,
                                         const struct link_peer *peer,
-                                        uint64_t now_us)
-{
+                                        uint64_t now_us) {
     if (peer->refusal != LINK_IN_USE) {
         in_use->since_us = 0;
         return HOST_FREE;
@@ -36,8 +35,7 @@ enum host_in_use_state host_in_use_look(struct host_in_use *in_use,
 }
 
 int host_in_use_fail(const struct host_machine *machine, unsigned node,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     const struct host_onlookers *them = machine->onlookers;
     const char *holder = them == NULL ? NULL : them->holder(them->context);
     return holder == NULL

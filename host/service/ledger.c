@@ -4,8 +4,7 @@
 #include <string.h>
 
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
-                     uint32_t nodes, struct host_error *error)
-{
+                     uint32_t nodes, struct host_error *error) {
     memset(ledger, 0, sizeof *ledger);
     ledger->bricks = bricks;
     ledger->nodes = nodes;
@@ -22,8 +21,7 @@ int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
     return 0;
 }
 
-void host_ledger_free(struct host_ledger *ledger)
-{
+void host_ledger_free(struct host_ledger *ledger) {
     free(ledger->open);
     free(ledger->by);
     free(ledger->job);
@@ -32,8 +30,7 @@ void host_ledger_free(struct host_ledger *ledger)
 }
 
 /* The end of the region that a brick is in. */
-static uint32_t region_end(const struct host_order *order, uint32_t brick)
-{
+static uint32_t region_end(const struct host_order *order, uint32_t brick) {
     uint32_t low = 0, high = order->regions;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
@@ -48,8 +45,7 @@ static uint32_t region_end(const struct host_order *order, uint32_t brick)
 
 bool host_ledger_next(struct host_ledger *ledger,
                       const struct host_order *order, uint32_t *first,
-                      uint32_t *last)
-{
+                      uint32_t *last) {
     uint32_t at = ledger->cursor;
     while (at < ledger->bricks && host_ledger_committed(ledger, at)) {
         at++;
@@ -68,8 +64,7 @@ bool host_ledger_next(struct host_ledger *ledger,
 }
 
 uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
-                          uint32_t first, uint32_t last)
-{
+                          uint32_t first, uint32_t last) {
     struct host_job *job = &ledger->job[node];
     job->epoch = ++ledger->epoch;
     job->first = first;
@@ -83,15 +78,13 @@ uint32_t host_ledger_open(struct host_ledger *ledger, uint32_t node,
 }
 
 bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
-                         uint32_t epoch)
-{
+                         uint32_t epoch) {
     return node < ledger->nodes && epoch != 0 &&
            ledger->job[node].epoch == epoch;
 }
 
 int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
-                       uint32_t brick)
-{
+                       uint32_t brick) {
     struct host_job *job = &ledger->job[node];
     if (job->epoch == 0 || brick < job->first || brick >= job->last ||
         host_ledger_committed(ledger, brick)) {
@@ -105,8 +98,7 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
     return 0;
 }
 
-int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
-{
+int host_ledger_finish(struct host_ledger *ledger, uint32_t node) {
     struct host_job *job = &ledger->job[node];
     if (job->epoch == 0 || job->committed != job->last - job->first) {
         return -1;
@@ -116,8 +108,8 @@ int host_ledger_finish(struct host_ledger *ledger, uint32_t node)
 }
 
 uint32_t host_ledger_owner(const struct host_ledger *ledger,
-                           const struct host_order *order, const uint32_t v[4])
-{
+                           const struct host_order *order,
+                           const uint32_t v[4]) {
     double at[4][3];
     for (int i = 0; i < 4; i++) {
         host_vertex(order, v[i], at[i]);
@@ -127,8 +119,7 @@ uint32_t host_ledger_owner(const struct host_ledger *ledger,
 }
 
 int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     size_t runs = ledger->runs;
     uint64_t before = runs == 0 ? 0 : ledger->found[runs - 1].end;
     if (count == 0) {
@@ -151,8 +142,7 @@ int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
     return 0;
 }
 
-uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i)
-{
+uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i) {
     size_t low = 0, high = ledger->runs;
     while (low < high) {
         size_t middle = low + (high - low) / 2;
@@ -166,8 +156,7 @@ uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i)
     return ledger->found[low].node;
 }
 
-void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick)
-{
+void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick) {
     assert(brick < ledger->bricks && host_ledger_committed(ledger, brick));
     ledger->open[brick] = UINT8_MAX;
     ledger->committed--;
@@ -177,8 +166,7 @@ void host_ledger_reopen(struct host_ledger *ledger, uint32_t brick)
  * The number of runs never grows. */
 static uint64_t keep_committed(struct host_ledger *ledger,
                                const struct host_order *order,
-                               struct host_tetrahedra *tets)
-{
+                               struct host_tetrahedra *tets) {
     uint64_t kept = 0, i = 0;
     size_t runs = 0;
     for (size_t r = 0; r < ledger->runs; r++) {
@@ -206,8 +194,7 @@ static uint64_t keep_committed(struct host_ledger *ledger,
 
 uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
                              const struct host_order *order,
-                             struct host_tetrahedra *tets)
-{
+                             struct host_tetrahedra *tets) {
     uint64_t count = tets->count;
     uint32_t left = ledger->bricks - ledger->committed;
     if (left > 0) {

@@ -73,8 +73,7 @@ struct host_ledger {
  * node's.
  */
 static inline uint32_t host_ledger_by(const struct host_ledger *ledger,
-                                      uint32_t brick)
-{
+                                      uint32_t brick) {
     return ledger->by[brick] & (HOST_LEDGER_ALONE - 1u);
 }
 
@@ -104,8 +103,7 @@ bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
 int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick);
 static inline bool host_ledger_committed(const struct host_ledger *ledger,
-                                         uint32_t brick)
-{
+                                         uint32_t brick) {
     return ledger->open[brick] == 0;
 }
 

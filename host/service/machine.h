@@ -91,16 +91,14 @@ struct host_machine {
 };
 
 /* For advice: the command's own words, or what they look like. */
-static inline const char *host_where(const struct host_machine *machine)
-{
+static inline const char *host_where(const struct host_machine *machine) {
     return machine->where == NULL ? "--cube FILE" : machine->where;
 }
 
 /* The link by which a node is reached from the gateway, the last of e-cube's
  * way; of the gateway, the host's wire. */
 static inline unsigned host_link_to(unsigned node, unsigned gateway,
-                                    unsigned dimension)
-{
+                                    unsigned dimension) {
     unsigned away = node ^ gateway;
     return away == 0 ? dimension : 31u - (unsigned)__builtin_clz(away);
 }

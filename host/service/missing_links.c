@@ -18,8 +18,7 @@ enum {
 
 /* Follows live links from the gateway: which nodes they lead to. */
 static const bool *follow(const struct host_service *s,
-                          const struct cube_wiring *w)
-{
+                          const struct cube_wiring *w) {
     static bool reached[HOST_NODES_MAX];
     unsigned dimension = s->machine->dimension, count = 1, before = 0;
     memset(reached, 0, sizeof reached);
@@ -42,8 +41,7 @@ static const bool *follow(const struct host_service *s,
 
 /* True: they lead to all nodes that are not lost, and so does the host's. */
 static bool holds_together(const struct host_service *s,
-                           const struct cube_wiring *w)
-{
+                           const struct cube_wiring *w) {
     unsigned dimension = s->machine->dimension;
     const bool *reached = follow(s, w);
     bool all =
@@ -54,8 +52,7 @@ static bool holds_together(const struct host_service *s,
     return all;
 }
 
-bool host_missing_links_spare(struct host_service *service)
-{
+bool host_missing_links_spare(struct host_service *service) {
     struct host_service *s = service;
     struct cube_wiring found = *cube_wiring(s->cube);
     found.gateway = host_generation_gateway(s, &found);
@@ -68,8 +65,7 @@ bool host_missing_links_spare(struct host_service *service)
 }
 
 /* Errors and what is as good as one go there, whatever else is quiet. */
-static void name_wire(struct host_service *s, unsigned node, unsigned link)
-{
+static void name_wire(struct host_service *s, unsigned node, unsigned link) {
     char other[16] = "the host";
     s->missing_wires++;
     if (s->machine->missing != NULL) {
@@ -84,15 +80,13 @@ static void name_wire(struct host_service *s, unsigned node, unsigned link)
               node, link, other);
 }
 
-static void tell(struct host_service *s, const struct cube_wiring *w)
-{
+static void tell(struct host_service *s, const struct cube_wiring *w) {
     for (unsigned i = w->settled; i < w->dead_count; i++) {
         name_wire(s, w->dead[i].node, w->dead[i].dimension);
     }
 }
 
-static void search(struct host_service *s, uint64_t now_us)
-{
+static void search(struct host_service *s, uint64_t now_us) {
     struct cube_wiring next = *cube_wiring(s->cube);
     next.dead_count = next.settled;
     next.absent_s = ABSENT_S;
@@ -102,8 +96,7 @@ static void search(struct host_service *s, uint64_t now_us)
 }
 
 /* missing: the dead that were found are. */
-static void end_search(struct host_service *s, uint64_t now_us, bool missing)
-{
+static void end_search(struct host_service *s, uint64_t now_us, bool missing) {
     struct cube_wiring next = *cube_wiring(s->cube);
     next.absent_s = missing ? s->machine->absent_s : 0;
     if (missing) {
@@ -119,20 +112,17 @@ static void end_search(struct host_service *s, uint64_t now_us, bool missing)
 }
 
 /* For one more node, and for wires that do not come up. */
-static uint64_t wait_us(uint64_t patience_us)
-{
+static uint64_t wait_us(uint64_t patience_us) {
     return patience_us / 2 < WAIT_US_MAX ? patience_us / 2 : WAIT_US_MAX;
 }
 
-static uint64_t search_us(uint64_t patience_us)
-{
+static uint64_t search_us(uint64_t patience_us) {
     uint64_t most = patience_us * 2 / 5;
     return most < SEARCH_US_MAX ? most : SEARCH_US_MAX;
 }
 
 bool host_missing_links_check(struct host_service *service, uint64_t now_us,
-                              uint64_t patience_us)
-{
+                              uint64_t patience_us) {
     struct host_service *s = service;
     struct cube_wiring found = *cube_wiring(s->cube);
     if (s->started || s->machine->absent_s == 0) {
@@ -161,14 +151,12 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
 
 /* --- wires that nothing needs --------------------------------------------- */
 
-static uint32_t bit_of(unsigned link)
-{
+static uint32_t bit_of(unsigned link) {
     return (uint32_t)1 << link;
 }
 
 void host_missing_links_heard(struct host_service *service, unsigned node,
-                              uint32_t links)
-{
+                              uint32_t links) {
     struct host_service *s = service;
     s->node[node].links_heard_us = s->uncabled_us;
     s->node[node].links |= links;
@@ -177,8 +165,7 @@ void host_missing_links_heard(struct host_service *service, unsigned node,
     }
 }
 
-static bool has_host_port(const struct host_machine *m, unsigned node)
-{
+static bool has_host_port(const struct host_machine *m, unsigned node) {
     return m->host_ports > 1
                ? node < m->host_ports
                : node == 0 || (m->spare_node != 0 && node == m->spare_node);
@@ -186,8 +173,7 @@ static bool has_host_port(const struct host_machine *m, unsigned node)
 
 /* Links of a node whose wires should have been up and never were, by their
  * lower ends; what is dead was named, or will be. */
-static uint32_t missing_of(const struct host_service *s, unsigned node)
-{
+static uint32_t missing_of(const struct host_service *s, unsigned node) {
     const struct cube_wiring *w = cube_wiring(s->cube);
     unsigned dimension = s->machine->dimension;
     uint32_t missing = has_host_port(s->machine, node) ? bit_of(dimension) : 0;
@@ -204,16 +190,14 @@ static uint32_t missing_of(const struct host_service *s, unsigned node)
 
 /* Whether both ends have spoken of it late enough. */
 static bool is_certain(const struct host_service *s, unsigned node,
-                       unsigned link)
-{
+                       unsigned link) {
     unsigned other = link < s->machine->dimension ? node ^ 1u << link : node;
     return s->node[node].links_heard_us >= ABSENT_US &&
            s->node[other].links_heard_us >= ABSENT_US;
 }
 
 /* How many wires are missing, and of how many that is certain. */
-static unsigned count_missing(const struct host_service *s, unsigned *certain)
-{
+static unsigned count_missing(const struct host_service *s, unsigned *certain) {
     unsigned count = 0;
     *certain = 0;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -227,8 +211,7 @@ static unsigned count_missing(const struct host_service *s, unsigned *certain)
     return count;
 }
 
-static void name_all(struct host_service *s)
-{
+static void name_all(struct host_service *s) {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         uint32_t missing = missing_of(s, i);
         for (unsigned d = 0; missing >> d != 0; d++) {
@@ -240,8 +223,7 @@ static void name_all(struct host_service *s)
 }
 
 /* Nodes that need them as well go round them, in a new generation. */
-static void go_round_all(struct host_service *s)
-{
+static void go_round_all(struct host_service *s) {
     struct cube_wiring next = *cube_wiring(s->cube);
     bool all = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
@@ -260,8 +242,7 @@ static void go_round_all(struct host_service *s)
     cube_renew(s->cube, &next);
 }
 
-static bool all_attentive(const struct host_service *s)
-{
+static bool all_attentive(const struct host_service *s) {
     bool all = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         all = all && (s->work.lost[i] || s->node[i].silent_us <= ATTENTIVE_US);
@@ -270,16 +251,15 @@ static bool all_attentive(const struct host_service *s)
 }
 
 /* When the run is over, pings are all there is to do. */
-static void call_all(struct host_service *s)
-{
+static void call_all(struct host_service *s) {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
         node->ping_due = node->ping_due || (!s->work.lost[i] && !node->pinged);
     }
 }
 
-void host_missing_links_look(struct host_service *service, uint64_t elapsed_us)
-{
+void host_missing_links_look(struct host_service *service,
+                             uint64_t elapsed_us) {
     struct host_service *s = service;
     unsigned certain;
     if (s->cabled || !s->started) {
@@ -301,8 +281,7 @@ void host_missing_links_look(struct host_service *service, uint64_t elapsed_us)
     }
 }
 
-bool host_missing_links_awaited(const struct host_service *service)
-{
+bool host_missing_links_awaited(const struct host_service *service) {
     const struct host_service *s = service;
     unsigned certain;
     return s->finished && !s->over && !s->cabled &&

@@ -4,16 +4,14 @@
 
 enum { LOOK_US = 50000, ANSWERS_US = 2000000 };
 
-static bool any(const struct host_node_set *set)
-{
+static bool any(const struct host_node_set *set) {
     static const struct host_node_set none;
     return memcmp(set, &none, sizeof none) != 0;
 }
 
 void host_onlooking_look(struct host_onlooking *onlooking,
                          const struct host_machine *machine, uint64_t now_us,
-                         const struct host_onlookers_progress *progress)
-{
+                         const struct host_onlookers_progress *progress) {
     const struct host_onlookers *them = machine->onlookers;
     struct host_onlooking *o = onlooking;
     if (them == NULL || (!o->asked && now_us - o->look_us < LOOK_US)) {
@@ -34,28 +32,24 @@ void host_onlooking_look(struct host_onlooking *onlooking,
 }
 
 bool host_onlooking_due(const struct host_onlooking *onlooking, unsigned node,
-                        struct node_question_message *question)
-{
+                        struct node_question_message *question) {
     *question = (struct node_question_message){
         HOST_ONLOOKERS_TAG, (uint32_t)onlooking->question.what, 0};
     return onlooking->asked && host_node_set_has(&onlooking->due, node);
 }
 
-void host_onlooking_sent(struct host_onlooking *onlooking, unsigned node)
-{
+void host_onlooking_sent(struct host_onlooking *onlooking, unsigned node) {
     host_node_set_remove(&onlooking->due, node);
 }
 
-void host_onlooking_leave_out(struct host_onlooking *onlooking, unsigned node)
-{
+void host_onlooking_leave_out(struct host_onlooking *onlooking, unsigned node) {
     host_node_set_remove(&onlooking->due, node);
     host_node_set_remove(&onlooking->waited, node);
 }
 
 bool host_onlooking_take(struct host_onlooking *onlooking,
                          const struct host_machine *machine,
-                         const struct cube_message *message)
-{
+                         const struct cube_message *message) {
     const struct host_onlookers *them = machine->onlookers;
     struct node_answer_head head;
     if (message->size < sizeof head) {
@@ -74,7 +68,6 @@ bool host_onlooking_take(struct host_onlooking *onlooking,
     return true;
 }
 
-void host_onlooking_again(struct host_onlooking *onlooking)
-{
+void host_onlooking_again(struct host_onlooking *onlooking) {
     onlooking->due = onlooking->waited;
 }

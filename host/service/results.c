@@ -11,8 +11,7 @@
 
 enum { WHY_BYTES = 120 };
 
-static bool is_point(const struct host_order *order, uint32_t vertex)
-{
+static bool is_point(const struct host_order *order, uint32_t vertex) {
     uint32_t brick = vertex / INCODE_BRICK_POINTS;
     return brick < order->bricks &&
            vertex % INCODE_BRICK_POINTS < order->fill[brick];
@@ -21,16 +20,14 @@ static bool is_point(const struct host_order *order, uint32_t vertex)
 /* Whether the vertex, below the number of all, is a point of a brick of the job
  * that is not committed. */
 static bool is_open(const struct host_service *s, const struct host_job *job,
-                    uint32_t vertex)
-{
+                    uint32_t vertex) {
     uint32_t brick = vertex / INCODE_BRICK_POINTS;
     uint32_t points = s->order->fill[brick] & s->ledger.open[brick];
     return (vertex % INCODE_BRICK_POINTS < points) &
            (brick - job->first < job->last - job->first);
 }
 
-static bool is_different(const uint32_t v[4])
-{
+static bool is_different(const uint32_t v[4]) {
     return (v[0] != v[1]) & (v[0] != v[2]) & (v[0] != v[3]) & (v[1] != v[2]) &
            (v[1] != v[3]) & (v[2] != v[3]);
 }
@@ -39,8 +36,7 @@ static bool is_different(const uint32_t v[4])
  * same: as long as none of its bricks is committed, that is at the job's
  * borders. */
 static bool is_sound(const struct host_service *s, const struct host_job *job,
-                     const uint32_t v[4])
-{
+                     const uint32_t v[4]) {
     bool different = is_different(v), open = different;
     for (int i = 0; i < 4; i++) {
         open &= is_open(s, job, v[i]);
@@ -59,8 +55,7 @@ static bool is_sound(const struct host_service *s, const struct host_job *job,
 
 /* What is_sound found. */
 static void describe(const struct host_service *s, const struct host_job *job,
-                     const uint32_t v[4], char why[WHY_BYTES])
-{
+                     const uint32_t v[4], char why[WHY_BYTES]) {
     for (int i = 0; i < 4; i++) {
         if (!is_point(s->order, v[i])) {
             snprintf(why, WHY_BYTES,
@@ -84,8 +79,7 @@ static void describe(const struct host_service *s, const struct host_job *job,
 /* The node is started again if the host can do that, once.  Else it is
  * excluded, and the run goes on; if it was the last node, the run ends. */
 int host_results_refuse(struct host_service *service, unsigned node,
-                        const char *why, struct host_error *error)
-{
+                        const char *why, struct host_error *error) {
     struct host_service *s = service;
     bool can_start = s->machine->kill != NULL && !s->node[node].started_anew;
     if (!can_start && !host_audit_is_other(s, node)) {
@@ -115,8 +109,7 @@ enum { SAMPLE = 64, SPILLED_A_BRICK = 1024, SPILLED_MIN = 65536 };
 
 /* An index below count that no node can predict (xorshift: Marsaglia, Journal
  * of Statistical Software 8, 2003). */
-static uint64_t draw(struct host_service *s, uint64_t count)
-{
+static uint64_t draw(struct host_service *s, uint64_t count) {
     uint64_t x = s->audit.secret | 1;
     x ^= x << 13;
     x ^= x >> 7;
@@ -125,13 +118,11 @@ static uint64_t draw(struct host_service *s, uint64_t count)
     return (x >> 11) % count;
 }
 
-static int compare_rows(const void *p, const void *q)
-{
+static int compare_rows(const void *p, const void *q) {
     return memcmp(p, q, 4 * sizeof(uint32_t));
 }
 
-static void ascend(uint32_t *v, unsigned count)
-{
+static void ascend(uint32_t *v, unsigned count) {
     for (unsigned i = 1; i < count; i++) {
         for (unsigned k = i; k > 0 && v[k] < v[k - 1]; k--) {
             uint32_t w = v[k];
@@ -144,8 +135,7 @@ static void ascend(uint32_t *v, unsigned count)
 /* The tetrahedra that the node's job has, in a list of their own; NULL without
  * memory. */
 static uint32_t (*rows_of_job(const struct host_service *s,
-                              const struct host_job *job, uint64_t *count))[4]
-{
+                              const struct host_job *job, uint64_t *count))[4] {
     uint32_t(*rows)[4] = malloc((size_t)(job->rows + 1) * sizeof *rows);
     *count = 0;
     for (uint64_t i = 0; rows != NULL && i < s->tets->count; i++) {
@@ -161,8 +151,7 @@ static uint32_t (*rows_of_job(const struct host_service *s,
  * least most of them are. */
 static const char *why_too_many(struct host_service *s,
                                 const struct host_judge *judge,
-                                uint32_t (*rows)[4], uint64_t count)
-{
+                                uint32_t (*rows)[4], uint64_t count) {
     for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
         if (!host_judge_tetrahedron(judge, rows[draw(s, count)])) {
             return "more results than its points allow, and wrong ones";
@@ -184,8 +173,7 @@ static const char *why_too_many(struct host_service *s,
  * as about a hub or on two skew lines, the bound is doubled.  So a node can
  * make the host keep at most twice the right results, and a constant. */
 static int look_through_rows(struct host_service *s, unsigned node,
-                             struct host_error *error)
-{
+                             struct host_error *error) {
     struct host_job *job = &s->ledger.job[node];
     const struct host_sites sites = host_sites_of_order(s->order);
     struct host_judge judge;
@@ -208,8 +196,7 @@ static int look_through_rows(struct host_service *s, unsigned node,
 }
 
 static bool is_spilled(const struct host_service *s, const struct host_job *job,
-                       const uint32_t f[3])
-{
+                       const uint32_t f[3]) {
     uint32_t brick = f[0] / INCODE_BRICK_POINTS;
     bool mark = f[1] == INCODE_NONE && f[2] == INCODE_NONE &&
                 brick >= job->first && brick < job->last;
@@ -220,8 +207,7 @@ static bool is_spilled(const struct host_service *s, const struct host_job *job,
 
 /* Whether a face is a facet of the triangulation: whether a tetrahedron of the
  * triangulation lies on either side of it. */
-static bool is_facet(const struct host_judge *judge, const uint32_t f[3])
-{
+static bool is_facet(const struct host_judge *judge, const uint32_t f[3]) {
     for (int side = 0; side < 2; side++) {
         uint32_t t[4] = {f[0], f[side == 0 ? 1 : 2], f[side == 0 ? 2 : 1], 0};
         t[3] = host_judge_apex(judge, t);
@@ -232,8 +218,7 @@ static bool is_facet(const struct host_judge *judge, const uint32_t f[3])
     return false;
 }
 
-static int compare_faces(const void *p, const void *q)
-{
+static int compare_faces(const void *p, const void *q) {
     return memcmp(p, q, 3 * sizeof(uint32_t));
 }
 
@@ -242,8 +227,7 @@ static int compare_faces(const void *p, const void *q)
  * to begin with its smallest vertex. */
 static const char *why_spilled(struct host_service *s,
                                const struct host_judge *judge,
-                               struct incode_face *faces, uint64_t count)
-{
+                               struct incode_face *faces, uint64_t count) {
     for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
         if (!is_facet(judge, faces[draw(s, count)].v)) {
             return "more spilled faces than its points allow, and wrong ones";
@@ -269,8 +253,7 @@ static const char *why_spilled(struct host_service *s,
 
 /* As look_through_rows, for the faces that the host keeps for the node. */
 static int look_through_faces(struct host_service *s, unsigned node,
-                              struct host_error *error)
-{
+                              struct host_error *error) {
     struct host_node *n = &s->node[node];
     const struct host_sites sites = host_sites_of_order(s->order);
     struct host_judge judge;
@@ -295,8 +278,7 @@ static int look_through_faces(struct host_service *s, unsigned node,
 
 int host_results_spill(struct host_service *service, unsigned node,
                        const struct incode_face *faces, uint32_t count,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_node *n = &service->node[node];
     const struct host_job *job = &service->ledger.job[node];
     for (uint32_t i = 0; i < count; i++) {
@@ -325,8 +307,7 @@ int host_results_spill(struct host_service *service, unsigned node,
 /* Rows go straight to their place; a commit may follow any of them. */
 int host_results_take(struct host_service *service,
                       const struct cube_message *message,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct host_service *s = service;
     const size_t header = sizeof(struct node_result_header);
     struct host_job *job = &s->ledger.job[message->source];

@@ -9,22 +9,19 @@
 #include "paging.h"
 
 static bool send_counted(struct host_service *s, uint16_t to, uint8_t type,
-                         const void *data, size_t size)
-{
+                         const void *data, size_t size) {
     bool sent = cube_write(s->cube, to, type, data, size) == 0;
     s->node[to].sent += sent;
     return sent;
 }
 
 bool host_sending_write(void *service, unsigned node, uint8_t type,
-                        const void *data, size_t size)
-{
+                        const void *data, size_t size) {
     return send_counted(service, (uint16_t)node, type, data, size);
 }
 
 bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
-                               size_t size)
-{
+                               size_t size) {
     struct host_service *s = service;
     if (cube_write(s->cube, CUBE_ALL, type, data, size) != 0) {
         return false;
@@ -38,8 +35,7 @@ bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
     return true;
 }
 
-static bool send_page(struct host_service *s, uint16_t to)
-{
+static bool send_page(struct host_service *s, uint16_t to) {
     struct node_page_message body;
     struct host_node *node = &s->node[to];
     if (cube_room(s->cube, to) == 0) {
@@ -60,8 +56,7 @@ static bool send_page(struct host_service *s, uint16_t to)
 }
 
 static bool send_unspill(struct host_service *s, uint16_t to,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     struct {
         struct node_spill_header header;
         struct incode_face faces[NODE_FACES_A_MESSAGE];
@@ -90,8 +85,7 @@ static bool send_unspill(struct host_service *s, uint16_t to,
 }
 
 static void give_job(struct host_service *s, unsigned to,
-                     const struct incode_job *job)
-{
+                     const struct incode_job *job) {
     struct host_node *node = &s->node[to];
     node->job.job = *job;
     node->job.epoch = host_ledger_open(&s->ledger, to, job->first, job->last);
@@ -101,8 +95,7 @@ static void give_job(struct host_service *s, unsigned to,
     s->working++;
 }
 
-void host_sending_deal(struct host_service *service)
-{
+void host_sending_deal(struct host_service *service) {
     struct host_service *s = service;
     struct incode_job job;
     s->dealt = true;
@@ -120,8 +113,7 @@ void host_sending_deal(struct host_service *service)
     }
 }
 
-void host_sending_begin(struct host_service *service)
-{
+void host_sending_begin(struct host_service *service) {
     struct host_service *s = service;
     s->dealt = false;
     s->working = 0;
@@ -141,8 +133,7 @@ void host_sending_begin(struct host_service *service)
 /* What the strategy has, and what the node has asked for, in turn: a strategy
  * that always has something would leave no room for pages. */
 static bool serve_data(struct host_service *s, uint16_t to,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_node *node = &s->node[to];
     bool asked = node->unspills_count > 0 || node->pages_count > 0;
     if (s->strategy->send != NULL && !(asked && node->strategy_last) &&
@@ -161,8 +152,7 @@ static bool serve_data(struct host_service *s, uint16_t to,
 /* The next message that is due to this node, pings apart; false: none, or no
  * room. */
 static bool serve_work(struct host_service *s, uint16_t to,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_node *node = &s->node[to];
     if (!s->started || !s->report[to].up) {
         return false; /* what goes before the first answer may get lost */
@@ -203,8 +193,7 @@ static bool serve_work(struct host_service *s, uint16_t to,
 }
 
 /* What goes before the first answer may get lost. */
-static bool serve_onlookers(struct host_service *s, uint16_t to)
-{
+static bool serve_onlookers(struct host_service *s, uint16_t to) {
     struct node_question_message question;
     if (!host_onlooking_due(&s->onlooking, to, &question) ||
         !s->report[to].up ||
@@ -218,8 +207,7 @@ static bool serve_onlookers(struct host_service *s, uint16_t to)
 /* A ping and a message of work in turn: on a slow wire the pings of many nodes
  * would leave no room for anything else. */
 static bool serve_node(struct host_service *s, uint16_t to,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_node *node = &s->node[to];
     if (s->work.lost[to]) {
         return false;
@@ -240,8 +228,7 @@ static bool serve_node(struct host_service *s, uint16_t to,
 
 /* Whether the node whose turn it was has another: for pages, of which the
  * strategy has some sent in a row. */
-static bool goes_on(struct host_service *s, struct host_node *node)
-{
+static bool goes_on(struct host_service *s, struct host_node *node) {
     bool more = node->pages_count > 0 &&
                 node->pages_in_a_row + 1 < s->strategy->pages_in_a_row;
     node->pages_in_a_row = more ? node->pages_in_a_row + 1 : 0;
@@ -249,8 +236,7 @@ static bool goes_on(struct host_service *s, struct host_node *node)
 }
 
 unsigned host_sending_serve(struct host_service *service,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     struct host_service *s = service;
     unsigned sent = 0, idle = 0;
     while (idle < s->machine->nodes && error->code == 0) {
@@ -268,8 +254,7 @@ unsigned host_sending_serve(struct host_service *service,
     return sent;
 }
 
-bool host_sending_pages_wait(const struct host_service *service)
-{
+bool host_sending_pages_wait(const struct host_service *service) {
     for (unsigned i = 0; i < service->machine->nodes; i++) {
         if (service->node[i].pages_count > 0) {
             return true;

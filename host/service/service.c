@@ -21,14 +21,12 @@ enum {
     CREDITS_SHARED = 128
 };
 
-static uint64_t now_of(const struct host_service *s)
-{
+static uint64_t now_of(const struct host_service *s) {
     return s->machine->now_us(s->machine->context);
 }
 
 /* Sleeps until the wire has something, or until the cube's next duty. */
-static void wait_for_wire(struct host_service *s, uint64_t now_us)
-{
+static void wait_for_wire(struct host_service *s, uint64_t now_us) {
     uint64_t due = cube_next_due_us(s->cube, now_us);
     uint64_t most =
         s->audit.state == HOST_AUDIT_RUNS ? AUDIT_US_MAX : IDLE_US_MAX;
@@ -37,8 +35,7 @@ static void wait_for_wire(struct host_service *s, uint64_t now_us)
 
 /* Reads all that has come: bytes first, then messages. */
 static int read_all(struct host_service *s, unsigned *moved,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct cube_message message;
     int status = 0;
     while (status == 0 && cube_read(s->cube, &message)) {
@@ -50,8 +47,7 @@ static int read_all(struct host_service *s, unsigned *moved,
 }
 
 /* Who looks on asks those nodes alone that have a part in this generation. */
-static void look_out(struct host_service *s, uint64_t now_us)
-{
+static void look_out(struct host_service *s, uint64_t now_us) {
     struct host_onlookers_progress progress = {s->ledger.committed,
                                                s->ledger.bricks, 0};
     progress.tetrahedra = s->tets == NULL ? 0 : s->tets->count;
@@ -64,8 +60,7 @@ static void look_out(struct host_service *s, uint64_t now_us)
 }
 
 /* One round of the loop: read, serve, and sleep where nothing moved. */
-int host_service_round(struct host_service *service, struct host_error *error)
-{
+int host_service_round(struct host_service *service, struct host_error *error) {
     struct host_service *s = service;
     uint64_t now = now_of(s);
     unsigned moved = (unsigned)cube_poll(s->cube, now);
@@ -96,8 +91,7 @@ int host_service_round(struct host_service *service, struct host_error *error)
     return 0;
 }
 
-int host_service_open(struct host_service *service, struct host_error *error)
-{
+int host_service_open(struct host_service *service, struct host_error *error) {
     struct host_service *s = service;
     s->spill.file = -1;
     s->patience_us = s->patience_us == 0 ? HOST_PATIENCE_US : s->patience_us;
@@ -120,13 +114,11 @@ int host_service_open(struct host_service *service, struct host_error *error)
     return 0;
 }
 
-bool host_service_is_up(const struct host_service *service)
-{
+bool host_service_is_up(const struct host_service *service) {
     return service->up == service->work.living && !service->searching;
 }
 
-int host_service_start(struct host_service *service, struct host_error *error)
-{
+int host_service_start(struct host_service *service, struct host_error *error) {
     int status = host_service_open(service, error);
     while (status == 0 && !host_service_is_up(service)) {
         status = host_service_round(service, error);
@@ -138,8 +130,7 @@ int host_service_start(struct host_service *service, struct host_error *error)
 }
 
 /* The strategy's part, and what it sees. */
-static int prepare_work(struct host_service *s, struct host_error *error)
-{
+static int prepare_work(struct host_service *s, struct host_error *error) {
     struct host_work *work = &s->work;
     work->order = s->order;
     work->ledger = &s->ledger;
@@ -154,8 +145,7 @@ static int prepare_work(struct host_service *s, struct host_error *error)
 }
 
 /* What is the same in all generations. */
-static void prepare(struct host_service *s)
-{
+static void prepare(struct host_service *s) {
     const struct host_order *order = s->order;
     s->setup.protocol = NODE_PROTOCOL;
     s->setup.nodes = (uint16_t)s->machine->nodes;
@@ -172,8 +162,7 @@ static void prepare(struct host_service *s)
 }
 
 /* Statistics of all that nodes have done, from those who have not told. */
-static void ask_for_reports(struct host_service *s)
-{
+static void ask_for_reports(struct host_service *s) {
     s->reporting = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *node = &s->node[i];
@@ -182,8 +171,7 @@ static void ask_for_reports(struct host_service *s)
     }
 }
 
-static bool all_reported(const struct host_service *s)
-{
+static bool all_reported(const struct host_service *s) {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (!s->work.lost[i] && !s->node[i].reported) {
             return false;
@@ -194,8 +182,7 @@ static bool all_reported(const struct host_service *s)
 
 /* All bricks are here: checks the result, and requests the statistics if it is
  * right. */
-static int conclude(struct host_service *s, struct host_error *error)
-{
+static int conclude(struct host_service *s, struct host_error *error) {
     bool passed;
     if (host_audit_step(s, &passed, error) != 0) {
         return error->code;
@@ -208,8 +195,7 @@ static int conclude(struct host_service *s, struct host_error *error)
     return 0;
 }
 
-int host_service_run(struct host_service *service, struct host_error *error)
-{
+int host_service_run(struct host_service *service, struct host_error *error) {
     struct host_service *s = service;
     if (host_ledger_init(&s->ledger, s->order->bricks, s->machine->nodes,
                          error) != 0 ||
@@ -245,8 +231,7 @@ int host_service_run(struct host_service *service, struct host_error *error)
     return 0;
 }
 
-int host_service_wires(struct host_service *service, struct host_error *error)
-{
+int host_service_wires(struct host_service *service, struct host_error *error) {
     int status = 0;
     while (status == 0 && host_missing_links_awaited(service)) {
         status = host_service_round(service, error);
@@ -255,16 +240,14 @@ int host_service_wires(struct host_service *service, struct host_error *error)
 }
 
 /* Whether no node is there that has to hear the end. */
-static bool parted(const struct host_service *s)
-{
+static bool parted(const struct host_service *s) {
     enum link_state state = cube_link_state(s->cube, 0);
     return s->machine->ended(s->machine->context) &&
            (s->machine->restarts != NULL || state == LINK_CLOSED ||
             state == LINK_DOWN);
 }
 
-void host_service_end(struct host_service *service)
-{
+void host_service_end(struct host_service *service) {
     struct host_service *s = service;
     uint64_t start = now_of(s);
     bool told = s->cube == NULL || !s->finished, closing = false;

@@ -24,8 +24,7 @@ struct host_spill_entry {
 };
 
 int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     memset(spill, 0, sizeof *spill);
     spill->blocks_memory =
         blocks_memory == 0 ? BLOCKS_MEMORY_DEFAULT : blocks_memory;
@@ -36,8 +35,7 @@ int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
     return spill->table == NULL ? host_fail_memory(error, "spilled faces") : 0;
 }
 
-void host_spill_clear(struct host_spill *spill)
-{
+void host_spill_clear(struct host_spill *spill) {
     memset(spill->table, 0, spill->table_size * sizeof *spill->table);
     spill->table_used = 0;
     spill->blocks_used = 0;
@@ -45,8 +43,7 @@ void host_spill_clear(struct host_spill *spill)
     spill->faces = 0;
 }
 
-void host_spill_free(struct host_spill *spill)
-{
+void host_spill_free(struct host_spill *spill) {
     host_unmap(spill->blocks, spill->blocks_mapped * sizeof *spill->blocks);
     free(spill->table);
     if (spill->file >= 0) {
@@ -56,23 +53,20 @@ void host_spill_free(struct host_spill *spill)
     spill->file = -1;
 }
 
-static int file_failed(struct host_error *error)
-{
+static int file_failed(struct host_error *error) {
     return host_fail(error, HOST_BROKEN,
                      "temporary file of spilled faces: %s; make room in the "
                      "directory for temporary files or set TMPDIR to another",
                      strerror(errno));
 }
 
-static off_t offset_of(const struct host_spill *s, uint32_t block)
-{
+static off_t offset_of(const struct host_spill *s, uint32_t block) {
     return (off_t)(block - s->blocks_memory) *
            (off_t)sizeof(struct host_spill_block);
 }
 
 static int load(const struct host_spill *s, uint32_t block,
-                struct host_spill_block *copy, struct host_error *error)
-{
+                struct host_spill_block *copy, struct host_error *error) {
     if (block < s->blocks_memory) {
         *copy = s->blocks[block];
         return 0;
@@ -85,8 +79,8 @@ static int load(const struct host_spill *s, uint32_t block,
 }
 
 static int store(struct host_spill *s, uint32_t block,
-                 const struct host_spill_block *copy, struct host_error *error)
-{
+                 const struct host_spill_block *copy,
+                 struct host_error *error) {
     if (block < s->blocks_memory) {
         s->blocks[block] = *copy;
         return 0;
@@ -99,8 +93,7 @@ static int store(struct host_spill *s, uint32_t block,
 }
 
 /* A file without a name: it goes when the program goes. */
-static int open_file(struct host_spill *s, struct host_error *error)
-{
+static int open_file(struct host_spill *s, struct host_error *error) {
     const char *directory = getenv("TMPDIR");
     char name[512];
     if (directory == NULL || strlen(directory) > 400) {
@@ -118,8 +111,7 @@ static int open_file(struct host_spill *s, struct host_error *error)
 
 /* A block without faces that no list has. */
 static int new_block(struct host_spill *s, uint32_t *block,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_spill_block copy = {HOST_SPILL_END, 0, 0, {{{0}}}};
     *block = s->free;
     if (s->free != HOST_SPILL_END) {
@@ -151,8 +143,7 @@ static int new_block(struct host_spill *s, uint32_t *block,
 }
 
 static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
-                                     uint32_t brick)
-{
+                                     uint32_t brick) {
     uint32_t at = (brick * 2654435761u ^ node * 40503u) % s->table_size;
     while (s->table[at].used &&
            (s->table[at].node != node || s->table[at].brick != brick)) {
@@ -162,8 +153,7 @@ static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
 }
 
 /* Entries stay once made: a brick that spilled will often spill again. */
-static int grow_table(struct host_spill *s, struct host_error *error)
-{
+static int grow_table(struct host_spill *s, struct host_error *error) {
     struct host_spill old = *s;
     s->table_size = 2 * old.table_size;
     s->table = calloc(s->table_size, sizeof *s->table);
@@ -180,14 +170,12 @@ static int grow_table(struct host_spill *s, struct host_error *error)
     return 0;
 }
 
-static uint64_t in_blocks(const struct host_spill_list *list)
-{
+static uint64_t in_blocks(const struct host_spill_list *list) {
     return list->faces - (uint64_t)__builtin_popcountll(list->marks);
 }
 
 static int append(struct host_spill *s, struct host_spill_list *list,
-                  struct incode_face face, struct host_error *error)
-{
+                  struct incode_face face, struct host_error *error) {
     struct host_spill_block tail;
     bool empty = in_blocks(list) == 0;
     tail.end = 0;
@@ -218,24 +206,21 @@ static int append(struct host_spill *s, struct host_spill_list *list,
 }
 
 static void mark(struct host_spill *s, struct host_spill_list *list,
-                 uint32_t vertex)
-{
+                 uint32_t vertex) {
     uint64_t bit = UINT64_C(1) << (vertex % INCODE_BRICK_POINTS);
     s->faces += (list->marks & bit) == 0;
     list->faces += (list->marks & bit) == 0;
     list->marks |= bit;
 }
 
-static struct host_spill_list empty_list(uint32_t brick)
-{
+static struct host_spill_list empty_list(uint32_t brick) {
     return (struct host_spill_list){
         .head = HOST_SPILL_END, .tail = HOST_SPILL_END, .brick = brick};
 }
 
 int host_spill_put(struct host_spill *spill, uint32_t node,
                    const struct incode_face *faces, uint32_t count,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     for (uint32_t i = 0; i < count; i++) {
         uint32_t brick = faces[i].v[0] / INCODE_BRICK_POINTS;
         struct host_spill_entry *entry = find(spill, node, brick);
@@ -263,8 +248,7 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
 }
 
 struct host_spill_list host_spill_detach(struct host_spill *spill,
-                                         uint32_t node, uint32_t brick)
-{
+                                         uint32_t node, uint32_t brick) {
     struct host_spill_entry *entry = find(spill, node, brick);
     struct host_spill_list list = entry->used ? entry->list : empty_list(brick);
     entry->list = empty_list(brick);
@@ -273,8 +257,7 @@ struct host_spill_list host_spill_detach(struct host_spill *spill,
 
 int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
                     struct incode_face *faces, uint32_t max, uint32_t *count,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     *count = 0;
     for (; list->marks != 0 && *count < max; list->marks &= list->marks - 1) {
         uint32_t slot = (uint32_t)__builtin_ctzll(list->marks);
@@ -311,8 +294,7 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
 static int copy_list(const struct host_spill *s,
                      const struct host_spill_list *list,
                      struct incode_face *faces, uint64_t *count,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_spill_block block;
     uint64_t left = in_blocks(list);
     for (uint32_t at = list->head; left > 0; at = block.next) {
@@ -328,8 +310,7 @@ static int copy_list(const struct host_spill *s,
 
 int host_spill_copy(const struct host_spill *spill, uint32_t node,
                     struct incode_face **faces, uint64_t *count,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     uint64_t all = 1;
     *count = 0;
     for (uint32_t i = 0; i < spill->table_size; i++) {

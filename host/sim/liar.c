@@ -19,13 +19,11 @@ const char *const host_lies[HOST_LIES] = {
     [HOST_LIE_FLOOD] = "flood",   [HOST_LIE_SPILLS] = "spill-flood",
 };
 
-static uint32_t draw(struct host_liar *l, uint32_t lo, uint32_t hi)
-{
+static uint32_t draw(struct host_liar *l, uint32_t lo, uint32_t hi) {
     return (uint32_t)host_sim_draw(&l->random, lo, hi);
 }
 
-static bool is_due(struct host_liar *l)
-{
+static bool is_due(struct host_liar *l) {
     return draw(l, 1, l->one_in) == 1;
 }
 
@@ -41,8 +39,7 @@ struct table {
 
 /* A vertex of another row, or INCODE_NONE: none differs from those of v. */
 static uint32_t another(struct host_liar *l, const struct table *t,
-                        const uint32_t *v, uint32_t width)
-{
+                        const uint32_t *v, uint32_t width) {
     for (unsigned i = 0; i < TRIES; i++) {
         uint32_t other = t->v[draw(l, 0, t->rows * t->width - 1)];
         bool differs = other != INCODE_NONE;
@@ -58,15 +55,13 @@ static uint32_t another(struct host_liar *l, const struct table *t,
 
 /* Puts another vertex in the place of v[k]; false: there is none. */
 static bool replace(struct host_liar *l, const struct table *t, uint32_t *v,
-                    uint32_t k)
-{
+                    uint32_t k) {
     uint32_t other = another(l, t, v, t->width);
     v[k] = other != INCODE_NONE ? other : v[k];
     return other != INCODE_NONE;
 }
 
-static bool take_next(const struct table *t, uint32_t i, uint32_t v[4])
-{
+static bool take_next(const struct table *t, uint32_t i, uint32_t v[4]) {
     uint32_t next = i + 1 < t->rows ? i + 1 : 0;
     bool differs = memcmp(v, t->v + next * t->width, t->width * sizeof *v) != 0;
     memcpy(v, t->v + next * t->width, t->width * sizeof *v);
@@ -77,8 +72,7 @@ static bool take_next(const struct table *t, uint32_t i, uint32_t v[4])
  * in its place.  Where the receiver counts rows, that is one.  A face whose
  * apex is left out is said to be one of the hull. */
 static uint32_t drop(struct host_liar *l, const struct table *t, uint32_t i,
-                     uint32_t (*said)[4])
-{
+                     uint32_t (*said)[4]) {
     bool lies = true;
     if (t->fixed && t->face == 3) {
         lies = said[0][3] != INCODE_NONE;
@@ -91,8 +85,7 @@ static uint32_t drop(struct host_liar *l, const struct table *t, uint32_t i,
 }
 
 static uint32_t exchange(struct host_liar *l, const struct table *t,
-                         uint32_t (*said)[4])
-{
+                         uint32_t (*said)[4]) {
     uint32_t *v = said[0], k = draw(l, t->face, 3);
     if (v[k] == INCODE_NONE || !replace(l, t, v, k)) {
         return 1;
@@ -107,8 +100,7 @@ static uint32_t exchange(struct host_liar *l, const struct table *t,
 }
 
 static uint32_t repeat(struct host_liar *l, const struct table *t, uint32_t i,
-                       uint32_t (*said)[4])
-{
+                       uint32_t (*said)[4]) {
     if (t->fixed) {
         l->pending += take_next(t, i, said[0]);
         return 1;
@@ -120,8 +112,7 @@ static uint32_t repeat(struct host_liar *l, const struct table *t, uint32_t i,
 }
 
 static uint32_t invent(struct host_liar *l, const struct table *t,
-                       uint32_t (*said)[4])
-{
+                       uint32_t (*said)[4]) {
     bool hull = said[0][3] == INCODE_NONE, lies = hull || t->face < 3;
     memcpy(said[1], said[0], sizeof said[1]);
     for (uint32_t k = hull ? 3 : 1; k < 4; k++) {
@@ -135,8 +126,7 @@ static uint32_t invent(struct host_liar *l, const struct table *t,
 }
 
 static uint32_t lend(struct host_liar *l, const struct table *t,
-                     uint32_t (*said)[4])
-{
+                     uint32_t (*said)[4]) {
     bool hull = t->width == 4 && said[0][3] == INCODE_NONE;
     l->pending += replace(l, t, said[0], draw(l, 0, hull ? 2 : t->width - 1));
     return 1;
@@ -144,8 +134,7 @@ static uint32_t lend(struct host_liar *l, const struct table *t,
 
 /* What is said instead of row i: 0 to 2 rows. */
 static uint32_t say(struct host_liar *l, const struct table *t, uint32_t i,
-                    uint32_t (*said)[4])
-{
+                    uint32_t (*said)[4]) {
     memcpy(said[0], t->v + i * t->width, t->width * sizeof said[0][0]);
     if (!is_due(l)) {
         return 1;
@@ -168,8 +157,8 @@ static uint32_t say(struct host_liar *l, const struct table *t, uint32_t i,
 
 /* ---- results ------------------------------------------------------------- */
 
-static bool read_results(struct host_liar *l, const uint8_t *data, size_t size)
-{
+static bool read_results(struct host_liar *l, const uint8_t *data,
+                         size_t size) {
     const size_t head = sizeof(struct node_result_header);
     struct node_result_reader reader;
     enum node_result_event event = NODE_RESULT_ROWS;
@@ -202,15 +191,13 @@ struct stars {
     bool full; /* something did not fit */
 };
 
-static void end_star(struct stars *s)
-{
+static void end_star(struct stars *s) {
     size_t written = node_result_star(&s->writer, s->vertex, s->apex, s->count);
     s->full = s->full || written != s->count;
     s->count = 0;
 }
 
-static void put_row(struct stars *s, const uint32_t v[4], uint16_t finder)
-{
+static void put_row(struct stars *s, const uint32_t v[4], uint16_t finder) {
     if (v[0] != s->vertex || s->count == STAR || finder != s->writer.finder) {
         end_star(s);
     }
@@ -219,15 +206,13 @@ static void put_row(struct stars *s, const uint32_t v[4], uint16_t finder)
     memcpy(s->apex[s->count++], v + 1, sizeof s->apex[0]);
 }
 
-static void put_commit(struct stars *s, uint32_t brick)
-{
+static void put_commit(struct stars *s, uint32_t brick) {
     end_star(s);
     s->full = s->full || !node_result_commit(&s->writer, brick);
 }
 
 static void begin_results(struct host_liar *l, struct stars *s,
-                          const uint8_t *data)
-{
+                          const uint8_t *data) {
     const size_t head = sizeof(struct node_result_header);
     memcpy(l->out, data, head);
     s->vertex = s->count = 0;
@@ -237,15 +222,13 @@ static void begin_results(struct host_liar *l, struct stars *s,
 }
 
 /* The size of what is written; 0: it did not fit. */
-static size_t end_results(struct stars *s)
-{
+static size_t end_results(struct stars *s) {
     end_star(s);
     return s->full ? 0 : sizeof(struct node_result_header) + s->writer.size;
 }
 
 static size_t alter_results(struct host_liar *l, const uint8_t *data,
-                            size_t size)
-{
+                            size_t size) {
     struct stars stars;
     uint32_t said[2][4], commits = 0;
     if (!read_results(l, data, size) || l->rows == 0) {
@@ -272,8 +255,7 @@ static size_t alter_results(struct host_liar *l, const uint8_t *data,
 /* Says the table anew from liar->out + at on, rows_max rows at most; how many.
  */
 static uint32_t say_all(struct host_liar *l, const struct table *t, size_t at,
-                        uint32_t rows_max)
-{
+                        uint32_t rows_max) {
     uint32_t said[2][4], rows = 0;
     size_t bytes = t->width * sizeof said[0][0];
     for (uint32_t i = 0; i < t->rows; i++) {
@@ -287,22 +269,19 @@ static uint32_t say_all(struct host_liar *l, const struct table *t, size_t at,
 
 /* Reads rows of a message from byte `at` on. */
 static struct table table_of(struct host_liar *l, const uint8_t *data,
-                             size_t at, uint32_t rows, uint32_t width)
-{
+                             size_t at, uint32_t rows, uint32_t width) {
     struct table t = {l->row[0], rows, width, 0, true};
     memcpy(l->row, data + at, rows * width * sizeof(uint32_t));
     return t;
 }
 
-static bool lies_of_findings(const struct host_liar *l)
-{
+static bool lies_of_findings(const struct host_liar *l) {
     return l->way <= HOST_LIE_INVENT;
 }
 
 /* Answers keep their number, in the order of the list. */
 static void alter_answers(struct host_liar *l, const uint8_t *data, size_t size,
-                          size_t at)
-{
+                          size_t at) {
     const size_t head = offsetof(struct incode_answers, v);
     uint16_t kind; /* in a list, the low half of it */
     uint32_t count;
@@ -322,8 +301,8 @@ static void alter_answers(struct host_liar *l, const uint8_t *data, size_t size,
 }
 
 /* Of a list or answers in a tuple. */
-static void alter_tuples(struct host_liar *l, const uint8_t *data, size_t size)
-{
+static void alter_tuples(struct host_liar *l, const uint8_t *data,
+                         size_t size) {
     struct tuple tuple;
     if (size <= TUPLES_HEADER_BYTES ||
         !tuple_read(&tuple, data + TUPLES_HEADER_BYTES,
@@ -338,8 +317,7 @@ static void alter_tuples(struct host_liar *l, const uint8_t *data, size_t size)
     }
 }
 
-static void alter_loan(struct host_liar *l, const uint8_t *data)
-{
+static void alter_loan(struct host_liar *l, const uint8_t *data) {
     struct incode_loan loan;
     const size_t head = offsetof(struct incode_loan, v);
     memcpy(&loan, data, head);
@@ -349,8 +327,8 @@ static void alter_loan(struct host_liar *l, const uint8_t *data)
     }
 }
 
-static size_t alter_found(struct host_liar *l, const uint8_t *data, size_t size)
-{
+static size_t alter_found(struct host_liar *l, const uint8_t *data,
+                          size_t size) {
     struct node_found_message found;
     const size_t head = offsetof(struct node_found_message, found.v);
     memcpy(&found, data, head);
@@ -366,8 +344,8 @@ static size_t alter_found(struct host_liar *l, const uint8_t *data, size_t size)
 }
 
 /* Who sends it counts what it sends: there are as many. */
-static void alter_shared(struct host_liar *l, const uint8_t *data, size_t size)
-{
+static void alter_shared(struct host_liar *l, const uint8_t *data,
+                         size_t size) {
     uint32_t rows = (uint32_t)(size / sizeof(struct node_shared));
     if (rows > 0) {
         struct table t = table_of(l, data, 0, rows, 4);
@@ -375,8 +353,7 @@ static void alter_shared(struct host_liar *l, const uint8_t *data, size_t size)
     }
 }
 
-static bool is_repeated(const double *x, uint32_t i)
-{
+static bool is_repeated(const double *x, uint32_t i) {
     uint64_t a, b;
     memcpy(&a, &x[i], sizeof a);
     memcpy(&b, &x[i - 1], sizeof b);
@@ -384,8 +361,7 @@ static bool is_repeated(const double *x, uint32_t i)
 }
 
 /* The last point is repeated behind it. */
-static uint32_t points_of(const struct incode_brick *brick)
-{
+static uint32_t points_of(const struct incode_brick *brick) {
     uint32_t last = INCODE_BRICK_POINTS - 1;
     while (last > 0 && is_repeated(brick->x, last) &&
            is_repeated(brick->y, last) && is_repeated(brick->z, last)) {
@@ -396,8 +372,7 @@ static uint32_t points_of(const struct incode_brick *brick)
 
 /* Moves a point of a brick, whose tag stays as it is: by a rounding, to another
  * point's coordinate, or far away. */
-static void alter_page(struct host_liar *l, size_t size)
-{
+static void alter_page(struct host_liar *l, size_t size) {
     struct incode_brick brick;
     const size_t head = offsetof(struct node_page_message, data);
     if (size != head + sizeof brick || !is_due(l)) {
@@ -425,8 +400,7 @@ static void alter_page(struct host_liar *l, size_t size)
 }
 
 size_t host_liar_alter(struct host_liar *liar, uint16_t dest, uint8_t type,
-                       const void *data, size_t size)
-{
+                       const void *data, size_t size) {
     struct host_liar *l = liar;
     size_t altered = size;
     l->pending = 0;
@@ -461,8 +435,7 @@ size_t host_liar_alter(struct host_liar *liar, uint16_t dest, uint8_t type,
 
 /* A message full of the first tetrahedron, or of a face of it. */
 static size_t flood(struct host_liar *l, const struct node_counted *counted,
-                    const uint8_t *data)
-{
+                    const uint8_t *data) {
     struct node_result_header head;
     struct stars stars;
     memcpy(&head, data, sizeof head);
@@ -492,8 +465,8 @@ static size_t flood(struct host_liar *l, const struct node_counted *counted,
 }
 
 /* Whether the host is flooded from this message on. */
-static bool begins_flood(struct host_liar *l, const uint8_t *data, size_t size)
-{
+static bool begins_flood(struct host_liar *l, const uint8_t *data,
+                         size_t size) {
     if (read_results(l, data, size) && l->rows > 0) {
         memcpy(l->kept, l->row[0], sizeof l->kept);
         l->keeps = true;
@@ -505,8 +478,8 @@ static bool begins_flood(struct host_liar *l, const uint8_t *data, size_t size)
 }
 
 int host_liar_write(struct host_liar *liar, struct node_counted *counted,
-                    uint16_t dest, uint8_t type, const void *data, size_t size)
-{
+                    uint16_t dest, uint8_t type, const void *data,
+                    size_t size) {
     struct host_liar *l = liar;
     bool floods = l->way == HOST_LIE_FLOOD || l->way == HOST_LIE_SPILLS;
     if (!floods || type != NODE_RESULT || !begins_flood(l, data, size)) {

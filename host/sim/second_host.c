@@ -7,14 +7,12 @@
 /* --- its machine ---------------------------------------------------------- */
 
 /* The world's clock goes on without it. */
-static uint64_t machine_now_us(void *context)
-{
+static uint64_t machine_now_us(void *context) {
     const struct host_second_host *h = context;
     return h->world->now_us + h->ahead_us;
 }
 
-static void machine_idle(void *context, uint64_t wait_us)
-{
+static void machine_idle(void *context, uint64_t wait_us) {
     struct host_second_host *h = context;
     if (h->there) {
         h->sleep_us = h->world->now_us + wait_us;
@@ -23,26 +21,22 @@ static void machine_idle(void *context, uint64_t wait_us)
     }
 }
 
-static int machine_check(void *context, struct host_error *error)
-{
+static int machine_check(void *context, struct host_error *error) {
     (void)context, (void)error;
     return 0;
 }
 
-static void machine_rest(void *context, uint64_t rest_us)
-{
+static void machine_rest(void *context, uint64_t rest_us) {
     struct host_second_host *h = context;
     host_world_rest(h->world, rest_us);
 }
 
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     (void)context;
     return true;
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     (void)context;
 }
 
@@ -50,8 +44,7 @@ static void machine_stop(void *context)
 
 void host_second_host_come(struct host_second_host *host,
                            struct host_world *world, uint64_t leave_us,
-                           uint32_t host_us)
-{
+                           uint32_t host_us) {
     struct host_second_host *h = host;
     struct host_error error = {0};
     h->world = world;
@@ -76,8 +69,7 @@ void host_second_host_come(struct host_second_host *host,
     }
 }
 
-void host_second_host_leave(struct host_second_host *host)
-{
+void host_second_host_leave(struct host_second_host *host) {
     if (host->there) {
         host->there = false;
         host_world_second_host(host->world, false);
@@ -86,14 +78,12 @@ void host_second_host_leave(struct host_second_host *host)
 }
 
 /* Nobody answers it, and it is not given the cube. */
-static bool let_in(const struct host_second_host *h)
-{
+static bool let_in(const struct host_second_host *h) {
     return h->service.up > 0 ||
            cube_link_statistics(h->service.cube, 0)->sessions > 0;
 }
 
-void host_second_host_round(void *host)
-{
+void host_second_host_round(void *host) {
     struct host_second_host *h = host;
     struct host_world *w = h->world;
     struct host_error error = {0};

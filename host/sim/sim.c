@@ -16,8 +16,7 @@ enum {
 };
 
 /* Bytes with which every node does. */
-static uint64_t memory_of(const struct host_sim_run *r)
-{
+static uint64_t memory_of(const struct host_sim_run *r) {
     const struct host_sim_plan *p = r->plan;
     struct node_setup_message setup = {
         .setup = {.bricks = r->order.bricks, .index = (uint8_t)p->index}};
@@ -37,8 +36,7 @@ static uint64_t memory_of(const struct host_sim_run *r)
     return memory + p->memory_more / 64 * 64;
 }
 
-static int open_world(struct host_sim_run *r, struct host_error *error)
-{
+static int open_world(struct host_sim_run *r, struct host_error *error) {
     const struct host_sim_plan *p = r->plan;
     struct host_world_options o = {
         .cube = {.dimension = (unsigned)__builtin_ctz(p->nodes),
@@ -82,8 +80,7 @@ static int open_world(struct host_sim_run *r, struct host_error *error)
     return 0;
 }
 
-static int make_work(struct host_sim_run *r, struct host_error *error)
-{
+static int make_work(struct host_sim_run *r, struct host_error *error) {
     const struct host_sim_plan *p = r->plan;
     if (host_gen(p->kind, p->points, p->seed, &r->points, error) != 0) {
         return error->code;
@@ -95,8 +92,8 @@ static int make_work(struct host_sim_run *r, struct host_error *error)
 }
 
 /* What is left in the queues of host and nodes when all is done. */
-static int check_queues(const struct host_sim_run *r, struct host_error *error)
-{
+static int check_queues(const struct host_sim_run *r,
+                        struct host_error *error) {
     const struct host_service *s = &r->service;
     uint64_t left = s->over ? 0 : s->spill.faces;
     for (unsigned i = 0; i < r->plan->nodes && !s->over; i++) {
@@ -118,8 +115,7 @@ static int check_queues(const struct host_sim_run *r, struct host_error *error)
 }
 
 static int check_second_host(const struct host_sim_run *r,
-                             struct host_error *error)
-{
+                             struct host_error *error) {
     return r->second.fault[0] == '\0'
                ? 0
                : host_fail(error, HOST_BROKEN, "node 0: %s; replay it",
@@ -127,8 +123,7 @@ static int check_second_host(const struct host_sim_run *r,
 }
 
 /* Every wire that was missing was named, and no other. */
-static int check_wires(const struct host_sim_run *r, struct host_error *error)
-{
+static int check_wires(const struct host_sim_run *r, struct host_error *error) {
     const struct host_world *w = &r->world;
     const bool *wanted = r->plan->wanted;
     /* What died or was lost since may be named as dead, or not at all. */
@@ -151,8 +146,8 @@ static int check_wires(const struct host_sim_run *r, struct host_error *error)
 /* What the service mends is a fault all the same, where no node lies: a result
  * that was wrong at first, or a node at fault.  Where one lies, no other node
  * may be blamed. */
-static int check_mended(const struct host_sim_run *r, struct host_error *error)
-{
+static int check_mended(const struct host_sim_run *r,
+                        struct host_error *error) {
     const struct host_service *s = &r->service;
     bool lies = r->plan->wanted[HOST_SIM_LIAR];
     bool mended =
@@ -171,8 +166,7 @@ static int check_mended(const struct host_sim_run *r, struct host_error *error)
 }
 
 static int serve(struct host_sim_run *r, struct host_machine *machine,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     const struct host_sim_plan *p = r->plan;
     struct host_service *s = &r->service;
     s->machine = machine;
@@ -211,8 +205,7 @@ static int serve(struct host_sim_run *r, struct host_machine *machine,
     return status;
 }
 
-static int compare(struct host_sim_run *r, struct host_error *error)
-{
+static int compare(struct host_sim_run *r, struct host_error *error) {
     static struct host_check_report report;
     struct host_tetrahedra right = {0};
     struct host_digest digest = {{0}};
@@ -240,16 +233,14 @@ static int compare(struct host_sim_run *r, struct host_error *error)
 
 /* A run that gave up as a node lies, and says which. */
 static bool names_liar(const struct host_sim_run *r, int status,
-                       const struct host_error *error)
-{
+                       const struct host_error *error) {
     char name[16];
     snprintf(name, sizeof name, "node %u: ", r->plan->liar.node);
     return r->liar.told > 0 && status == HOST_UNVERIFIED &&
            strncmp(error->text, name, strlen(name)) == 0;
 }
 
-static void tell(struct host_sim_run *r)
-{
+static void tell(struct host_sim_run *r) {
     struct host_sim_outcome *out = r->outcome;
     const struct host_world *w = &r->world;
     out->trace = w->cube.trace;
@@ -269,8 +260,7 @@ static void tell(struct host_sim_run *r)
 }
 
 int host_sim_run(const struct host_sim_plan *plan,
-                 struct host_sim_outcome *outcome, struct host_error *error)
-{
+                 struct host_sim_outcome *outcome, struct host_error *error) {
     struct host_sim_run *r = calloc(1, sizeof *r);
     memset(outcome, 0, sizeof *outcome);
     if (r == NULL) {

@@ -12,8 +12,7 @@ struct parse_sim {
     struct host_error *error;
 };
 
-static void add_range(struct parse_sim *p, uint64_t first, uint64_t last)
-{
+static void add_range(struct parse_sim *p, uint64_t first, uint64_t last) {
     struct host_sim_options *o = p->options;
     if (o->ranges == HOST_SIM_RANGES_MAX) {
         host_fail(p->error, HOST_USAGE,
@@ -26,8 +25,7 @@ static void add_range(struct parse_sim *p, uint64_t first, uint64_t last)
 }
 
 /* A..B, both included. */
-static void parse_seeds(struct parse_sim *p, const char *value)
-{
+static void parse_seeds(struct parse_sim *p, const char *value) {
     uint64_t first_seed = 0, last_seed = 0;
     char first[32] = "";
     const char *dots = strstr(value, "..");
@@ -46,8 +44,8 @@ static void parse_seeds(struct parse_sim *p, const char *value)
     add_range(p, first_seed, last_seed);
 }
 
-static error_t parse_sim_option(int key, char *value, struct argp_state *state)
-{
+static error_t parse_sim_option(int key, char *value,
+                                struct argp_state *state) {
     struct parse_sim *p = state->input;
     uint64_t n = 0;
     switch (key) {
@@ -78,8 +76,7 @@ static error_t parse_sim_option(int key, char *value, struct argp_state *state)
 }
 
 int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     static const struct argp_option options_of_sim[] = {
         {"seed", KEY_SEED, "S", 0,
          "Run seed S, which may be given more than once. Default: 1", 0},

@@ -2,8 +2,7 @@
 
 #include <string.h>
 
-static void start(struct host_world *w, unsigned i)
-{
+static void start(struct host_world *w, unsigned i) {
     struct host_world_node *n = &w->node[i];
     const char *why = NULL;
     n->learning = false;
@@ -18,8 +17,7 @@ static void start(struct host_world *w, unsigned i)
     }
 }
 
-void host_sim_learn(struct host_world *world, unsigned node)
-{
+void host_sim_learn(struct host_world *world, unsigned node) {
     struct host_world *w = world;
     unsigned i = node;
     struct host_world_node *n = &w->node[i];
@@ -36,8 +34,7 @@ void host_sim_learn(struct host_world *world, unsigned node)
     start(w, i);
 }
 
-void host_sim_boot(struct host_world *world, unsigned node)
-{
+void host_sim_boot(struct host_world *world, unsigned node) {
     struct host_world *w = world;
     unsigned i = node;
     struct host_world_node *n = &w->node[i];

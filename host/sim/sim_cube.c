@@ -5,20 +5,17 @@
 
 /* --- who is where --------------------------------------------------------- */
 
-static unsigned host_wires_of(const struct host_sim_cube *c)
-{
+static unsigned host_wires_of(const struct host_sim_cube *c) {
     const struct host_sim_cube_options *o = &c->options;
     return o->spare_node != 0 ? 2 : o->host_ports > 1 ? o->host_ports : 1;
 }
 
 /* The node at the end of the host's k-th wire. */
-static unsigned host_node(const struct host_sim_cube *c, unsigned k)
-{
+static unsigned host_node(const struct host_sim_cube *c, unsigned k) {
     return k > 0 && c->options.spare_node != 0 ? c->options.spare_node : k;
 }
 
-unsigned host_sim_cube_links(const struct host_sim_cube *cube, unsigned place)
-{
+unsigned host_sim_cube_links(const struct host_sim_cube *cube, unsigned place) {
     if (place >= cube->nodes) {
         return place == cube->nodes ? host_wires_of(cube) : 1;
     }
@@ -30,8 +27,7 @@ unsigned host_sim_cube_links(const struct host_sim_cube *cube, unsigned place)
 }
 
 unsigned host_sim_cube_wire(const struct host_sim_cube *cube, unsigned place,
-                            unsigned link)
-{
+                            unsigned link) {
     if (place > cube->nodes) {
         return cube->wires - 1;
     }
@@ -48,8 +44,7 @@ unsigned host_sim_cube_wire(const struct host_sim_cube *cube, unsigned place,
 
 /* The place at the other end. */
 static unsigned peer_of(const struct host_sim_cube *c, unsigned place,
-                        unsigned link)
-{
+                        unsigned link) {
     return place > c->nodes               ? 0
            : place == c->nodes            ? host_node(c, link)
            : link == c->options.dimension ? c->nodes
@@ -57,28 +52,24 @@ static unsigned peer_of(const struct host_sim_cube *c, unsigned place,
 }
 
 struct host_sim_port *host_sim_cube_port(const struct host_sim_cube *cube,
-                                         unsigned place, unsigned link)
-{
+                                         unsigned place, unsigned link) {
     return &cube->port[place * cube->links_max + link];
 }
 
 struct sim_direction *host_sim_cube_direction(const struct host_sim_cube *cube,
-                                              unsigned wire, unsigned side)
-{
+                                              unsigned wire, unsigned side) {
     return &cube->wire[wire].wire.direction[side];
 }
 
 /* --- bytes ---------------------------------------------------------------- */
 
-static void remember(struct host_sim_cube *c, uint64_t word)
-{
+static void remember(struct host_sim_cube *c, uint64_t word) {
     c->trace = (c->trace ^ word) * UINT64_C(0x9fb21c651e98df25);
     c->trace ^= c->trace >> 28;
 }
 
 static void remember_bytes(struct host_sim_cube *c, const uint8_t *bytes,
-                           size_t size)
-{
+                           size_t size) {
     for (; size >= 8; bytes += 8, size -= 8) {
         uint64_t word;
         memcpy(&word, bytes, 8);
@@ -91,8 +82,7 @@ static void remember_bytes(struct host_sim_cube *c, const uint8_t *bytes,
     remember(c, rest);
 }
 
-static int port_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int port_send(void *context, const uint8_t *bytes, size_t size) {
     struct host_sim_port *port = context;
     struct host_sim_cube *c = port->cube;
     const struct host_sim_cube_options *o = &c->options;
@@ -111,8 +101,7 @@ static int port_send(void *context, const uint8_t *bytes, size_t size)
     return taken;
 }
 
-static int port_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int port_receive(void *context, uint8_t *bytes, size_t size) {
     struct host_sim_port *port = context;
     if (port->replaced) {
         port->replaced = false;
@@ -127,15 +116,13 @@ static int port_receive(void *context, uint8_t *bytes, size_t size)
 }
 
 struct link_pipe host_sim_cube_pipe(const struct host_sim_cube *cube,
-                                    unsigned place, unsigned link)
-{
+                                    unsigned place, unsigned link) {
     return (struct link_pipe){host_sim_cube_port(cube, place, link), port_send,
                               port_receive};
 }
 
 static void open_port(struct host_sim_cube *c, unsigned place, unsigned link,
-                      unsigned wire, unsigned peer)
-{
+                      unsigned wire, unsigned peer) {
     struct host_sim_port *port = host_sim_cube_port(c, place, link);
     port->cube = c;
     port->peer = peer;
@@ -148,8 +135,7 @@ static void open_port(struct host_sim_cube *c, unsigned place, unsigned link,
 /* --- what breaks ---------------------------------------------------------- */
 
 void host_sim_cube_faults(struct host_sim_cube *cube,
-                          const struct sim_faults *faults)
-{
+                          const struct sim_faults *faults) {
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
         sim_direction_faults(host_sim_cube_direction(cube, i / 2, i % 2),
                              faults);
@@ -157,8 +143,7 @@ void host_sim_cube_faults(struct host_sim_cube *cube,
 }
 
 uint64_t host_sim_cube_struck(const struct host_sim_cube *cube,
-                              enum sim_fault fault)
-{
+                              enum sim_fault fault) {
     uint64_t sum = 0;
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
         sum += host_sim_cube_direction(cube, i / 2, i % 2)->struck[fault];
@@ -166,8 +151,7 @@ uint64_t host_sim_cube_struck(const struct host_sim_cube *cube,
     return sum;
 }
 
-void host_sim_cube_cut(struct host_sim_cube *cube, unsigned wire, bool cut)
-{
+void host_sim_cube_cut(struct host_sim_cube *cube, unsigned wire, bool cut) {
     struct host_sim_wire *one = &cube->wire[wire];
     one->cuts += cut ? 1u : UINT32_MAX;
     if (cut ? one->cuts == 1 : one->cuts == 0) {
@@ -176,21 +160,18 @@ void host_sim_cube_cut(struct host_sim_cube *cube, unsigned wire, bool cut)
 }
 
 void host_sim_cube_deaf(struct host_sim_cube *cube, unsigned wire,
-                        unsigned side, bool deaf)
-{
+                        unsigned side, bool deaf) {
     struct host_sim_wire *one = &cube->wire[wire];
     one->deaf[side] += deaf ? 1u : UINT32_MAX;
     sim_direction_deaf(&one->wire.direction[side], one->deaf[side] > 0);
 }
 
-void host_sim_cube_leave_out(struct host_sim_cube *cube, unsigned wire)
-{
+void host_sim_cube_leave_out(struct host_sim_cube *cube, unsigned wire) {
     cube->wire[wire].missing = true;
     host_sim_cube_cut(cube, wire, true);
 }
 
-void host_sim_cube_connect(struct host_sim_cube *cube, unsigned host)
-{
+void host_sim_cube_connect(struct host_sim_cube *cube, unsigned host) {
     unsigned place = cube->nodes + host, link = cube->options.dimension;
     open_port(cube, 0, link, host_sim_cube_wire(cube, place, 0), place);
     host_sim_cube_port(cube, 0, link)->replaced = true;
@@ -198,8 +179,7 @@ void host_sim_cube_connect(struct host_sim_cube *cube, unsigned host)
 
 /* --- from nothing, and back ----------------------------------------------- */
 
-static int make_wires(struct host_sim_cube *c)
-{
+static int make_wires(struct host_sim_cube *c) {
     const struct host_sim_cube_options *o = &c->options;
     size_t each = sim_wire_bytes(&o->wire);
     size_t of_host = sim_wire_bytes(&o->host_wire);
@@ -225,8 +205,7 @@ static int make_wires(struct host_sim_cube *c)
 
 int host_sim_cube_open(struct host_sim_cube *cube,
                        const struct host_sim_cube_options *options,
-                       const uint64_t *now_us, struct host_error *error)
-{
+                       const uint64_t *now_us, struct host_error *error) {
     struct host_sim_cube *c = cube;
     memset(c, 0, sizeof *c);
     c->options = *options;
@@ -258,8 +237,7 @@ int host_sim_cube_open(struct host_sim_cube *cube,
     return 0;
 }
 
-void host_sim_cube_close(struct host_sim_cube *cube)
-{
+void host_sim_cube_close(struct host_sim_cube *cube) {
     free(cube->wire);
     free(cube->port);
     free(cube->bytes);

@@ -13,15 +13,14 @@
 #include "transport/drivers/sim.h"
 
 /* Uniform from lo to hi, both included. */
-static inline uint64_t host_sim_draw(uint64_t *state, uint64_t lo, uint64_t hi)
-{
+static inline uint64_t host_sim_draw(uint64_t *state, uint64_t lo,
+                                     uint64_t hi) {
     return lo + (sim_draw(state) >> 16) % (hi - lo + 1);
 }
 
 /* The same over orders of magnitude; lo is not 0. */
 static inline uint64_t host_sim_draw_log(uint64_t *state, uint64_t lo,
-                                         uint64_t hi)
-{
+                                         uint64_t hi) {
     unsigned doublings = 0;
     while (lo << doublings < hi) {
         doublings++;

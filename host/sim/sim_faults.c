@@ -17,8 +17,7 @@ enum {
     HOST_KEEPS_US = 3000000 /* node 0 to a host that it does not hear */
 };
 
-static uint64_t draw(struct host_sim_run *r, uint64_t lo, uint64_t hi)
-{
+static uint64_t draw(struct host_sim_run *r, uint64_t lo, uint64_t hi) {
     return host_sim_draw(&r->random, lo, hi);
 }
 
@@ -27,8 +26,7 @@ static uint64_t draw(struct host_sim_run *r, uint64_t lo, uint64_t hi)
 /* A wire breaks or a node dies for good where another way is left.  What else
  * would have links given up that come back, until none is left, does not happen
  * then. */
-static void draw_death(struct host_sim_plan *p)
-{
+static void draw_death(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 78);
     if (p->nodes < 4 || p->nodes > 64 || host_sim_draw(&state, 1, 5) > 2) {
         return;
@@ -45,8 +43,7 @@ static void draw_death(struct host_sim_plan *p)
 
 /* Fewer wires than a node has may be missing anywhere: the cube holds together.
  * With dead ones one less, so that node 0 keeps one. */
-static void draw_missing(struct host_sim_plan *p)
-{
+static void draw_missing(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 79);
     unsigned dimension = (unsigned)__builtin_ctz(p->nodes);
     unsigned dead =
@@ -63,8 +60,7 @@ static void draw_missing(struct host_sim_plan *p)
 
 /* A second host is sent away as long as node 0 hears the first: nothing else
  * then keeps it from that for long. */
-static void draw_second_host(struct host_sim_plan *p)
-{
+static void draw_second_host(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 80);
     if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1) {
         return;
@@ -81,8 +77,7 @@ static void draw_second_host(struct host_sim_plan *p)
 }
 
 /* From a state of its own, as what follows. */
-static void draw_slow_nodes(struct host_sim_plan *p)
-{
+static void draw_slow_nodes(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 88);
     if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1) {
         return;
@@ -92,8 +87,7 @@ static void draw_slow_nodes(struct host_sim_plan *p)
 }
 
 static void draw_serial_wire(struct sim_quality *q, uint32_t baud,
-                             uint64_t *state)
-{
+                             uint64_t *state) {
     q->bytes_per_s = baud / 10;
     q->latency_us = (uint32_t)host_sim_draw_log(state, 1, 3000);
     q->room = (uint32_t)host_sim_draw_log(state, 16, 1024);
@@ -102,8 +96,7 @@ static void draw_serial_wire(struct sim_quality *q, uint32_t baud,
 
 /* What is told of the rate may be wrong, as a board knows that of its own UARTs
  * alone.  A UART never closes, and has one host. */
-static void draw_bare(struct host_sim_plan *p)
-{
+static void draw_bare(struct host_sim_plan *p) {
     static const uint32_t rates[] = {19200, 19200, 115200, 115200, 921600};
     uint64_t state = sim_seed(p->seed, 89);
     if (p->nodes > 16 || p->wanted[HOST_SIM_SECOND_HOST] ||
@@ -126,8 +119,7 @@ static void draw_bare(struct host_sim_plan *p)
 /* What is left of the cube can do the work without it, once more: that slow
  * nodes with tiny memories take half an hour for.  It lies about what it has to
  * say: where one node computes, others have pages alone. */
-static void draw_liar(struct host_sim_plan *p)
-{
+static void draw_liar(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 91);
     unsigned others = 1u + p->wanted[HOST_SIM_DEAD_NODE] +
                       p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_IDLER];
@@ -156,33 +148,28 @@ static void draw_liar(struct host_sim_plan *p)
 
 /* --- what they do --------------------------------------------------------- */
 
-static bool one_way(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool one_way(struct host_sim_run *r, const struct host_sim_event *e) {
     host_sim_cube_deaf(&r->world.cube, e->wire, e->side, true);
     return true;
 }
 
-static void both_ways(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static void both_ways(struct host_sim_run *r, const struct host_sim_event *e) {
     host_sim_cube_deaf(&r->world.cube, e->wire, e->side, false);
 }
 
-static bool cut(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool cut(struct host_sim_run *r, const struct host_sim_event *e) {
     host_sim_cube_cut(&r->world.cube, e->wire, true);
     return true;
 }
 
-static void mend(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static void mend(struct host_sim_run *r, const struct host_sim_event *e) {
     host_sim_cube_cut(&r->world.cube, e->wire, false);
 }
 
 /* All wires of the dimension `link`, or the node's own where link is the cube's
  * dimension. */
 static void part(struct host_sim_run *r, const struct host_sim_event *e,
-                 bool apart)
-{
+                 bool apart) {
     struct host_sim_cube *cube = &r->world.cube;
     unsigned dimension = cube->options.dimension;
     for (unsigned i = 0; e->link == dimension && i < dimension; i++) {
@@ -193,8 +180,7 @@ static void part(struct host_sim_run *r, const struct host_sim_event *e,
     }
 }
 
-static bool partition(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool partition(struct host_sim_run *r, const struct host_sim_event *e) {
     if (r->world.cube.options.dimension == 0) {
         return false;
     }
@@ -202,21 +188,19 @@ static bool partition(struct host_sim_run *r, const struct host_sim_event *e)
     return true;
 }
 
-static void unite(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static void unite(struct host_sim_run *r, const struct host_sim_event *e) {
     part(r, e, false);
 }
 
-static bool stand_still(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool stand_still(struct host_sim_run *r,
+                        const struct host_sim_event *e) {
     host_world_pause(&r->world, e->node, e->lasts_us);
     return true;
 }
 
 /* Node 0 forgets which host it keeps to, and is his who comes first: no other
  * may come then but one that has just been refused. */
-static bool crash(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool crash(struct host_sim_run *r, const struct host_sim_event *e) {
     const struct host_second_host *second = &r->second;
     if (e->node == 0 && second->there &&
         (second->refused == 0 ||
@@ -228,45 +212,39 @@ static bool crash(struct host_sim_run *r, const struct host_sim_event *e)
     return true;
 }
 
-static bool slow_host(struct host_sim_run *r, const struct host_sim_event *e)
-{
+static bool slow_host(struct host_sim_run *r, const struct host_sim_event *e) {
     r->world.host_pause_us = e->lasts_us;
     return true;
 }
 
-static void kill_wire(struct host_sim_run *r)
-{
+static void kill_wire(struct host_sim_run *r) {
     struct host_sim_cube *cube = &r->world.cube;
     unsigned wire = (unsigned)draw(r, 0, cube->host_wire - 1);
     cube->wire[wire].dead = true;
     host_sim_cube_cut(cube, wire, true);
 }
 
-static void kill_node(struct host_sim_run *r)
-{
+static void kill_node(struct host_sim_run *r) {
     host_world_kill(&r->world, (unsigned)draw(r, 1, r->world.nodes - 1));
 }
 
 /* --- how they are counted ------------------------------------------------- */
 
 static uint64_t count_chance(const struct host_sim_run *r,
-                             enum host_sim_fault kind)
-{
+                             enum host_sim_fault kind) {
     return host_sim_cube_struck(&r->world.cube, (enum sim_fault)kind) -
            r->before[kind];
 }
 
 /* It is slow all the time, besides. */
 static uint64_t count_slow_host(const struct host_sim_run *r,
-                                enum host_sim_fault kind)
-{
+                                enum host_sim_fault kind) {
     return r->happened[kind] + r->plan->wanted[kind];
 }
 
 /* Pages that were dropped and faces that were spilled. */
 static uint64_t count_tiny(const struct host_sim_run *r,
-                           enum host_sim_fault kind)
-{
+                           enum host_sim_fault kind) {
     uint64_t sum = r->service.spill.faces_total;
     for (unsigned i = 0; i < r->plan->nodes; i++) {
         sum += r->service.report[i].statistics.statistics.page_evictions;
@@ -275,8 +253,7 @@ static uint64_t count_tiny(const struct host_sim_run *r,
 }
 
 static uint64_t count_missing(const struct host_sim_run *r,
-                              enum host_sim_fault kind)
-{
+                              enum host_sim_fault kind) {
     uint64_t sum = 0;
     (void)kind;
     for (unsigned i = 0; i < r->world.cube.wires; i++) {
@@ -287,23 +264,20 @@ static uint64_t count_missing(const struct host_sim_run *r,
 
 /* Looks, of which some were at the links as well. */
 static uint64_t count_slow_node(const struct host_sim_run *r,
-                                enum host_sim_fault kind)
-{
+                                enum host_sim_fault kind) {
     return r->plan->wanted[kind] ? r->world.looks : 0;
 }
 
 /* Starts of nodes that others had met before. */
 static uint64_t count_bare(const struct host_sim_run *r,
-                           enum host_sim_fault kind)
-{
+                           enum host_sim_fault kind) {
     (void)kind;
     return r->world.learned;
 }
 
 /* Lies that have left the node. */
 static uint64_t count_lies(const struct host_sim_run *r,
-                           enum host_sim_fault kind)
-{
+                           enum host_sim_fault kind) {
     (void)kind;
     return r->liar.told;
 }
@@ -344,8 +318,7 @@ const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
 
 /* --- when ----------------------------------------------------------------- */
 
-static void weather(struct host_sim_run *r, bool bad)
-{
+static void weather(struct host_sim_run *r, bool bad) {
     for (unsigned i = 0; i < 2 * r->world.cube.wires; i++) {
         bool here = bad && draw(r, 0, 2) > 0;
         sim_direction_faults(
@@ -355,8 +328,7 @@ static void weather(struct host_sim_run *r, bool bad)
 }
 
 /* Takes back what is over by now, or all. */
-static void take_back(struct host_sim_run *r, bool all)
-{
+static void take_back(struct host_sim_run *r, bool all) {
     unsigned left = 0;
     for (unsigned i = 0; i < r->lasting_count; i++) {
         struct host_sim_event one = r->lasting[i];
@@ -370,8 +342,7 @@ static void take_back(struct host_sim_run *r, bool all)
 }
 
 /* One of the kinds that happen at a time. */
-static enum host_sim_fault draw_kind(struct host_sim_run *r)
-{
+static enum host_sim_fault draw_kind(struct host_sim_run *r) {
     enum host_sim_fault kinds[HOST_SIM_FAULTS];
     unsigned count = 0;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
@@ -383,8 +354,7 @@ static enum host_sim_fault draw_kind(struct host_sim_run *r)
 }
 
 /* One fault of those that the plan wants; false: none was possible. */
-static bool happen(struct host_sim_run *r)
-{
+static bool happen(struct host_sim_run *r) {
     const struct host_world *w = &r->world;
     struct host_sim_event e = {.kind = draw_kind(r)};
     const struct host_sim_kind *kind = &host_sim_kinds[e.kind];
@@ -407,8 +377,7 @@ static bool happen(struct host_sim_run *r)
     return true;
 }
 
-static bool any_event_wanted(const struct host_sim_plan *plan)
-{
+static bool any_event_wanted(const struct host_sim_plan *plan) {
     bool any = false;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         any = any || (plan->wanted[k] && host_sim_kinds[k].happen != NULL);
@@ -416,8 +385,7 @@ static bool any_event_wanted(const struct host_sim_plan *plan)
     return any;
 }
 
-static void break_for_good(struct host_sim_run *r)
-{
+static void break_for_good(struct host_sim_run *r) {
     r->broken = true;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         if (r->plan->wanted[k] && host_sim_kinds[k].break_for_good != NULL) {
@@ -427,8 +395,7 @@ static void break_for_good(struct host_sim_run *r)
     }
 }
 
-static void event(struct host_sim_run *r)
-{
+static void event(struct host_sim_run *r) {
     bool more = any_event_wanted(r->plan) && r->events > 0;
     if (!r->broken) {
         break_for_good(r);
@@ -445,8 +412,7 @@ static void event(struct host_sim_run *r)
 }
 
 /* It comes when the first host knows node 0 as it is now. */
-static void second_host(struct host_sim_run *r)
-{
+static void second_host(struct host_sim_run *r) {
     struct host_world *w = &r->world;
     const struct host_world_node *node = &w->node[0];
     if (node->state != HOST_WORLD_UP ||
@@ -460,19 +426,16 @@ static void second_host(struct host_sim_run *r)
     r->happened[HOST_SIM_SECOND_HOST] += r->open;
 }
 
-static uint64_t sooner(uint64_t a, uint64_t b)
-{
+static uint64_t sooner(uint64_t a, uint64_t b) {
     return a < b ? a : b;
 }
 
 /* What comes in its time, whatever the weather. */
-static uint64_t arrivals_us(const struct host_sim_run *r)
-{
+static uint64_t arrivals_us(const struct host_sim_run *r) {
     return sooner(r->second_us, host_sim_stand_ins_us(r));
 }
 
-static void calm(struct host_sim_run *r)
-{
+static void calm(struct host_sim_run *r) {
     struct host_world *w = &r->world;
     take_back(r, true);
     weather(r, false);
@@ -482,8 +445,7 @@ static void calm(struct host_sim_run *r)
     }
 }
 
-void host_sim_faults_strike(void *run)
-{
+void host_sim_faults_strike(void *run) {
     struct host_sim_run *r = run;
     struct host_world *w = &r->world;
     if (r->crash_due) {
@@ -509,8 +471,7 @@ void host_sim_faults_strike(void *run)
 }
 
 /* The frame that the plan names meets its fate. */
-static enum sim_fate decide(void *context, struct sim_direction *direction)
-{
+static enum sim_fate decide(void *context, struct sim_direction *direction) {
     struct host_sim_run *r = context;
     (void)direction;
     if (++r->frames != r->plan->frame) {
@@ -522,8 +483,7 @@ static enum sim_fate decide(void *context, struct sim_direction *direction)
 }
 
 /* All frames are counted, or those alone that the node to restart sends. */
-static void watch_frames(struct host_sim_run *r)
-{
+static void watch_frames(struct host_sim_run *r) {
     struct host_sim_cube *cube = &r->world.cube;
     unsigned node = r->plan->restart_node;
     if (r->plan->frame == 0) {
@@ -541,8 +501,7 @@ static void watch_frames(struct host_sim_run *r)
     }
 }
 
-void host_sim_faults_prepare(struct host_sim_run *run)
-{
+void host_sim_faults_prepare(struct host_sim_run *run) {
     const struct host_sim_plan *p = run->plan;
     /* Early weather ends too, while there is patience left to come up. */
     uint64_t patience = p->patience_us != 0 ? p->patience_us : HOST_PATIENCE_US;
@@ -554,8 +513,7 @@ void host_sim_faults_prepare(struct host_sim_run *run)
     watch_frames(run);
 }
 
-void host_sim_faults_begin(struct host_sim_run *run)
-{
+void host_sim_faults_begin(struct host_sim_run *run) {
     struct host_sim_run *r = run;
     uint64_t now_us = r->world.now_us;
     r->open = true;
@@ -573,8 +531,7 @@ void host_sim_faults_begin(struct host_sim_run *run)
     r->world.strike_us = sooner(r->event_us, arrivals_us(r));
 }
 
-void host_sim_faults_finish(struct host_sim_run *run)
-{
+void host_sim_faults_finish(struct host_sim_run *run) {
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         const struct host_sim_kind *kind = &host_sim_kinds[k];
         run->outcome->struck[k] = kind->count != NULL

@@ -2,8 +2,7 @@
 #include "sim_world.h"
 
 /* Each look at the clock costs the host some time. */
-static uint64_t machine_now_us(void *context)
-{
+static uint64_t machine_now_us(void *context) {
     struct host_world *w = context;
     uint64_t us = host_sim_draw(&w->random, 1, 2 * w->options.host_us);
     us += w->host_pause_us;
@@ -12,8 +11,7 @@ static uint64_t machine_now_us(void *context)
     return w->now_us;
 }
 
-static void machine_idle(void *context, uint64_t wait_us)
-{
+static void machine_idle(void *context, uint64_t wait_us) {
     struct host_world *w = context;
     host_world_run(w, w->now_us + wait_us, true);
     unsigned host = w->nodes;
@@ -22,8 +20,7 @@ static void machine_idle(void *context, uint64_t wait_us)
     }
 }
 
-static int machine_check(void *context, struct host_error *error)
-{
+static int machine_check(void *context, struct host_error *error) {
     const struct host_world *w = context;
     if (w->fault == NULL) {
         return 0;
@@ -35,31 +32,26 @@ static int machine_check(void *context, struct host_error *error)
                      (unsigned long long)w->steps);
 }
 
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     const struct host_world *w = context;
     return w->ended == w->nodes || w->fault != NULL;
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     host_world_halt(context);
 }
 
-static void machine_missing(void *context, unsigned node, unsigned link)
-{
+static void machine_missing(void *context, unsigned node, unsigned link) {
     struct host_world *w = context;
     w->named[host_sim_cube_wire(&w->cube, node, link)] = true;
 }
 
 /* Seeds say what they have to say at their end. */
-static void machine_told(void *context, const char *line)
-{
+static void machine_told(void *context, const char *line) {
     (void)context, (void)line;
 }
 
-struct host_machine host_world_machine(struct host_world *world)
-{
+struct host_machine host_world_machine(struct host_world *world) {
     struct host_machine machine = {.virtual_time = true};
     machine.context = world;
     unsigned host = world->nodes;

@@ -18,18 +18,15 @@ static const struct {
 } cubes[] = {{0, 60}, {1, 130}, {2, 260}, {3, 275}, {4, 173}, {5, 80},
              {6, 16}, {7, 3},   {8, 1},   {9, 1},   {10, 1}};
 
-static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi)
-{
+static uint64_t draw(uint64_t *state, uint64_t lo, uint64_t hi) {
     return host_sim_draw(state, lo, hi);
 }
 
-static bool one_in(uint64_t *state, unsigned n)
-{
+static bool one_in(uint64_t *state, unsigned n) {
     return draw(state, 1, n) == 1;
 }
 
-static unsigned draw_nodes(uint64_t *state)
-{
+static unsigned draw_nodes(uint64_t *state) {
     uint64_t at = draw(state, 0, 999);
     unsigned i = 0;
     while (at >= cubes[i].weight) {
@@ -40,8 +37,7 @@ static unsigned draw_nodes(uint64_t *state)
 
 static bool is_refused(const struct host_strategy *row, unsigned nodes,
                        const struct host_sharing *sharing,
-                       enum incode_face_rule rule)
-{
+                       enum incode_face_rule rule) {
     struct host_error error = {0};
     return host_strategy_check(row, nodes, sharing, rule, INCODE_BUILD_AUTO,
                                &error) != 0;
@@ -50,8 +46,7 @@ static bool is_refused(const struct host_strategy *row, unsigned nodes,
 /* Of the strategies that keep to one node, or of the others, one at random that
  * goes with so many; NULL: there is none. */
 static const struct host_strategy *draw_row(uint64_t *state, unsigned nodes,
-                                            bool one_node)
-{
+                                            bool one_node) {
     static const struct host_sharing usual;
     const struct host_strategy *row, *drawn = NULL;
     unsigned rows = 0;
@@ -70,16 +65,14 @@ static const struct host_strategy *draw_row(uint64_t *state, unsigned nodes,
 
 /* One that keeps to one node is drawn seldom: most of a cube idles under it. */
 static const struct host_strategy *draw_strategy(const struct host_sim_plan *p,
-                                                 bool one_node)
-{
+                                                 bool one_node) {
     uint64_t state = sim_seed(p->seed, 81);
     const struct host_strategy *row = draw_row(&state, p->nodes, one_node);
     return row != NULL ? row : draw_row(&state, p->nodes, !one_node);
 }
 
 /* What the strategy heeds and does not refuse; from a state of its own. */
-static void draw_sharing(struct host_sim_plan *p)
-{
+static void draw_sharing(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 87);
     struct host_sharing s = {0};
     unsigned heeds = p->strategy->sharing;
@@ -103,15 +96,13 @@ static void draw_sharing(struct host_sim_plan *p)
 }
 
 /* From a state of its own: what else a seed stands for does not change. */
-static enum incode_build draw_build(const struct host_sim_plan *p)
-{
+static enum incode_build draw_build(const struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 85);
     return (enum incode_build)draw(&state, INCODE_BUILD_AUTO,
                                    INCODE_BUILD_POINTS);
 }
 
-static void draw_work(struct host_sim_plan *p, uint64_t *state)
-{
+static void draw_work(struct host_sim_plan *p, uint64_t *state) {
     static const char *const kinds[] = {"uniform", "bubbles", "bluntfin",
                                         "sphere",  "grid",    "rotated",
                                         "hub",     "uniform"};
@@ -141,8 +132,7 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state)
     }
 }
 
-static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
-{
+static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast) {
     q->bytes_per_s = one_in(state, 5)
                          ? 0
                          : (uint32_t)host_sim_draw_log(
@@ -153,8 +143,7 @@ static void draw_wire(struct sim_quality *q, uint64_t *state, bool fast)
     q->bytes = q->bytes < SIM_BYTES_MIN ? SIM_BYTES_MIN : q->bytes;
 }
 
-static void draw_cube(struct host_sim_plan *p, uint64_t *state)
-{
+static void draw_cube(struct host_sim_plan *p, uint64_t *state) {
     bool large = p->nodes > 64;
     p->window = one_in(state, 3) ? 0 : (unsigned)draw(state, 1, large ? 3 : 8);
     p->host_window = one_in(state, 2) ? 0 : (unsigned)draw(state, 1, 32);
@@ -181,8 +170,7 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state)
                      : (uint32_t)host_sim_draw_log(state, 2, 200);
 }
 
-static void draw_faults(struct host_sim_plan *p, uint64_t *state)
-{
+static void draw_faults(struct host_sim_plan *p, uint64_t *state) {
     struct sim_faults *w = &p->weather;
     bool large = p->nodes > 64;
     double worst = large ? 0.02 : 0.3;
@@ -205,8 +193,7 @@ static void draw_faults(struct host_sim_plan *p, uint64_t *state)
 }
 
 void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
-                        unsigned nodes)
-{
+                        unsigned nodes) {
     uint64_t state = sim_seed(seed, 77);
     memset(plan, 0, sizeof *plan);
     plan->seed = seed;
@@ -227,8 +214,7 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
     }
 }
 
-void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan)
-{
+void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan) {
     fprintf(file, "%llu points %s, %u node%s, %s, %s, %s, %s, %s;",
             (unsigned long long)plan->points, plan->kind, plan->nodes,
             plan->nodes == 1 ? "" : "s", plan->strategy->name,

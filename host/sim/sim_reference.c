@@ -17,8 +17,7 @@ struct reference {
     uint32_t committed;
 };
 
-static bool request(void *context, uint32_t page)
-{
+static bool request(void *context, uint32_t page) {
     struct reference *r = context;
     if (r->count == PAGES_MAX) {
         return false;
@@ -27,15 +26,13 @@ static bool request(void *context, uint32_t page)
     return true;
 }
 
-static size_t emit_room(void *context)
-{
+static size_t emit_room(void *context) {
     (void)context;
     return EMIT_ROOM;
 }
 
 static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count)
-{
+                 size_t count) {
     struct reference *r = context;
     uint32_t(*v)[4] = host_tetrahedra_room(r->tets, count, r->error);
     for (size_t i = 0; v != NULL && i < count; i++) {
@@ -45,28 +42,25 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
     host_tetrahedra_keep(r->tets, v == NULL ? 0 : count);
 }
 
-static void commit(void *context, uint32_t brick)
-{
+static void commit(void *context, uint32_t brick) {
     struct reference *r = context;
     (void)brick;
     r->committed++;
 }
 
 /* There is memory enough: nothing is spilled. */
-static bool spill(void *context, const struct incode_face *faces, size_t count)
-{
+static bool spill(void *context, const struct incode_face *faces,
+                  size_t count) {
     (void)context, (void)faces, (void)count;
     return false;
 }
 
-static bool unspill(void *context, uint32_t brick)
-{
+static bool unspill(void *context, uint32_t brick) {
     (void)context, (void)brick;
     return false;
 }
 
-static void deliver(struct reference *r)
-{
+static void deliver(struct reference *r) {
     uint8_t page[INCODE_PAGE_BYTES];
     while (r->count > 0) {
         uint32_t number = r->pages[--r->count];
@@ -75,8 +69,7 @@ static void deliver(struct reference *r)
     }
 }
 
-static int work(struct reference *r)
-{
+static int work(struct reference *r) {
     enum incode_step step = INCODE_WORKED;
     while (step != INCODE_FINISHED && r->error->code == 0) {
         step = incode_triangulator_step(r->t);
@@ -99,8 +92,7 @@ static int work(struct reference *r)
 }
 
 static int triangulate(struct reference *r, void *arena, size_t bytes,
-                       const struct incode_setup *setup)
-{
+                       const struct incode_setup *setup) {
     const struct incode_outside outside = {
         .pages = {r, request},
         .front = {r, emit_room, emit, commit, spill, unspill}};
@@ -118,8 +110,7 @@ static int triangulate(struct reference *r, void *arena, size_t bytes,
 }
 
 int host_reference(const struct host_points *points,
-                   struct host_tetrahedra *tets, struct host_error *error)
-{
+                   struct host_tetrahedra *tets, struct host_error *error) {
     struct reference r = {.tets = tets, .error = error};
     if (host_order_make(&r.order, "points", points->xyz, points->count,
                         HOST_ADAPTIVE, 1, false, error) != 0) {

@@ -20,8 +20,7 @@ enum {
 /* How the seed at work is replayed: for a handler of signals, too. */
 static char replay[160];
 
-static void note_replay(const struct host_sim_plan *plan)
-{
+static void note_replay(const struct host_sim_plan *plan) {
     char nodes[32] = "";
     if (plan->nodes_given != 0) {
         snprintf(nodes, sizeof nodes, " --nodes %u", plan->nodes_given);
@@ -32,8 +31,7 @@ static void note_replay(const struct host_sim_plan *plan)
              INCODE_COMMIT, (unsigned long long)plan->seed, nodes);
 }
 
-static void on_crash(int number)
-{
+static void on_crash(int number) {
     static const char what[] = "\nincode: sim: crashed or stuck\n";
     (void)!write(STDERR_FILENO, what, sizeof what - 1);
     (void)!write(STDERR_FILENO, replay, strlen(replay));
@@ -41,8 +39,7 @@ static void on_crash(int number)
     (void)raise(number);
 }
 
-static void watch_crashes(void)
-{
+static void watch_crashes(void) {
     static const int numbers[] = {SIGSEGV, SIGBUS,  SIGILL,   SIGFPE,
                                   SIGTRAP, SIGABRT, SIGVTALRM};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
@@ -51,8 +48,7 @@ static void watch_crashes(void)
 }
 
 /* Processor time for one more seed. */
-static void give_time(void)
-{
+static void give_time(void) {
     const struct itimerval time = {.it_value = {.tv_sec = STUCK_S}};
     (void)setitimer(ITIMER_VIRTUAL, &time, NULL);
 }
@@ -65,8 +61,7 @@ struct totals {
     uint64_t struck[HOST_SIM_FAULTS], seeds_struck[HOST_SIM_FAULTS];
 };
 
-static void print_struck(const uint64_t *struck)
-{
+static void print_struck(const uint64_t *struck) {
     const char *comma = " ";
     bool any = false;
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
@@ -83,8 +78,7 @@ static void print_struck(const uint64_t *struck)
 }
 
 static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
-                     struct host_error *first)
-{
+                     struct host_error *first) {
     struct host_sim_plan plan;
     struct host_sim_outcome outcome;
     struct host_error error = {0};
@@ -118,8 +112,7 @@ static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
     fflush(stdout);
 }
 
-static void print_totals(const struct totals *t, double seconds)
-{
+static void print_totals(const struct totals *t, double seconds) {
     printf("%llu seed%s, %llu failed; %llu restart%s, %.0f s in virtual time, "
            "%.1f in ours",
            (unsigned long long)t->seeds, t->seeds == 1 ? "" : "s",
@@ -138,16 +131,14 @@ static void print_totals(const struct totals *t, double seconds)
     }
 }
 
-static double processor_s(void)
-{
+static double processor_s(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
 int host_sim_seeds(const struct host_sim_options *options,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct totals totals = {0};
     double start = processor_s(), seconds = 0;
     bool late = false;

@@ -10,8 +10,7 @@ enum { REPLACE_US = 3000, FOREIGN_DEAD_MAX = 2 };
 /* A node that answers and never works has no part in the work any more; its
  * links go on.  Node 0 must keep to its host for a second one to be sent away:
  * nothing takes its place then. */
-void host_sim_draw_idler(struct host_sim_plan *plan)
-{
+void host_sim_draw_idler(struct host_sim_plan *plan) {
     struct host_sim_plan *p = plan;
     uint64_t state = sim_seed(p->seed, 82);
     unsigned first = p->wanted[HOST_SIM_SECOND_HOST];
@@ -34,8 +33,7 @@ void host_sim_draw_idler(struct host_sim_plan *plan)
 
 /* Where the counting of generations may go wrong: at the ends of their 16 and
  * 32 bits, and in jumps of half the smaller. */
-static void draw_generation(struct host_sim_plan *p, uint64_t *state)
-{
+static void draw_generation(struct host_sim_plan *p, uint64_t *state) {
     static const uint32_t ends[] = {0x7fff,  0x8000,     0xffff,
                                     0x10000, 0xffff8000, UINT32_MAX};
     static const uint32_t jumps[] = {0x7fff,  0x8000,     0x8001,    0xffff,
@@ -52,8 +50,7 @@ static void draw_generation(struct host_sim_plan *p, uint64_t *state)
 }
 
 /* The wiring of a host that was there before. */
-void host_sim_draw_teller(struct host_sim_plan *plan)
-{
+void host_sim_draw_teller(struct host_sim_plan *plan) {
     struct host_sim_plan *p = plan;
     uint64_t state = sim_seed(p->seed, 83);
     unsigned first = p->wanted[HOST_SIM_SECOND_HOST];
@@ -71,8 +68,7 @@ void host_sim_draw_teller(struct host_sim_plan *plan)
 
 /* --- when they come and go ------------------------------------------------ */
 
-static void idler_comes(struct host_sim_run *r)
-{
+static void idler_comes(struct host_sim_run *r) {
     struct host_stand_in_orders orders = {.kind = HOST_IDLER,
                                           .ready = r->plan->idler_ready};
     host_world_replace(&r->world, r->plan->idler.node, REPLACE_US, &orders);
@@ -80,8 +76,7 @@ static void idler_comes(struct host_sim_run *r)
     r->happened[HOST_SIM_IDLER]++;
 }
 
-static void teller_comes(struct host_sim_run *r)
-{
+static void teller_comes(struct host_sim_run *r) {
     const struct host_sim_plan *p = r->plan;
     unsigned dimension = r->world.cube.options.dimension;
     uint64_t state = sim_seed(p->seed, 84);
@@ -106,8 +101,7 @@ static void teller_comes(struct host_sim_run *r)
     r->telling = true;
 }
 
-static void teller_goes(struct host_sim_run *r)
-{
+static void teller_goes(struct host_sim_run *r) {
     unsigned node = r->plan->teller.node;
     const struct host_world_node *n = &r->world.node[node];
     if (n->state == HOST_WORLD_UP && n->stand_in != NULL) {
@@ -118,8 +112,7 @@ static void teller_goes(struct host_sim_run *r)
     r->telling = false;
 }
 
-void host_sim_stand_ins_prepare(struct host_sim_run *run)
-{
+void host_sim_stand_ins_prepare(struct host_sim_run *run) {
     const struct host_sim_plan *p = run->plan;
     run->idler_us = run->teller_us = UINT64_MAX;
     if (p->wanted[HOST_SIM_IDLER] && p->idler.us == 0) {
@@ -130,8 +123,7 @@ void host_sim_stand_ins_prepare(struct host_sim_run *run)
     }
 }
 
-void host_sim_stand_ins_begin(struct host_sim_run *run)
-{
+void host_sim_stand_ins_begin(struct host_sim_run *run) {
     const struct host_sim_plan *p = run->plan;
     if (p->wanted[HOST_SIM_IDLER] && p->idler.us > 0) {
         run->idler_us = run->world.now_us + p->idler.us;
@@ -141,19 +133,16 @@ void host_sim_stand_ins_begin(struct host_sim_run *run)
     }
 }
 
-void host_sim_stand_ins_finish(struct host_sim_run *run)
-{
+void host_sim_stand_ins_finish(struct host_sim_run *run) {
     run->idler_us = UINT64_MAX;
     run->teller_us = run->telling ? run->teller_us : UINT64_MAX;
 }
 
-uint64_t host_sim_stand_ins_us(const struct host_sim_run *run)
-{
+uint64_t host_sim_stand_ins_us(const struct host_sim_run *run) {
     return run->idler_us < run->teller_us ? run->idler_us : run->teller_us;
 }
 
-void host_sim_stand_ins_strike(struct host_sim_run *run)
-{
+void host_sim_stand_ins_strike(struct host_sim_run *run) {
     if (run->world.now_us >= run->idler_us) {
         idler_comes(run);
     }

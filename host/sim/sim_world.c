@@ -22,21 +22,18 @@ enum {
 
 /* --- the nodes in the order of their clocks ------------------------------ */
 
-static bool before(const struct host_world *w, uint32_t a, uint32_t b)
-{
+static bool before(const struct host_world *w, uint32_t a, uint32_t b) {
     uint64_t s = w->node[a].wake_us, t = w->node[b].wake_us;
     return s != t ? s < t : a < b;
 }
 
-static void place(struct host_world *w, uint32_t at, uint32_t node)
-{
+static void place(struct host_world *w, uint32_t at, uint32_t node) {
     w->heap[at] = node;
     w->node[node].place = at;
 }
 
 /* Wakes a node at that time, whenever it was to wake before. */
-static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
-{
+static void wake_at(struct host_world *w, uint32_t node, uint64_t us) {
     uint32_t at = w->node[node].place, count = w->nodes;
     w->node[node].wake_us = us;
     while (at > 0 && before(w, node, w->heap[(at - 1) / 2])) {
@@ -59,8 +56,7 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us)
 }
 
 /* Something comes for a place: a node looks once it is free. */
-static void rouse(void *context, unsigned node, uint64_t us)
-{
+static void rouse(void *context, unsigned node, uint64_t us) {
     struct host_world *w = context;
     if (node > w->nodes && us < w->second_us) {
         w->second_us = us;
@@ -77,14 +73,12 @@ static void rouse(void *context, unsigned node, uint64_t us)
 
 /* --- two hosts ------------------------------------------------------------ */
 
-static void cut_host(struct host_world *w, unsigned host, bool cut)
-{
+static void cut_host(struct host_world *w, unsigned host, bool cut) {
     unsigned place = w->nodes + host;
     host_sim_cube_cut(&w->cube, host_sim_cube_wire(&w->cube, place, 0), cut);
 }
 
-static void hang_up(struct host_world *w, unsigned host, uint64_t rest_us)
-{
+static void hang_up(struct host_world *w, unsigned host, uint64_t rest_us) {
     struct host_world_connection *c = &w->connection[host];
     if (c->connected) {
         c->connected = false;
@@ -94,8 +88,7 @@ static void hang_up(struct host_world *w, unsigned host, uint64_t rest_us)
     c->pause_us = CONNECT_US;
 }
 
-static void connect_host(struct host_world *w, unsigned host)
-{
+static void connect_host(struct host_world *w, unsigned host) {
     struct host_world_connection *c = &w->connection[host];
     if (w->node[0].state != HOST_WORLD_UP) { /* nobody listens */
         c->next_us = w->now_us + c->pause_us;
@@ -111,8 +104,7 @@ static void connect_host(struct host_world *w, unsigned host)
 }
 
 /* When a host connects next, and which; or UINT64_MAX. */
-static uint64_t next_connection(const struct host_world *w, unsigned *host)
-{
+static uint64_t next_connection(const struct host_world *w, unsigned *host) {
     uint64_t next = UINT64_MAX;
     for (unsigned i = 0; i < 2; i++) {
         const struct host_world_connection *c = &w->connection[i];
@@ -124,13 +116,11 @@ static uint64_t next_connection(const struct host_world *w, unsigned *host)
     return next;
 }
 
-void host_world_rest(struct host_world *world, uint64_t rest_us)
-{
+void host_world_rest(struct host_world *world, uint64_t rest_us) {
     hang_up(world, 1, rest_us);
 }
 
-void host_world_second_host(struct host_world *world, bool comes)
-{
+void host_world_second_host(struct host_world *world, bool comes) {
     hang_up(world, 1, 0);
     world->connection[1].wanted = comes;
     world->second_us = comes ? world->now_us : UINT64_MAX;
@@ -139,8 +129,7 @@ void host_world_second_host(struct host_world *world, bool comes)
 /* --- nodes --------------------------------------------------------------- */
 
 /* Nanoseconds of this step so far. */
-static uint64_t spent_ns(const struct host_world_node *node)
-{
+static uint64_t spent_ns(const struct host_world_node *node) {
     const struct host_world_options *o = &node->world->options;
     return o->used_ns == NULL || !node->stepping
                ? 0
@@ -151,16 +140,14 @@ static uint64_t spent_ns(const struct host_world_node *node)
 
 /* The world's clock goes with a slow node's until its step is over: what the
  * others do meanwhile the node sees later. */
-static void take_time(struct host_world *w)
-{
+static void take_time(struct host_world *w) {
     bool lasts = host_sim_draw(&w->look_random, 1, LONG_IN) == 1;
     w->looks++;
     w->now_us += host_sim_draw(&w->look_random, 0,
                                lasts ? LONG_US : 2 * w->options.look_us);
 }
 
-static uint64_t node_now_us(void *context)
-{
+static uint64_t node_now_us(void *context) {
     const struct host_world_node *node = context;
     struct host_world *w = node->world;
     if (node->stepping && w->options.look_us > 0) {
@@ -169,38 +156,33 @@ static uint64_t node_now_us(void *context)
     return w->now_us + node->offset_us + spent_ns(node) / 1000;
 }
 
-static uint64_t node_busy_us(void *context)
-{
+static uint64_t node_busy_us(void *context) {
     const struct host_world_node *node = context;
     return node->busy_us;
 }
 
 /* The world sleeps for its nodes. */
-static void node_idle(void *context, uint64_t wait_us)
-{
+static void node_idle(void *context, uint64_t wait_us) {
     (void)context, (void)wait_us;
 }
 
 /* Of the node that lies. */
 static int node_write(void *context, struct node_counted *counted,
                       uint16_t dest, uint8_t type, const void *data,
-                      size_t size)
-{
+                      size_t size) {
     const struct host_world_node *node = context;
     return host_liar_write(node->world->options.liar, counted, dest, type, data,
                            size);
 }
 
-static void node_reset(void *context, int status)
-{
+static void node_reset(void *context, int status) {
     struct host_world_node *node = context;
     (void)status;
     node->state = HOST_WORLD_ENDED;
 }
 
 void host_world_give_up(struct host_world *world, unsigned node,
-                        const char *why)
-{
+                        const char *why) {
     if (world->fault == NULL) {
         world->fault = why;
         world->fault_node = node;
@@ -208,8 +190,7 @@ void host_world_give_up(struct host_world *world, unsigned node,
 }
 
 /* Takes back what the crash did to the node's wires. */
-static void plug_in(struct host_world *w, unsigned i, bool in)
-{
+static void plug_in(struct host_world *w, unsigned i, bool in) {
     struct host_world_node *n = &w->node[i];
     for (unsigned d = 0; d < n->links; d++) {
         struct host_sim_port *port = host_sim_cube_port(&w->cube, i, d);
@@ -223,8 +204,7 @@ static void plug_in(struct host_world *w, unsigned i, bool in)
 }
 
 void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
-                      bool unplugged)
-{
+                      bool unplugged) {
     struct host_world_node *n = &world->node[node];
     if (n->state != HOST_WORLD_UP) {
         return;
@@ -241,22 +221,19 @@ void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
 }
 
 void host_world_replace(struct host_world *world, unsigned node, uint64_t us,
-                        const struct host_stand_in_orders *orders)
-{
+                        const struct host_stand_in_orders *orders) {
     const struct host_stand_in_orders none = {.kind = HOST_NO_STAND_IN};
     world->node[node].orders = orders != NULL ? *orders : none;
     host_world_crash(world, node, us, false);
 }
 
-void host_world_idle(struct host_world *world, unsigned node)
-{
+void host_world_idle(struct host_world *world, unsigned node) {
     const struct host_stand_in_orders idler = {.kind = HOST_IDLER,
                                                .ready = true};
     host_world_replace(world, node, 0, &idler);
 }
 
-void host_world_kill(struct host_world *world, unsigned node)
-{
+void host_world_kill(struct host_world *world, unsigned node) {
     host_world_crash(world, node, 0, false);
     if (world->node[node].state == HOST_WORLD_OFF) {
         world->node[node].state = HOST_WORLD_ENDED;
@@ -265,13 +242,11 @@ void host_world_kill(struct host_world *world, unsigned node)
     }
 }
 
-void host_world_late(struct host_world *world, unsigned node, uint64_t us)
-{
+void host_world_late(struct host_world *world, unsigned node, uint64_t us) {
     wake_at(world, node, world->now_us + us);
 }
 
-void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
-{
+void host_world_pause(struct host_world *world, unsigned node, uint64_t us) {
     struct host_world_node *n = &world->node[node];
     uint64_t until = world->now_us + us;
     if (n->state == HOST_WORLD_UP && until > n->busy_until_us) {
@@ -281,8 +256,7 @@ void host_world_pause(struct host_world *world, unsigned node, uint64_t us)
 }
 
 /* When an idle node has something to do. */
-static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
-{
+static uint64_t next_duty(struct host_world *w, struct host_world_node *n) {
     uint64_t due = w->now_us;
     due += n->learning           ? LISTEN_US
            : n->stand_in != NULL ? host_stand_in_wait_us(n->stand_in)
@@ -299,16 +273,14 @@ static uint64_t next_duty(struct host_world *w, struct host_world_node *n)
 }
 
 /* Its links may send again what found no room. */
-static void look_for_room(struct host_world *w, unsigned i)
-{
+static void look_for_room(struct host_world *w, unsigned i) {
     for (unsigned d = 0; d < w->node[i].links; d++) {
         host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
     }
 }
 
 /* The node's processor is busy, its links are not. */
-static void pass(struct host_world *w, unsigned i)
-{
+static void pass(struct host_world *w, unsigned i) {
     struct host_world_node *n = &w->node[i];
     look_for_room(w, i);
     (void)node_receive(n->node);
@@ -319,8 +291,8 @@ static void pass(struct host_world *w, unsigned i)
 
 /* A step of the node itself, charged by its work: microseconds.  What the step
  * before has worked is sent now, as its time is over. */
-static uint64_t charged_step(struct host_world_node *n, enum node_event *event)
-{
+static uint64_t charged_step(struct host_world_node *n,
+                             enum node_event *event) {
     n->stepping = true;
     unsigned moved = node_receive(n->node);
     *event = node_send(n->node, moved);
@@ -335,8 +307,7 @@ static uint64_t charged_step(struct host_world_node *n, enum node_event *event)
 }
 
 /* The same of one whose clock may go on by itself. */
-static uint64_t timed_step(struct host_world_node *n, enum node_event *event)
-{
+static uint64_t timed_step(struct host_world_node *n, enum node_event *event) {
     struct host_world *w = n->world;
     uint64_t begin_us = w->now_us;
     n->stepping = true;
@@ -347,8 +318,7 @@ static uint64_t timed_step(struct host_world_node *n, enum node_event *event)
     return passed_us;
 }
 
-static void step(struct host_world *w, unsigned i)
-{
+static void step(struct host_world *w, unsigned i) {
     struct host_world_node *n = &w->node[i];
     bool charged = w->options.used_ns != NULL;
     if (charged && n->node != NULL && n->state == HOST_WORLD_UP &&
@@ -400,8 +370,7 @@ static void step(struct host_world *w, unsigned i)
 
 /* --- time ---------------------------------------------------------------- */
 
-uint64_t host_world_host_due(const struct host_world *world, unsigned host)
-{
+uint64_t host_world_host_due(const struct host_world *world, unsigned host) {
     uint64_t due = UINT64_MAX;
     unsigned place = world->nodes + host;
     for (unsigned d = 0; d < host_sim_cube_links(&world->cube, place); d++) {
@@ -418,8 +387,7 @@ uint64_t host_world_host_due(const struct host_world *world, unsigned host)
 enum what { STRIKE, STEP, SECOND, CONNECT };
 
 static uint64_t next_event(const struct host_world *w, enum what *what,
-                           unsigned *host)
-{
+                           unsigned *host) {
     uint64_t next = w->node[w->heap[0]].wake_us;
     uint64_t connects = next_connection(w, host);
     *what = w->strike_us <= next ? STRIKE : STEP;
@@ -430,8 +398,7 @@ static uint64_t next_event(const struct host_world *w, enum what *what,
     return *what == CONNECT ? connects : next;
 }
 
-static void happen(struct host_world *w, enum what what, unsigned host)
-{
+static void happen(struct host_world *w, enum what what, unsigned host) {
     switch (what) {
     case STRIKE:
         w->strike_us = UINT64_MAX;
@@ -453,8 +420,7 @@ static void happen(struct host_world *w, enum what what, unsigned host)
     }
 }
 
-void host_world_run(struct host_world *world, uint64_t until, bool for_host)
-{
+void host_world_run(struct host_world *world, uint64_t until, bool for_host) {
     struct host_world *w = world;
     while (w->fault == NULL) {
         enum what what;
@@ -476,8 +442,7 @@ void host_world_run(struct host_world *world, uint64_t until, bool for_host)
     }
 }
 
-void host_world_halt(struct host_world *world)
-{
+void host_world_halt(struct host_world *world) {
     for (unsigned i = 0; i < world->nodes; i++) {
         wake_at(world, i, UINT64_MAX);
     }
@@ -485,8 +450,7 @@ void host_world_halt(struct host_world *world)
 
 /* --- from nothing, and back ---------------------------------------------- */
 
-static int open_node(struct host_world *w, unsigned i)
-{
+static int open_node(struct host_world *w, unsigned i) {
     struct host_world_node *n = &w->node[i];
     const struct host_world_options *o = &w->options;
     n->world = w;
@@ -525,8 +489,7 @@ static int open_node(struct host_world *w, unsigned i)
     return 0;
 }
 
-static int open_nodes(struct host_world *w)
-{
+static int open_nodes(struct host_world *w) {
     w->node = calloc(w->nodes, sizeof *w->node);
     w->heap = calloc(w->nodes, sizeof *w->heap);
     w->named = calloc(w->cube.wires, sizeof *w->named);
@@ -547,8 +510,7 @@ static int open_nodes(struct host_world *w)
 
 int host_world_open(struct host_world *world,
                     const struct host_world_options *options,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_world *w = world;
     memset(w, 0, sizeof *w);
     w->options = *options;
@@ -571,8 +533,7 @@ int host_world_open(struct host_world *world,
     return 0;
 }
 
-void host_world_close(struct host_world *world)
-{
+void host_world_close(struct host_world *world) {
     for (unsigned i = 0; world->node != NULL && i < world->nodes; i++) {
         free(world->node[i].board.arena);
     }
@@ -583,8 +544,7 @@ void host_world_close(struct host_world *world)
     world->node = NULL;
 }
 
-const char *host_world_damage(const struct host_world *world)
-{
+const char *host_world_damage(const struct host_world *world) {
     for (unsigned i = 0; i < world->nodes; i++) {
         const struct node_board *b = &world->node[i].board;
         const uint8_t *past = (const uint8_t *)b->arena + b->arena_bytes;

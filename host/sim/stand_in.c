@@ -29,14 +29,12 @@ struct host_stand_in {
     size_t datagram_size;
 };
 
-static uint64_t now_of(const struct host_stand_in *one)
-{
+static uint64_t now_of(const struct host_stand_in *one) {
     return one->board->now_us(one->board->context);
 }
 
 /* The cube as a node has it. */
-static struct cube_config configure(const struct node_board *board)
-{
+static struct cube_config configure(const struct node_board *board) {
     const struct node_identity *who = &board->identity;
     struct cube_config config;
     memset(&config, 0, sizeof config);
@@ -54,15 +52,14 @@ static struct cube_config configure(const struct node_board *board)
 /* --- an idler ------------------------------------------------------------- */
 
 static bool start_idler(struct host_stand_in *one, uint8_t *memory,
-                        size_t bytes)
-{
+                        size_t bytes) {
     struct cube_config config = configure(one->board);
     one->counted.cube = cube_init(memory, bytes, &config);
     return one->counted.cube != NULL;
 }
 
-static void take(struct host_stand_in *one, const struct cube_message *message)
-{
+static void take(struct host_stand_in *one,
+                 const struct cube_message *message) {
     struct node_ping_message ping;
     struct node_setup_message setup;
     if (message->type == NODE_PING && message->size == sizeof ping) {
@@ -81,8 +78,7 @@ static void take(struct host_stand_in *one, const struct cube_message *message)
         message->source == CUBE_HOST && message->type != NODE_STOP;
 }
 
-static bool send_pong(struct host_stand_in *one)
-{
+static bool send_pong(struct host_stand_in *one) {
     const struct cube *cube = one->counted.cube;
     one->pong.start = one->board->identity.epoch;
     one->pong.sent = one->counted.sent;
@@ -97,8 +93,7 @@ static bool send_pong(struct host_stand_in *one)
                               sizeof one->pong) == 0;
 }
 
-static bool send_ready(struct host_stand_in *one)
-{
+static bool send_ready(struct host_stand_in *one) {
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
@@ -107,8 +102,7 @@ static bool send_ready(struct host_stand_in *one)
                               sizeof ready) == 0;
 }
 
-static void follow_wiring(struct host_stand_in *one)
-{
+static void follow_wiring(struct host_stand_in *one) {
     uint32_t generation = cube_wiring(one->counted.cube)->generation;
     if (generation != one->generation) {
         one->generation = generation;
@@ -117,8 +111,7 @@ static void follow_wiring(struct host_stand_in *one)
     }
 }
 
-static enum node_event idle(struct host_stand_in *one)
-{
+static enum node_event idle(struct host_stand_in *one) {
     struct cube *cube = one->counted.cube;
     struct cube_message message;
     unsigned moved = (unsigned)cube_poll(cube, one->now_us);
@@ -145,8 +138,7 @@ static enum node_event idle(struct host_stand_in *one)
 
 /* The links of a cube, which carry no message. */
 static bool start_teller(struct host_stand_in *one, uint8_t *memory,
-                         size_t bytes, const struct cube_wiring *wiring)
-{
+                         size_t bytes, const struct cube_wiring *wiring) {
     struct cube_config config = configure(one->board);
     one->datagram_size = wiring_pack(wiring, one->datagram);
     one->links = cube_links_of(&config);
@@ -164,8 +156,7 @@ static bool start_teller(struct host_stand_in *one, uint8_t *memory,
 }
 
 /* Each neighbour is told until it has said something itself. */
-static enum node_event tell(struct host_stand_in *one)
-{
+static enum node_event tell(struct host_stand_in *one) {
     unsigned moved = 0;
     for (unsigned d = 0; d < one->links; d++) {
         struct link *link = one->link[d];
@@ -195,8 +186,7 @@ static enum node_event tell(struct host_stand_in *one)
 
 struct host_stand_in *
 host_stand_in_start(const struct node_board *board,
-                    const struct host_stand_in_orders *orders)
-{
+                    const struct host_stand_in_orders *orders) {
     size_t own = node_aligned(sizeof(struct host_stand_in));
     if (board->arena_bytes < own) {
         return NULL;
@@ -213,14 +203,12 @@ host_stand_in_start(const struct node_board *board,
     return started ? one : NULL;
 }
 
-enum node_event host_stand_in_step(struct host_stand_in *one)
-{
+enum node_event host_stand_in_step(struct host_stand_in *one) {
     one->now_us = now_of(one);
     return one->counted.cube != NULL ? idle(one) : tell(one);
 }
 
-uint64_t host_stand_in_wait_us(const struct host_stand_in *one)
-{
+uint64_t host_stand_in_wait_us(const struct host_stand_in *one) {
     uint64_t due = IDLE_US_MAX;
     if (one->counted.cube != NULL) {
         uint64_t cube = cube_next_due_us(one->counted.cube, one->now_us);
@@ -234,7 +222,6 @@ uint64_t host_stand_in_wait_us(const struct host_stand_in *one)
     return due < AGAIN_US ? due : AGAIN_US;
 }
 
-unsigned host_stand_in_told(const struct host_stand_in *one)
-{
+unsigned host_stand_in_told(const struct host_stand_in *one) {
     return one->told;
 }

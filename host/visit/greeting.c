@@ -16,8 +16,7 @@ struct listener {
 
 /* An acknowledgement of session 0, which is nobody's, has whoever hears it
  * greet.  A greeting of epoch 0 is passed over. */
-static void make_question(struct listener *l, bool first_hello)
-{
+static void make_question(struct listener *l, bool first_hello) {
     struct frame_header hello = {.kind = LINK_HELLO, .size = LINK_HELLO_SIZE};
     struct frame_header ask = {.kind = LINK_ACK};
     uint8_t payload[LINK_HELLO_SIZE] = {LINK_VERSION};
@@ -31,8 +30,7 @@ static void make_question(struct listener *l, bool first_hello)
     l->due += frame_encode(l->out + l->due, &ask, NULL);
 }
 
-static void take_frame(struct listener *l, const uint8_t *bytes, size_t size)
-{
+static void take_frame(struct listener *l, const uint8_t *bytes, size_t size) {
     struct host_greeting *g = l->greeting;
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
@@ -51,8 +49,7 @@ static void take_frame(struct listener *l, const uint8_t *bytes, size_t size)
     }
 }
 
-static void hear(struct listener *l, const struct link_pipe *pipe)
-{
+static void hear(struct listener *l, const struct link_pipe *pipe) {
     int got =
         pipe->receive(pipe->context, l->in + l->heard, sizeof l->in - l->heard);
     size_t begin = 0;
@@ -76,8 +73,7 @@ static void hear(struct listener *l, const struct link_pipe *pipe)
 
 void host_greeting_wait(struct host_greeting *greeting,
                         const struct host_machine *machine, bool first_hello,
-                        uint64_t wait_us)
-{
+                        uint64_t wait_us) {
     struct listener l;
     uint64_t begun_us = machine->now_us(machine->context), now_us = begun_us,
              asked_us = 0;

@@ -47,8 +47,7 @@ static const struct argp_option site_rows[] = {
     {0}};
 
 void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
-                     const struct argp_option *own)
-{
+                     const struct argp_option *own) {
     unsigned count = sizeof site_rows / sizeof site_rows[0] - 1;
     memcpy(rows, site_rows, sizeof site_rows);
     for (; own->name != NULL || own->doc != NULL; own++) {
@@ -59,8 +58,7 @@ void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
 }
 
 error_t host_site_option(struct host_site_options *options, int key,
-                         char *value, struct host_error *error)
-{
+                         char *value, struct host_error *error) {
     switch (key) {
     case KEY_CUBE:
         options->cube = value;
@@ -94,8 +92,7 @@ error_t host_site_option(struct host_site_options *options, int key,
 }
 
 int host_site_check(const struct host_site_options *options,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     const struct host_site_options *o = options;
     int places = (o->cube != NULL) + (o->port != NULL) + (o->tcp != NULL) +
                  (o->unix_path != NULL);
@@ -132,8 +129,7 @@ int host_site_check(const struct host_site_options *options,
 
 /* " NAME VALUE", or false: it does not fit. */
 static bool put_word(char *text, size_t size, const char *name,
-                     const char *value)
-{
+                     const char *value) {
     size_t used = strlen(text);
     int head = snprintf(text + used, size - used, "%s--%s%s",
                         used == 0 ? "" : " ", name, value == NULL ? "" : " ");
@@ -144,8 +140,7 @@ static bool put_word(char *text, size_t size, const char *name,
 }
 
 void host_site_text(const struct host_site_options *options, char *text,
-                    size_t size)
-{
+                    size_t size) {
     const struct host_site_options *o = options;
     char nodes[24], baud[24];
     snprintf(nodes, sizeof nodes, "%u", o->nodes);
@@ -175,8 +170,7 @@ void host_site_text(const struct host_site_options *options, char *text,
 /* --- a wire instead of a file --------------------------------------------- */
 
 static int read_key(struct host_cube_file *file, const char *path,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     enum key_file_state state = key_file_read(path, file->key);
     int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
     struct key_file_text fault = key_file_text(state);
@@ -195,8 +189,7 @@ static int read_key(struct host_cube_file *file, const char *path,
 
 static int take_address(struct host_cube_wire *wire,
                         const struct host_site_options *o,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     char why[400];
     if (o->unix_path != NULL) {
         return tcp_address_set_path(&wire->via, o->unix_path) == 0
@@ -214,8 +207,7 @@ static int take_address(struct host_cube_wire *wire,
 
 /* One wire, to node 0 of a cube of which nothing is known yet. */
 static int make_file(struct host_site *site, const struct host_site_options *o,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_cube_file *file = &site->file;
     struct host_cube_wire *wire = calloc(1, sizeof *wire);
     memset(file, 0, sizeof *file);
@@ -258,15 +250,13 @@ static int make_file(struct host_site *site, const struct host_site_options *o,
     return o->key == NULL ? 0 : read_key(file, o->key, error);
 }
 
-static void pass_over(const char *text)
-{
+static void pass_over(const char *text) {
     (void)text;
 }
 
 /* What it notes is noted when it is opened. */
 int host_site_read(const struct host_site_options *options,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     static struct host_cube_file file;
     memset(&file, 0, sizeof file);
     host_note_to(pass_over);
@@ -280,8 +270,7 @@ int host_site_read(const struct host_site_options *options,
     return error->code;
 }
 
-static void set_nodes(struct host_cube_file *file, unsigned dimension)
-{
+static void set_nodes(struct host_cube_file *file, unsigned dimension) {
     file->dimension = dimension;
     file->nodes = 1u << dimension;
     for (unsigned i = 0; i < file->nodes; i++) {
@@ -291,8 +280,7 @@ static void set_nodes(struct host_cube_file *file, unsigned dimension)
 
 /* Nobody has greeted: why, as far as it is known. */
 static int fail_silent(struct host_site *site, const struct host_greeting *g,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     const struct host_machine machine = host_remote_machine(&site->remote);
     const char *doubt = machine.doubt(machine.context, 0);
     if (doubt != NULL) {
@@ -320,8 +308,7 @@ static int fail_silent(struct host_site *site, const struct host_greeting *g,
 static int take_greeting(struct host_site *site,
                          const struct host_site_options *o,
                          const struct host_greeting *g,
-                         struct host_error *error)
-{
+                         struct host_error *error) {
     struct host_cube_file *file = &site->file;
     if (g->found && (g->node != 0 || g->peer_node != CUBE_HOST)) {
         return host_fail(error, HOST_CUBE,
@@ -355,8 +342,7 @@ static int take_greeting(struct host_site *site,
 }
 
 static int open_wire(struct host_site *site, const struct host_site_options *o,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_greeting greeting;
     if (make_file(site, o, error) != 0 ||
         host_remote_start(&site->remote, &site->file, "", error) != 0) {
@@ -374,8 +360,7 @@ static int open_wire(struct host_site *site, const struct host_site_options *o,
 }
 
 static int open_file(struct host_site *site, const struct host_site_options *o,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     if (host_cube_file_read(&site->file, o->cube, error) != 0) {
         return error->code;
     }
@@ -391,8 +376,7 @@ static int open_file(struct host_site *site, const struct host_site_options *o,
 
 int host_site_open(struct host_site *site,
                    const struct host_site_options *options,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     memset(site, 0, sizeof *site);
     int status = host_site_check(options, error);
     if (status == 0) {
@@ -407,8 +391,7 @@ int host_site_open(struct host_site *site,
     return status;
 }
 
-void host_site_close(struct host_site *site)
-{
+void host_site_close(struct host_site *site) {
     host_remote_stop(&site->remote);
     host_cube_file_free(&site->file); /* and wipes the key */
 }

@@ -24,14 +24,12 @@ enum {
     OUTDONE_MAX = 64
 };
 
-static struct host_visit_node *node_of(struct host_visit *v, unsigned i)
-{
+static struct host_visit_node *node_of(struct host_visit *v, unsigned i) {
     return &v->node[i];
 }
 
 /* In which all nodes are pinged once. */
-static uint64_t ping_round_us(const struct host_visit *v)
-{
+static uint64_t ping_round_us(const struct host_visit *v) {
     const struct host_machine *m = v->machine;
     uint64_t one = PING_A_NODE_US;
     if (m->serial_baud != 0) {
@@ -47,15 +45,13 @@ static uint64_t ping_round_us(const struct host_visit *v)
 }
 
 /* The longest of late. */
-static void note_rtt(struct host_visit *v, uint64_t us)
-{
+static void note_rtt(struct host_visit *v, uint64_t us) {
     uint64_t late = v->pong_rtt_us - v->pong_rtt_us / v->machine->nodes / 2;
     v->pong_rtt_us = us > late ? us : late;
 }
 
 int host_visit_open(struct host_visit *visit, struct host_machine *machine,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     struct host_visit *v = visit;
     unsigned nodes = machine->nodes;
     memset(v, 0, sizeof *v);
@@ -84,8 +80,7 @@ int host_visit_open(struct host_visit *visit, struct host_machine *machine,
 /* --- what nodes say ------------------------------------------------------- */
 
 /* A start that was not known. */
-static void begin_start(struct host_visit *v, unsigned i, uint32_t start)
-{
+static void begin_start(struct host_visit *v, unsigned i, uint32_t start) {
     struct host_visit_node *node = node_of(v, i);
     node->starts++;
     node->start = start;
@@ -97,16 +92,15 @@ static void begin_start(struct host_visit *v, unsigned i, uint32_t start)
 }
 
 /* What is known of a link, both ends know. */
-static void note_links(struct host_visit *v, unsigned i, uint32_t seen)
-{
+static void note_links(struct host_visit *v, unsigned i, uint32_t seen) {
     node_of(v, i)->links |= seen;
     for (unsigned d = 0; d < v->machine->dimension; d++) {
         node_of(v, i ^ 1u << d)->links |= seen & (uint32_t)1 << d;
     }
 }
 
-static void take_pong(struct host_visit *v, const struct cube_message *message)
-{
+static void take_pong(struct host_visit *v,
+                      const struct cube_message *message) {
     struct node_pong_message pong;
     struct host_visit_node *node = node_of(v, message->source);
     if (message->size != sizeof pong) {
@@ -135,8 +129,7 @@ static void take_pong(struct host_visit *v, const struct cube_message *message)
 
 /* Of another version of the program the first field alone is known. */
 static void take_who(struct host_visit *v, unsigned i, const uint8_t *data,
-                     size_t size)
-{
+                     size_t size) {
     struct host_visit_node *node = node_of(v, i);
     struct node_who who;
     memset(&who, 0, sizeof who);
@@ -158,8 +151,7 @@ static void take_who(struct host_visit *v, unsigned i, const uint8_t *data,
 }
 
 static void take_answer(struct host_visit *v,
-                        const struct cube_message *message)
-{
+                        const struct cube_message *message) {
     struct host_visit_node *node = node_of(v, message->source);
     struct node_answer_head head;
     if (message->size < sizeof head) {
@@ -188,8 +180,7 @@ static void take_answer(struct host_visit *v,
 }
 
 static void take_message(struct host_visit *v,
-                         const struct cube_message *message)
-{
+                         const struct cube_message *message) {
     if (message->source >= v->machine->nodes) {
         return;
     }
@@ -210,21 +201,18 @@ static void take_message(struct host_visit *v,
 
 /* What is wanted `now`, or has been asked and is `still` open for too long. */
 static bool is_due(bool now, bool still, uint64_t asked_us, uint64_t again_us,
-                   uint64_t now_us)
-{
+                   uint64_t now_us) {
     return now || (still && now_us - asked_us >= again_us);
 }
 
 /* Not while the answer may be on its way. */
-static uint64_t again_us(const struct host_visit *v, uint64_t us)
-{
+static uint64_t again_us(const struct host_visit *v, uint64_t us) {
     uint64_t late = 2 * v->pong_rtt_us;
     late = late < WHO_AGAIN_US_MAX ? late : WHO_AGAIN_US_MAX;
     return us < late ? late : us;
 }
 
-static void find_due(struct host_visit *v, unsigned i)
-{
+static void find_due(struct host_visit *v, unsigned i) {
     struct host_visit_node *node = node_of(v, i);
     bool asked = host_node_set_has(&v->wanted, i);
     node->who_due = is_due(node->who_due, !node->there, node->who_us,
@@ -236,22 +224,19 @@ static void find_due(struct host_visit *v, unsigned i)
 }
 
 static bool write_question(struct host_visit *v, unsigned i, uint32_t tag,
-                           uint32_t what, uint32_t target)
-{
+                           uint32_t what, uint32_t target) {
     struct node_question_message question = {tag, what, target};
     return cube_write(v->cube, (uint16_t)i, NODE_QUESTION, &question,
                       sizeof question) == 0;
 }
 
-static bool write_ping(struct host_visit *v, unsigned i)
-{
+static bool write_ping(struct host_visit *v, unsigned i) {
     struct node_ping_message ping = {0};
     return cube_write(v->cube, (uint16_t)i, NODE_PING, &ping, sizeof ping) == 0;
 }
 
 /* Sends what is due to a node; how much. */
-static unsigned serve(struct host_visit *v, unsigned i)
-{
+static unsigned serve(struct host_visit *v, unsigned i) {
     struct host_visit_node *node = node_of(v, i);
     unsigned sent = 0;
     if (node->who_due &&
@@ -285,8 +270,7 @@ static unsigned serve(struct host_visit *v, unsigned i)
     return sent;
 }
 
-static unsigned serve_all(struct host_visit *v)
-{
+static unsigned serve_all(struct host_visit *v) {
     unsigned sent = 0, nodes = v->machine->nodes;
     for (unsigned k = 0; k < nodes; k++) {
         unsigned i = (v->turn + k) % nodes;
@@ -300,8 +284,7 @@ static unsigned serve_all(struct host_visit *v)
 }
 
 /* Each node once a round, one after the other. */
-static void ping_in_turn(struct host_visit *v)
-{
+static void ping_in_turn(struct host_visit *v) {
     uint64_t every = ping_round_us(v) / v->machine->nodes;
     unsigned most = v->machine->nodes;
     for (; most > 0 && v->now_us - v->ping_us >= every; most--) {
@@ -317,8 +300,7 @@ static void ping_in_turn(struct host_visit *v)
 
 /* --- rounds --------------------------------------------------------------- */
 
-static int check_outdone(const struct host_visit *v, struct host_error *error)
-{
+static int check_outdone(const struct host_visit *v, struct host_error *error) {
     return cube_statistics(v->cube)->outdone <= OUTDONE_MAX
                ? 0
                : host_fail(error, HOST_CUBE,
@@ -330,8 +312,7 @@ static int check_outdone(const struct host_visit *v, struct host_error *error)
 }
 
 /* Whether another host has the cube, which may have died just before. */
-static int check_use(struct host_visit *v, struct host_error *error)
-{
+static int check_use(struct host_visit *v, struct host_error *error) {
     enum host_in_use_state use = host_in_use_look(
         &v->use, v->machine, cube_link_peer(v->cube, host_visit_wire(v)),
         v->now_us);
@@ -343,8 +324,7 @@ static int check_use(struct host_visit *v, struct host_error *error)
     return 0;
 }
 
-static int check(struct host_visit *v, struct host_error *error)
-{
+static int check(struct host_visit *v, struct host_error *error) {
     if (v->now_us - v->check_us < CHECK_EVERY_US) {
         return 0;
     }
@@ -364,8 +344,7 @@ static int check(struct host_visit *v, struct host_error *error)
     return 0;
 }
 
-static void look_out(struct host_visit *v)
-{
+static void look_out(struct host_visit *v) {
     static const struct host_onlookers_progress none;
     host_onlooking_look(&v->onlooking, v->machine, v->now_us, &none);
     for (unsigned i = 0; v->onlooking.asked && i < v->machine->nodes; i++) {
@@ -376,8 +355,7 @@ static void look_out(struct host_visit *v)
 }
 
 int host_visit_round(struct host_visit *visit, uint64_t wait_us,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct host_visit *v = visit;
     const struct host_machine *m = v->machine;
     struct cube_message message;
@@ -405,15 +383,13 @@ int host_visit_round(struct host_visit *visit, uint64_t wait_us,
 }
 
 bool host_visit_send(struct host_visit *visit, uint16_t dest, uint8_t type,
-                     const void *data, size_t size)
-{
+                     const void *data, size_t size) {
     return cube_write(visit->cube, dest, type, data, size) == 0;
 }
 
 int host_visit_restart(struct host_visit *visit,
                        const struct host_node_set *set, enum node_restart what,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     struct host_visit *v = visit;
     struct node_restart_message restart = {(uint32_t)what};
     uint64_t begun_us = v->now_us;
@@ -433,8 +409,7 @@ int host_visit_restart(struct host_visit *visit,
 /* --- leaving -------------------------------------------------------------- */
 
 /* The host's wires at whose end somebody is. */
-static uint32_t links_up(const struct host_visit *v)
-{
+static uint32_t links_up(const struct host_visit *v) {
     uint32_t up = 0;
     for (unsigned d = 0; d < cube_links(v->cube); d++) {
         up |= (uint32_t)(cube_link_state(v->cube, d) == LINK_UP) << d;
@@ -443,8 +418,7 @@ static uint32_t links_up(const struct host_visit *v)
 }
 
 /* Whether one of those has not heard the farewell. */
-static bool parting(const struct host_visit *v, uint32_t links)
-{
+static bool parting(const struct host_visit *v, uint32_t links) {
     for (unsigned d = 0; d < cube_links(v->cube); d++) {
         if ((links >> d & 1) != 0 &&
             cube_link_state(v->cube, d) == LINK_CLOSING) {
@@ -456,8 +430,7 @@ static bool parting(const struct host_visit *v, uint32_t links)
 
 /* What waits for nodes that take nothing would hold up the farewell: it is
  * dropped. */
-static void part(struct host_visit *v)
-{
+static void part(struct host_visit *v) {
     const struct host_machine *m = v->machine;
     struct cube_message message;
     uint32_t up = links_up(v);
@@ -477,8 +450,7 @@ static void part(struct host_visit *v)
     }
 }
 
-void host_visit_close(struct host_visit *visit)
-{
+void host_visit_close(struct host_visit *visit) {
     struct host_visit *v = visit;
     if (v->cube != NULL) {
         part(v);

@@ -8,8 +8,7 @@
 
 /* A neighbour that has met somebody with another key where the node should be;
  * -1: none has. */
-static int refused_by(const struct host_visit *v, unsigned node)
-{
+static int refused_by(const struct host_visit *v, unsigned node) {
     for (unsigned d = 0; d < v->machine->dimension; d++) {
         if ((v->node[node ^ 1u << d].refused >> d & 1) != 0) {
             return (int)(node ^ 1u << d);
@@ -20,8 +19,7 @@ static int refused_by(const struct host_visit *v, unsigned node)
 
 /* A wrong wire that should lead to the node, or does. */
 static const struct cube_wrong *wrong_at(const struct host_visit *v,
-                                         unsigned node)
-{
+                                         unsigned node) {
     for (unsigned i = 0; i < v->wrong_count; i++) {
         const struct cube_wrong *w = &v->wrong[i];
         bool to = w->node < v->machine->nodes &&
@@ -36,8 +34,7 @@ static const struct cube_wrong *wrong_at(const struct host_visit *v,
 
 static void describe_wrong(const struct host_visit *v,
                            const struct cube_wrong *wrong, char *text,
-                           size_t size)
-{
+                           size_t size) {
     char fault[CUBE_FAULT_BYTES];
     struct cube_config config = {.dimension = (uint8_t)v->machine->dimension,
                                  .spare_node = v->machine->spare_node,
@@ -51,8 +48,7 @@ static void describe_wrong(const struct host_visit *v,
 
 /* The nearest node on the way from the gateway that is not there: what is
  * behind it cannot be heard. */
-static unsigned first_missing(const struct host_visit *v, unsigned node)
-{
+static unsigned first_missing(const struct host_visit *v, unsigned node) {
     unsigned at = cube_wiring(v->cube)->gateway, away = at ^ node;
     for (unsigned d = 0; away >> d != 0; d++) {
         if (!v->node[at].there) {
@@ -64,8 +60,7 @@ static unsigned first_missing(const struct host_visit *v, unsigned node)
 }
 
 const char *host_visit_reason(const struct host_visit *visit, unsigned node,
-                              char *text, size_t size)
-{
+                              char *text, size_t size) {
     const struct host_visit *v = visit;
     const struct host_machine *m = v->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
@@ -115,28 +110,24 @@ const char *host_visit_reason(const struct host_visit *visit, unsigned node,
 
 /* --- wires ---------------------------------------------------------------- */
 
-static bool has_host_port(const struct host_machine *m, unsigned node)
-{
+static bool has_host_port(const struct host_machine *m, unsigned node) {
     return m->host_ports > 1
                ? node < m->host_ports
                : node == 0 || (m->spare_node != 0 && node == m->spare_node);
 }
 
-unsigned host_visit_links(const struct host_visit *visit, unsigned node)
-{
+unsigned host_visit_links(const struct host_visit *visit, unsigned node) {
     return visit->machine->dimension +
            (has_host_port(visit->machine, node) ? 1 : 0);
 }
 
-unsigned host_visit_links_up(const struct host_visit *visit, unsigned node)
-{
+unsigned host_visit_links_up(const struct host_visit *visit, unsigned node) {
     const struct host_visit_node *n = &visit->node[node];
     return (unsigned)__builtin_popcount(n->seen & ~n->silent);
 }
 
 /* What an end that is there says of a link: it never was up, or is silent. */
-static bool is_down(const struct host_visit *v, unsigned node, unsigned link)
-{
+static bool is_down(const struct host_visit *v, unsigned node, unsigned link) {
     const struct host_visit_node *n = &v->node[node];
     return n->pong_us != 0 && ((n->seen & ~n->silent) >> link & 1) == 0;
 }
@@ -144,8 +135,7 @@ static bool is_down(const struct host_visit *v, unsigned node, unsigned link)
 /* Why a wire between two nodes that are there does not work; false: it does, or
  * is told of as wrong. */
 static bool describe_wire(const struct host_visit *v, unsigned node,
-                          unsigned link, char *text, size_t size)
-{
+                          unsigned link, char *text, size_t size) {
     unsigned other = node ^ 1u << link;
     const struct host_visit_node *one = &v->node[node], *two = &v->node[other];
     if (!is_down(v, node, link) && !is_down(v, other, link)) {
@@ -171,16 +161,15 @@ static bool describe_wire(const struct host_visit *v, unsigned node,
 
 /* Whether what the node has said of its wires is as late as that; who is silent
  * will say no more. */
-static bool is_old(const struct host_visit *v, unsigned node, uint64_t age_us)
-{
+static bool is_old(const struct host_visit *v, unsigned node, uint64_t age_us) {
     const struct host_visit_node *n = &v->node[node];
     uint64_t since_us = n->born_us > v->opened_us ? n->born_us : v->opened_us;
     return !n->heard ||
            (n->pong_us >= since_us && n->pong_us - since_us >= age_us);
 }
 
-bool host_visit_faults_are_old(const struct host_visit *visit, uint64_t age_us)
-{
+bool host_visit_faults_are_old(const struct host_visit *visit,
+                               uint64_t age_us) {
     const struct host_visit *v = visit;
     if (v->now_us - v->opened_us < age_us) {
         return false; /* wrong wires are told of by others */
@@ -201,8 +190,7 @@ bool host_visit_faults_are_old(const struct host_visit *visit, uint64_t age_us)
 unsigned host_visit_faults(const struct host_visit *visit,
                            void (*tell)(void *context, unsigned node,
                                         unsigned link, const char *text),
-                           void *context)
-{
+                           void *context) {
     const struct host_visit *v = visit;
     char text[240];
     for (unsigned i = 0; i < v->wrong_count && tell != NULL; i++) {

@@ -15,8 +15,7 @@ enum {
 static int until(struct host_visit *v, uint64_t wait_us,
                  bool (*done)(const struct host_visit *v,
                               const struct host_node_set *set),
-                 const struct host_node_set *set, struct host_error *error)
-{
+                 const struct host_node_set *set, struct host_error *error) {
     uint64_t begun_us = v->machine->now_us(v->machine->context);
     v->now_us = begun_us;
     while (!done(v, set) && v->now_us - begun_us < wait_us) {
@@ -28,8 +27,7 @@ static int until(struct host_visit *v, uint64_t wait_us,
 }
 
 static bool all_there(const struct host_visit *v,
-                      const struct host_node_set *set)
-{
+                      const struct host_node_set *set) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         if (host_node_set_has(set, i) && !v->node[i].there) {
             return false;
@@ -39,8 +37,7 @@ static bool all_there(const struct host_visit *v,
 }
 
 int host_visit_wait(struct host_visit *visit, const struct host_node_set *set,
-                    uint64_t wait_us, struct host_error *error)
-{
+                    uint64_t wait_us, struct host_error *error) {
     bool was;
     int status;
     do { /* a round fails within 9 s where the other host stays */
@@ -52,8 +49,7 @@ int host_visit_wait(struct host_visit *visit, const struct host_node_set *set,
 
 /* A wire that was found dead may be one on the way round which others come. */
 static bool all_settled(const struct host_visit *v,
-                        const struct host_node_set *set)
-{
+                        const struct host_node_set *set) {
     bool late = v->now_us - v->began_us >= SETTLED_US;
     enum link_state wire = cube_link_state(v->cube, host_visit_wire(v));
     if (wire != LINK_UP && !v->in_use &&
@@ -71,14 +67,12 @@ static bool all_settled(const struct host_visit *v,
 }
 
 int host_visit_settle(struct host_visit *visit, const struct host_node_set *set,
-                      uint64_t wait_us, struct host_error *error)
-{
+                      uint64_t wait_us, struct host_error *error) {
     return until(visit, wait_us, all_settled, set, error);
 }
 
 static bool wires_settled(const struct host_visit *v,
-                          const struct host_node_set *set)
-{
+                          const struct host_node_set *set) {
     (void)set;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         const struct host_visit_node *node = &v->node[i];
@@ -91,14 +85,12 @@ static bool wires_settled(const struct host_visit *v,
 }
 
 int host_visit_settle_wires(struct host_visit *visit, uint64_t wait_us,
-                            struct host_error *error)
-{
+                            struct host_error *error) {
     return until(visit, wait_us, wires_settled, NULL, error);
 }
 
 static bool all_answered(const struct host_visit *v,
-                         const struct host_node_set *set)
-{
+                         const struct host_node_set *set) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         if (host_node_set_has(set, i) && !v->node[i].answered &&
             cube_reaches(v->cube, (uint16_t)i)) {
@@ -110,8 +102,7 @@ static bool all_answered(const struct host_visit *v,
 
 int host_visit_ask(struct host_visit *visit, const struct host_node_set *set,
                    enum node_question what, unsigned target, uint64_t wait_us,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct host_visit *v = visit;
     v->tag =
         v->tag + 1 == HOST_ONLOOKERS_TAG ? HOST_VISIT_WHO_TAG + 1 : v->tag + 1;

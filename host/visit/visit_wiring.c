@@ -16,19 +16,16 @@ enum {
     WIRE_US = 4000000       /* down, and the other wire of the host's is used */
 };
 
-static uint32_t bit_of(unsigned link)
-{
+static uint32_t bit_of(unsigned link) {
     return (uint32_t)1 << link;
 }
 
-unsigned host_visit_wire(const struct host_visit *visit)
-{
+unsigned host_visit_wire(const struct host_visit *visit) {
     uint16_t gateway = cube_wiring(visit->cube)->gateway;
     return gateway != 0 && gateway == visit->machine->spare_node ? 1 : 0;
 }
 
-void host_visit_wiring_begin(struct host_visit *visit)
-{
+void host_visit_wiring_begin(struct host_visit *visit) {
     struct host_visit *v = visit;
     v->generation = cube_wiring(v->cube)->generation;
     v->began_us = v->evidence_us = v->now_us;
@@ -46,8 +43,7 @@ void host_visit_wiring_begin(struct host_visit *visit)
 /* --- what is dead --------------------------------------------------------- */
 
 static void add(struct host_visit *v, uint32_t *dead, unsigned node,
-                unsigned link)
-{
+                unsigned link) {
     if (node < v->machine->nodes && link < v->machine->dimension) {
         dead[node] |= bit_of(link);
         dead[node ^ 1u << link] |= bit_of(link);
@@ -55,8 +51,7 @@ static void add(struct host_visit *v, uint32_t *dead, unsigned node,
 }
 
 /* What nodes have found since this generation began. */
-static void add_found(struct host_visit *v, uint32_t *dead)
-{
+static void add_found(struct host_visit *v, uint32_t *dead) {
     const struct cube_wiring *w = cube_wiring(v->cube);
     for (unsigned i = w->settled; i < w->dead_count; i++) {
         if (w->dead[i].dimension != CUBE_WHOLE_NODE) {
@@ -69,8 +64,7 @@ static void add_found(struct host_visit *v, uint32_t *dead)
 }
 
 /* What nodes call silent for long enough. */
-static void add_silent(struct host_visit *v, uint32_t *dead)
-{
+static void add_silent(struct host_visit *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         const struct host_visit_node *node = &v->node[i];
         for (unsigned d = 0; d < v->machine->dimension; d++) {
@@ -83,8 +77,7 @@ static void add_silent(struct host_visit *v, uint32_t *dead)
 }
 
 /* What an end of a link says of it: 1 alive, -1 not, 0 nothing yet. */
-static int says(const struct host_visit *v, unsigned node, unsigned link)
-{
+static int says(const struct host_visit *v, unsigned node, unsigned link) {
     const struct host_visit_node *n = &v->node[node];
     if (n->pong_us == 0 || n->pong_us - v->began_us < ALIVE_US) {
         return 0;
@@ -92,8 +85,7 @@ static int says(const struct host_visit *v, unsigned node, unsigned link)
     return (n->seen & ~n->silent & bit_of(link)) != 0 ? 1 : -1;
 }
 
-static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link)
-{
+static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link) {
     for (unsigned i = 0; i < v->wrong_count; i++) {
         if (v->wrong[i].node == node && v->wrong[i].link == link) {
             return true;
@@ -104,8 +96,8 @@ static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link)
 
 /* Whether a link that was dead is still: nobody says that it is alive, or an
  * end says that it is not. */
-static bool stays_dead(const struct host_visit *v, unsigned node, unsigned link)
-{
+static bool stays_dead(const struct host_visit *v, unsigned node,
+                       unsigned link) {
     unsigned other = node ^ 1u << link;
     int one = says(v, node, link), two = says(v, other, link);
     return one < 0 || two < 0 || (one == 0 && two == 0) ||
@@ -113,8 +105,7 @@ static bool stays_dead(const struct host_visit *v, unsigned node, unsigned link)
 }
 
 /* By all that is known now. */
-static void find_dead(struct host_visit *v, uint32_t *dead)
-{
+static void find_dead(struct host_visit *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         dead[i] = 0;
         for (unsigned d = 0; d < v->machine->dimension; d++) {
@@ -133,8 +124,7 @@ static void find_dead(struct host_visit *v, uint32_t *dead)
  * so as a whole, where nobody knows of a link to it that is not: the wiring has
  * room for few. */
 static bool is_whole(const struct host_visit *v, const uint32_t *dead,
-                     unsigned node)
-{
+                     unsigned node) {
     bool whole = v->node[node].pong_us == 0 &&
                  node != cube_wiring(v->cube)->gateway &&
                  __builtin_popcount(dead[node]) >= 2;
@@ -146,8 +136,7 @@ static bool is_whole(const struct host_visit *v, const uint32_t *dead,
 }
 
 /* All links of such nodes: what is said of one brings it back. */
-static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole)
-{
+static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         whole[i] = is_whole(v, dead, i);
     }
@@ -159,8 +148,7 @@ static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole)
 }
 
 static void settle(struct host_visit *v, uint32_t *dead,
-                   struct cube_wiring *next)
-{
+                   struct cube_wiring *next) {
     unsigned dimension = v->machine->dimension;
     bool whole[HOST_NODES_MAX];
     add_whole(v, dead, whole);
@@ -184,8 +172,7 @@ static void settle(struct host_visit *v, uint32_t *dead,
 }
 
 /* The gateway's wire is down, and the other one works. */
-static uint16_t choose_gateway(struct host_visit *v)
-{
+static uint16_t choose_gateway(struct host_visit *v) {
     unsigned wire = host_visit_wire(v);
     uint16_t gateway = cube_wiring(v->cube)->gateway;
     enum link_state state = cube_link_state(v->cube, wire);
@@ -199,8 +186,7 @@ static uint16_t choose_gateway(struct host_visit *v)
                                                       : 0;
 }
 
-static void begin(struct host_visit *v, uint32_t *dead, uint16_t gateway)
-{
+static void begin(struct host_visit *v, uint32_t *dead, uint16_t gateway) {
     struct cube_wiring next = *cube_wiring(v->cube);
     next.gateway = gateway;
     next.absent_s = HOST_VISIT_ABSENT_S;
@@ -214,8 +200,7 @@ static void begin(struct host_visit *v, uint32_t *dead, uint16_t gateway)
     host_visit_wiring_begin(v);
 }
 
-void host_visit_wiring_renew(struct host_visit *visit)
-{
+void host_visit_wiring_renew(struct host_visit *visit) {
     uint32_t dead[HOST_NODES_MAX];
     find_dead(visit, dead);
     begin(visit, dead, choose_gateway(visit));
@@ -223,8 +208,7 @@ void host_visit_wiring_renew(struct host_visit *visit)
 
 /* The wiring keeps its wrong wires for as long as a generation lasts, and a new
  * one has none for a moment. */
-static void look_for_wrong(struct host_visit *v)
-{
+static void look_for_wrong(struct host_visit *v) {
     const struct cube_wiring *w = cube_wiring(v->cube);
     if (w->wrong_count > 0 || v->now_us - v->began_us > NEWS_US) {
         memcpy(v->wrong, w->wrong, w->wrong_count * sizeof w->wrong[0]);
@@ -232,8 +216,7 @@ static void look_for_wrong(struct host_visit *v)
     }
 }
 
-void host_visit_wiring_look(struct host_visit *visit)
-{
+void host_visit_wiring_look(struct host_visit *visit) {
     struct host_visit *v = visit;
     uint32_t dead[HOST_NODES_MAX];
     uint16_t gateway = choose_gateway(v);

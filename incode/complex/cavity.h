@@ -51,13 +51,11 @@ incode_complex_insert_large(struct incode_complex *x,
                             struct incode_tally *tally, uint32_t v,
                             uint32_t first);
 
-static inline unsigned incode_cell_mark(const struct incode_cell *c)
-{
+static inline unsigned incode_cell_mark(const struct incode_cell *c) {
     return c->flags & (unsigned)INCODE_CELL_MARK;
 }
 
-static inline void incode_cell_unmark(struct incode_cell *c)
-{
+static inline void incode_cell_unmark(struct incode_cell *c) {
     c->flags &= (uint8_t)~INCODE_CELL_MARK;
 }
 

@@ -10,8 +10,7 @@ enum { INFINITE = INCODE_COMPLEX_INFINITE, FIRST = INCODE_COMPLEX_CELLS_FIRST };
 
 /* ---- memory ---- */
 
-void incode_complex_init(struct incode_complex *x, void *memory, size_t bytes)
-{
+void incode_complex_init(struct incode_complex *x, void *memory, size_t bytes) {
     memset(x, 0, sizeof *x);
     x->point = memory;
     x->bytes = bytes / 8 * 8;
@@ -20,15 +19,13 @@ void incode_complex_init(struct incode_complex *x, void *memory, size_t bytes)
     incode_complex_clear(x);
 }
 
-void incode_complex_reserve(struct incode_complex *x, uint32_t points)
-{
+void incode_complex_reserve(struct incode_complex *x, uint32_t points) {
     x->points_kept = points;
 }
 
 /* Whether so many more points and cells fit. */
 bool incode_complex_has_room(const struct incode_complex *x, uint32_t points,
-                             uint32_t cells)
-{
+                             uint32_t cells) {
     uint32_t fresh = cells > x->free_count ? cells - x->free_count : 0;
     uint32_t all = x->points + points;
     all = all < x->points_kept ? x->points_kept : all;
@@ -39,8 +36,7 @@ bool incode_complex_has_room(const struct incode_complex *x, uint32_t points,
            x->cells + fresh <= INCODE_COMPLEX_CELLS_MAX;
 }
 
-uint32_t incode_complex_take_cell(struct incode_complex *x)
-{
+uint32_t incode_complex_take_cell(struct incode_complex *x) {
     uint32_t i = x->free;
     if (x->free_count == 0)
         return x->cells++;
@@ -49,8 +45,7 @@ uint32_t incode_complex_take_cell(struct incode_complex *x)
     return i;
 }
 
-void incode_complex_free_cell(struct incode_complex *x, uint32_t i)
-{
+void incode_complex_free_cell(struct incode_complex *x, uint32_t i) {
     struct incode_cell *c = incode_complex_cell(x, i);
     c->v[0] = c->v[1];
     incode_cell_join(c, 0, x->free);
@@ -59,8 +54,7 @@ void incode_complex_free_cell(struct incode_complex *x, uint32_t i)
 }
 
 uint32_t incode_complex_add(struct incode_complex *x, const double p[3],
-                            uint32_t id)
-{
+                            uint32_t id) {
     uint32_t v = x->free_point;
     if (v == 0 && !incode_complex_has_room(x, 1, 0))
         return INCODE_NONE;
@@ -75,8 +69,7 @@ uint32_t incode_complex_add(struct incode_complex *x, const double p[3],
     return v;
 }
 
-void incode_complex_clear(struct incode_complex *x)
-{
+void incode_complex_clear(struct incode_complex *x) {
     const double nowhere[3] = {0, 0, 0};
     x->points = x->cells = x->free_count = 0;
     x->free_point = 0;
@@ -86,8 +79,7 @@ void incode_complex_clear(struct incode_complex *x)
 /* ---- the first cells ---- */
 
 /* What stands for released cells: infinite, and nothing is known of it. */
-static void set_gone(struct incode_complex *x)
-{
+static void set_gone(struct incode_complex *x) {
     for (uint32_t i = 0; i < FIRST; i++) {
         struct incode_cell *c = incode_complex_cell(x, i);
         memset(c, 0, sizeof *c);
@@ -99,8 +91,7 @@ static void set_gone(struct incode_complex *x)
 }
 
 /* Brings the last vertex elsewhere. */
-static void rotate(struct incode_cell *c)
-{
+static void rotate(struct incode_cell *c) {
     struct incode_cell d = *c;
     for (unsigned i = 0; i < 4; i++) {
         /* 0 1 2 3 to 3 0 2 1 */
@@ -111,8 +102,7 @@ static void rotate(struct incode_cell *c)
 }
 
 bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
-                          const uint32_t four[4])
-{
+                          const uint32_t four[4]) {
     struct incode_complex_point *v = x->point;
     int sign = incode_orient3d(tally, v[four[0]].p, v[four[1]].p, v[four[2]].p,
                                v[four[3]].p);
@@ -155,8 +145,7 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
 /* ---- insertion ---- */
 
 bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
-                           uint32_t v, uint32_t near)
-{
+                           uint32_t v, uint32_t near) {
     INCODE_ASSERT(v < x->points && near < x->points && x->cells > 0 &&
                   !incode_complex_is_vertex(x, v) &&
                   incode_complex_is_vertex(x, near));
@@ -174,8 +163,7 @@ bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
 uint32_t incode_complex_cavity(struct incode_complex *x,
                                struct incode_tally *tally, const double p[3],
                                uint32_t near,
-                               uint32_t cells[INCODE_COMPLEX_CAVITY])
-{
+                               uint32_t cells[INCODE_COMPLEX_CAVITY]) {
     INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
     uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
     return first == INCODE_NONE

@@ -142,51 +142,44 @@ uint32_t incode_complex_disprove(struct incode_complex *x,
                                  uint32_t near, uint32_t *were);
 
 /* Cells that are not free. */
-static inline uint32_t incode_complex_cells_used(const struct incode_complex *x)
-{
+static inline uint32_t
+incode_complex_cells_used(const struct incode_complex *x) {
     return x->cells - x->free_count;
 }
 
-static inline bool incode_cell_is_free(const struct incode_cell *c)
-{
+static inline bool incode_cell_is_free(const struct incode_cell *c) {
     return c->v[0] == c->v[1];
 }
 
 /* What its owner has put down of a cell: 0 to 3. */
-static inline unsigned incode_cell_proved(const struct incode_cell *c)
-{
+static inline unsigned incode_cell_proved(const struct incode_cell *c) {
     return (c->flags & (unsigned)INCODE_CELL_PROVED) / 4;
 }
 
-static inline void incode_cell_set_proved(struct incode_cell *c, unsigned to)
-{
+static inline void incode_cell_set_proved(struct incode_cell *c, unsigned to) {
     c->flags = (uint8_t)((c->flags & ~(unsigned)INCODE_CELL_PROVED) | to * 4);
 }
 
 /* Whether a point is a vertex. */
 static inline bool incode_complex_is_vertex(const struct incode_complex *x,
-                                            uint32_t v)
-{
+                                            uint32_t v) {
     return x->point[v].cell != INCODE_NONE;
 }
 
 static inline struct incode_cell *
-incode_complex_cell(const struct incode_complex *x, uint32_t i)
-{
+incode_complex_cell(const struct incode_complex *x, uint32_t i) {
     return x->cell - i;
 }
 
 /* Makes a cell the neighbour i of another. */
 static inline void incode_cell_join(struct incode_cell *c, unsigned i,
-                                    uint32_t to)
-{
+                                    uint32_t to) {
     c->n[i].cell = to & (uint32_t)INCODE_CELL_NONE;
 }
 
 /* Where a vertex is in a cell: 0 to 3; 4: nowhere. */
 static inline unsigned incode_cell_index(const struct incode_cell *c,
-                                         uint32_t v)
-{
+                                         uint32_t v) {
     return c->v[0] == v   ? 0
            : c->v[1] == v ? 1
            : c->v[2] == v ? 2
@@ -194,8 +187,7 @@ static inline unsigned incode_cell_index(const struct incode_cell *c,
                           : 4;
 }
 
-static inline bool incode_cell_is_infinite(const struct incode_cell *c)
-{
+static inline bool incode_cell_is_infinite(const struct incode_cell *c) {
     return incode_cell_index(c, INCODE_COMPLEX_INFINITE) != 4;
 }
 

@@ -16,22 +16,19 @@ enum {
 };
 
 /* In a cell that gives way, instead of its sphere: the next of the list. */
-static uint32_t next_of(const struct incode_cell *c)
-{
+static uint32_t next_of(const struct incode_cell *c) {
     uint32_t next;
     memcpy(&next, c->sphere, sizeof next);
     return next;
 }
 
-static void set_next(struct incode_cell *c, uint32_t next)
-{
+static void set_next(struct incode_cell *c, uint32_t next) {
     memcpy(c->sphere, &next, sizeof next);
 }
 
 /* Lists the cells that give way; returns how many facets are around them. */
 static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
-                     const double p[3], uint32_t first)
-{
+                     const double p[3], uint32_t first) {
     uint32_t last = first, facets = 0;
     struct incode_cell *c = incode_complex_cell(x, first);
     c->flags |= INCODE_CELL_GOES;
@@ -59,8 +56,7 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
 
 /* Takes the marks away and brings the spheres back. */
 static void forget(struct incode_complex *x, struct incode_pause *pause,
-                   uint32_t first)
-{
+                   uint32_t first) {
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
         struct incode_cell *c = incode_complex_cell(x, at);
@@ -76,8 +72,7 @@ static void forget(struct incode_complex *x, struct incode_pause *pause,
 
 /* Puts a cell between each facet of the boundary and the new point. */
 static void fill(struct incode_complex *x, struct incode_pause *pause,
-                 uint32_t first, uint32_t v)
-{
+                 uint32_t first, uint32_t v) {
     struct incode_cell *c;
     uint32_t some[BATCH], count = 0;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
@@ -117,8 +112,7 @@ static void fill(struct incode_complex *x, struct incode_pause *pause,
  * left opposite to. */
 static uint32_t around_edge(const struct incode_complex *x,
                             struct incode_pause *pause, uint32_t at, unsigned i,
-                            unsigned j)
-{
+                            unsigned j) {
     const struct incode_cell *c = incode_complex_cell(x, at);
     uint32_t next = c->n[i].cell;
     uint16_t pivot = c->v[j];
@@ -137,8 +131,7 @@ static uint32_t around_edge(const struct incode_complex *x,
 
 /* Joins the new cells to each other. */
 static void join(struct incode_complex *x, struct incode_pause *pause,
-                 uint32_t first)
-{
+                 uint32_t first) {
     const struct incode_cell *c;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
         c = incode_complex_cell(x, at);
@@ -159,8 +152,7 @@ static void join(struct incode_complex *x, struct incode_pause *pause,
 enum incode_cavity_result
 incode_complex_insert_large(struct incode_complex *x,
                             struct incode_tally *tally, uint32_t v,
-                            uint32_t first)
-{
+                            uint32_t first) {
     struct incode_pause *pause = &tally->pause;
     uint32_t facets = find(x, tally, x->point[v].p, first);
     if (!incode_complex_has_room(x, 0, facets)) {
@@ -180,8 +172,7 @@ incode_complex_insert_large(struct incode_complex *x,
 }
 
 /* Where a cell's neighbour is in it. */
-static unsigned side_of(const struct incode_cell *c, uint32_t neighbour)
-{
+static unsigned side_of(const struct incode_cell *c, uint32_t neighbour) {
     return c->n[0].cell == neighbour   ? 0
            : c->n[1].cell == neighbour ? 1
            : c->n[2].cell == neighbour ? 2
@@ -189,8 +180,7 @@ static unsigned side_of(const struct incode_cell *c, uint32_t neighbour)
 }
 
 /* Returns whether it was proved. */
-static uint32_t disprove(struct incode_cell *c)
-{
+static uint32_t disprove(struct incode_cell *c) {
     uint32_t was = incode_cell_proved(c) != 0;
     c->flags ^= INCODE_CELL_GOES;
     incode_cell_set_proved(c, 0);
@@ -201,8 +191,7 @@ static uint32_t disprove(struct incode_cell *c)
  * in the cells, and marks them; the second time it takes the marks away. */
 static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
                            const double p[3], uint32_t first, bool again,
-                           uint32_t *were)
-{
+                           uint32_t *were) {
     uint32_t at = first, count = 1;
     unsigned i = 0;
     *were += disprove(incode_complex_cell(x, first));
@@ -234,8 +223,7 @@ static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
 
 uint32_t incode_complex_disprove(struct incode_complex *x,
                                  struct incode_tally *tally, const double p[3],
-                                 uint32_t near, uint32_t *were)
-{
+                                 uint32_t near, uint32_t *were) {
     INCODE_ASSERT(near < x->points && incode_complex_is_vertex(x, near));
     uint32_t first = incode_complex_locate(x, tally, x->point[near].cell, p);
     *were = 0;

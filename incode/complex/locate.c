@@ -6,8 +6,7 @@ enum { INFINITE = INCODE_COMPLEX_INFINITE };
 /* orient3d of a cell with p in the place of its vertex i. */
 static int orient_with(const struct incode_complex *x,
                        struct incode_tally *tally, const struct incode_cell *c,
-                       unsigned i, const double p[3])
-{
+                       unsigned i, const double p[3]) {
     const double *q[4];
     for (unsigned k = 0; k < 4; k++)
         q[k] = k == i ? p : x->point[c->v[k]].p;
@@ -15,15 +14,14 @@ static int orient_with(const struct incode_complex *x,
 }
 
 /* Whether it stands for cells that have been released. */
-static bool is_gone(const struct incode_complex *x, const struct incode_cell *c)
-{
+static bool is_gone(const struct incode_complex *x,
+                    const struct incode_cell *c) {
     return c > incode_complex_cell(x, INCODE_COMPLEX_CELLS_FIRST);
 }
 
 bool incode_complex_holds(const struct incode_complex *x,
                           struct incode_tally *tally,
-                          const struct incode_cell *c, const double p[3])
-{
+                          const struct incode_cell *c, const double p[3]) {
     unsigned i = incode_cell_index(c, INFINITE);
     if (is_gone(x, c))
         return false;
@@ -43,8 +41,7 @@ bool incode_complex_holds(const struct incode_complex *x,
 
 /* Whether a vertex of the cell is at p. */
 static bool has_point(const struct incode_complex *x,
-                      const struct incode_cell *c, const double p[3])
-{
+                      const struct incode_cell *c, const double p[3]) {
     for (unsigned i = 0; i < 4; i++)
         if (c->v[i] != INFINITE &&
             incode_lexicographic(x->point[c->v[i]].p, p) == 0)
@@ -54,8 +51,7 @@ static bool has_point(const struct incode_complex *x,
 
 bool incode_complex_gives_way(const struct incode_complex *x,
                               struct incode_tally *tally,
-                              const struct incode_cell *c, const double p[3])
-{
+                              const struct incode_cell *c, const double p[3]) {
     double bound, t = incode_sphere_power(x->point, c, p, &bound);
     return t < -bound || (!(t > bound) && !has_point(x, c, p) &&
                           incode_complex_holds(x, tally, c, p));
@@ -66,8 +62,7 @@ bool incode_complex_gives_way(const struct incode_complex *x,
  * the plane where their powers are equal, so downhill is towards p. */
 static uint32_t descend(const struct incode_complex *x,
                         struct incode_tally *tally, uint32_t at,
-                        const double p[3], bool *found)
-{
+                        const double p[3], bool *found) {
     double bound, least;
     const struct incode_cell *c = incode_complex_cell(x, at);
     least = incode_sphere_power(x->point, c, p, &bound);
@@ -99,8 +94,7 @@ static uint32_t descend(const struct incode_complex *x,
  * walk, which ends as the triangulation is regular (Edelsbrunner, Combinatorica
  * 10, 1990). */
 static uint32_t walk(const struct incode_complex *x, struct incode_tally *tally,
-                     uint32_t at, const double p[3])
-{
+                     uint32_t at, const double p[3]) {
     uint32_t before = INCODE_NONE;
     for (uint32_t steps = 0; steps <= x->cells; steps++) {
         uint32_t next = INCODE_NONE;
@@ -127,8 +121,7 @@ static uint32_t walk(const struct incode_complex *x, struct incode_tally *tally,
 
 /* Looks at all cells that are not final. */
 static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
-                     const double p[3])
-{
+                     const double p[3]) {
     x->scans++;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
@@ -143,8 +136,7 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
 
 /* The vertex nearest to p, up to rounding; INFINITE: squares overflow. */
 static uint32_t nearest(const struct incode_complex *x,
-                        struct incode_tally *tally, const double p[3])
-{
+                        struct incode_tally *tally, const double p[3]) {
     uint32_t best = INFINITE;
     double least = __builtin_inf();
     for (uint32_t v = 1; v < x->points; v++) {
@@ -164,8 +156,7 @@ static uint32_t nearest(const struct incode_complex *x,
 
 /* From one cell on; INCODE_NONE: what has been released is on the way. */
 static uint32_t go(const struct incode_complex *x, struct incode_tally *tally,
-                   uint32_t from, const double p[3])
-{
+                   uint32_t from, const double p[3]) {
     bool found = false;
     const struct incode_cell *c = incode_complex_cell(x, from);
     unsigned i = incode_cell_index(c, INFINITE);
@@ -180,8 +171,7 @@ static uint32_t go(const struct incode_complex *x, struct incode_tally *tally,
  * cell that holds p. */
 uint32_t incode_complex_locate(struct incode_complex *x,
                                struct incode_tally *tally, uint32_t from,
-                               const double p[3])
-{
+                               const double p[3]) {
     from = go(x, tally, from, p);
     if (from == INCODE_NONE) {
         uint32_t near = nearest(x, tally, p);

@@ -4,8 +4,7 @@
 enum { FIRST = INCODE_COMPLEX_CELLS_FIRST };
 
 /* The neighbours of a cell that stays, and its vertices' cells. */
-static void settle(struct incode_complex *x, uint32_t i)
-{
+static void settle(struct incode_complex *x, uint32_t i) {
     struct incode_cell *c = incode_complex_cell(x, i);
     for (unsigned k = 0; k < 4; k++) {
         const struct incode_cell *n = incode_complex_cell(x, c->n[k].cell);
@@ -19,8 +18,8 @@ static void settle(struct incode_complex *x, uint32_t i)
 }
 
 /* Those of [first, end) that stay are settled, then the others are freed. */
-static void settle_some(struct incode_complex *x, uint32_t first, uint32_t end)
-{
+static void settle_some(struct incode_complex *x, uint32_t first,
+                        uint32_t end) {
     for (uint32_t i = first; i < end; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
         if (!incode_cell_is_free(c) && incode_cell_proved(c) == 0)
@@ -28,8 +27,7 @@ static void settle_some(struct incode_complex *x, uint32_t first, uint32_t end)
     }
 }
 
-static void free_some(struct incode_complex *x, uint32_t first, uint32_t end)
-{
+static void free_some(struct incode_complex *x, uint32_t first, uint32_t end) {
     for (uint32_t i = first; i < end; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
         if (!incode_cell_is_free(c) && incode_cell_proved(c) != 0)
@@ -40,8 +38,7 @@ static void free_some(struct incode_complex *x, uint32_t first, uint32_t end)
 enum { AT_ONCE = 128, UNITS = 64 /* points or cells in a breath */ };
 
 void incode_complex_release(struct incode_complex *x,
-                            struct incode_pause *pause)
-{
+                            struct incode_pause *pause) {
     for (uint32_t v = 0; v < x->points; v++) {
         if (v % AT_ONCE == 0)
             incode_breathe(pause, UNITS / 8);

@@ -23,8 +23,7 @@ struct cavity {
 };
 
 /* Takes the marks away. */
-static void forget(struct incode_complex *x, const struct cavity *cavity)
-{
+static void forget(struct incode_complex *x, const struct cavity *cavity) {
     for (uint32_t j = 0; j < cavity->looked_at; j++)
         incode_cell_unmark(incode_complex_cell(x, cavity->other[j]));
 }
@@ -32,8 +31,7 @@ static void forget(struct incode_complex *x, const struct cavity *cavity)
 /* Neighbours of cells that give way, from `from` on, that were not looked at
  * yet. */
 static void look_around(struct incode_complex *x, struct cavity *cavity,
-                        uint32_t from)
-{
+                        uint32_t from) {
     struct incode_cell *cell = x->cell;
     uint32_t count = cavity->looked_at;
     for (uint32_t j = from; j < cavity->gone; j++) {
@@ -51,8 +49,7 @@ static void look_around(struct incode_complex *x, struct cavity *cavity,
 /* Tells those of [from, end) that give way. */
 static inline void tell(struct incode_complex *x, struct incode_tally *tally,
                         const double p[3], uint32_t from, uint32_t end,
-                        struct cavity *cavity)
-{
+                        struct cavity *cavity) {
     const struct incode_complex_point *point = x->point;
     struct incode_cell *cell = x->cell;
     uint32_t gone = cavity->gone;
@@ -73,8 +70,7 @@ static inline void tell(struct incode_complex *x, struct incode_tally *tally,
 /* The same of many. */
 static __attribute__((noinline)) void
 tell_many(struct incode_complex *x, struct incode_tally *tally,
-          const double p[3], uint32_t from, struct cavity *cavity)
-{
+          const double p[3], uint32_t from, struct cavity *cavity) {
     while (from < cavity->looked_at) {
         uint32_t left = cavity->looked_at - from;
         uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
@@ -86,8 +82,7 @@ tell_many(struct incode_complex *x, struct incode_tally *tally,
 
 /* False: too many cells. */
 static bool find(struct incode_complex *x, struct incode_tally *tally,
-                 const double at[3], uint32_t first, struct cavity *cavity)
-{
+                 const double at[3], uint32_t first, struct cavity *cavity) {
     const double p[3] = {at[0], at[1], at[2]};
     uint32_t from = 0, breath = AT_ONCE;
     incode_breathe(&tally->pause, AT_ONCE);
@@ -113,8 +108,7 @@ static bool find(struct incode_complex *x, struct incode_tally *tally,
 uint32_t incode_complex_find_small(struct incode_complex *x,
                                    struct incode_tally *tally,
                                    const double p[3], uint32_t first,
-                                   uint32_t cells[INCODE_COMPLEX_CAVITY])
-{
+                                   uint32_t cells[INCODE_COMPLEX_CAVITY]) {
     struct cavity cavity;
     bool all = find(x, tally, p, first, &cavity);
     forget(x, &cavity);
@@ -123,8 +117,7 @@ uint32_t incode_complex_find_small(struct incode_complex *x,
 }
 
 static bool list_facets(const struct incode_complex *x,
-                        struct incode_pause *pause, struct cavity *cavity)
-{
+                        struct incode_pause *pause, struct cavity *cavity) {
     uint32_t facets = 0;
     incode_breathe(pause, cavity->gone / 4);
     for (uint32_t j = 0; j < cavity->gone && facets <= FACETS_MAX; j++) {
@@ -159,16 +152,14 @@ struct filling {
 };
 
 static void take_cells(struct incode_complex *x, const struct cavity *cavity,
-                       uint32_t *cell)
-{
+                       uint32_t *cell) {
     uint32_t gone = cavity->gone, facets = cavity->facets;
     for (uint32_t f = 0; f < facets; f++)
         cell[f] = f < gone ? cavity->cell[f] : incode_complex_take_cell(x);
 }
 
 /* Those that give way and whose places nobody has taken are free. */
-static void free_cells(struct incode_complex *x, const struct cavity *cavity)
-{
+static void free_cells(struct incode_complex *x, const struct cavity *cavity) {
     for (uint32_t j = cavity->facets; j < cavity->gone; j++) {
         incode_complex_free_cell(x, cavity->cell[j]);
     }
@@ -177,8 +168,7 @@ static void free_cells(struct incode_complex *x, const struct cavity *cavity)
 /* Takes from the cells that give way what the new ones need to know; returns
  * how many points there are. */
 static uint32_t number(struct incode_complex *x, const struct cavity *cavity,
-                       struct filling *fill, uint32_t v)
-{
+                       struct filling *fill, uint32_t v) {
     struct incode_complex_point *point = x->point;
     struct incode_cell *cell = x->cell;
     uint32_t points = 0;
@@ -212,8 +202,7 @@ static uint32_t number(struct incode_complex *x, const struct cavity *cavity,
 }
 
 static void see_from(struct incode_complex *x, struct filling *fill,
-                     uint32_t points, uint32_t v)
-{
+                     uint32_t points, uint32_t v) {
     const double *o = x->point[v].p;
     for (uint32_t s = 0; s < points; s++) {
         bool infinite = fill->point[s] == INCODE_COMPLEX_INFINITE;
@@ -227,8 +216,7 @@ static void see_from(struct incode_complex *x, struct filling *fill,
 }
 
 static inline void write_one(struct incode_complex *x,
-                             const struct filling *fill, uint32_t f)
-{
+                             const struct filling *fill, uint32_t f) {
     struct incode_cell *d = x->cell - fill->cell[f];
     uint32_t a = fill->number[0][f], b = fill->number[1][f],
              c = fill->number[2][f];
@@ -241,8 +229,7 @@ static inline void write_one(struct incode_complex *x,
 }
 
 static void write(struct incode_complex *x, struct incode_pause *pause,
-                  struct filling *fill, uint32_t facets)
-{
+                  struct filling *fill, uint32_t facets) {
     enum { BATCH = INCODE_SPHERE_BATCH };
     struct incode_sphere_batch b;
     for (int i = 0; i < 3; i++)
@@ -270,8 +257,7 @@ static void write(struct incode_complex *x, struct incode_pause *pause,
 enum incode_cavity_result
 incode_complex_insert_small(struct incode_complex *x,
                             struct incode_tally *tally, uint32_t v,
-                            uint32_t first)
-{
+                            uint32_t first) {
     struct cavity cavity;
     struct filling fill;
     if (!find(x, tally, x->point[v].p, first, &cavity) ||

@@ -10,28 +10,24 @@ _Static_assert(BATCH % INCODE_VD_LANES == 0, "whole vectors");
 typedef incode_vd vector[3];
 typedef uint64_t words __attribute__((vector_size(INCODE_VECTOR), may_alias));
 
-INCODE_INLINE void cross(vector r, const vector a, const vector b)
-{
+INCODE_INLINE void cross(vector r, const vector a, const vector b) {
     r[0] = a[1] * b[2] - a[2] * b[1];
     r[1] = a[2] * b[0] - a[0] * b[2];
     r[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-INCODE_INLINE incode_vd dot(const vector a, const vector b)
-{
+INCODE_INLINE incode_vd dot(const vector a, const vector b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-INCODE_INLINE incode_vd largest3(incode_vd a, incode_vd b, incode_vd c)
-{
+INCODE_INLINE incode_vd largest3(incode_vd a, incode_vd b, incode_vd c) {
     return incode_vd_max(incode_vd_abs(a),
                          incode_vd_max(incode_vd_abs(b), incode_vd_abs(c)));
 }
 
 /* Rounds to multiples of the next power of two not below the scale. */
 INCODE_INLINE void keep(struct incode_sphere_batch *b, int at, const vector n,
-                        incode_vd scale, incode_vl known, incode_vl infinite)
-{
+                        incode_vd scale, incode_vl known, incode_vl infinite) {
     const words zero = {0};
     words kept = zero, low = zero, up = zero + ((UINT64_C(1) << 52) - 1);
     words bits = ((words)scale + up) & ~up;
@@ -60,8 +56,7 @@ INCODE_INLINE void keep(struct incode_sphere_batch *b, int at, const vector n,
  * where |D| > 128 u m[0] m[1] m[2], and by its own rounding.  An infinite
  * vertex has no part in N but for the cross product of the others, D is the
  * 1-norm of N, and neither rounding of D nor W matters. */
-INCODE_INLINE void compute(struct incode_sphere_batch *b, int at)
-{
+INCODE_INLINE void compute(struct incode_sphere_batch *b, int at) {
     const incode_vd zero = {0}, one = zero + 1;
     incode_vd lift[3], some = zero, m[3];
     vector v[3], n, part[3];
@@ -106,15 +101,13 @@ INCODE_INLINE void compute(struct incode_sphere_batch *b, int at)
     keep(b, at, n, scale, known, infinite);
 }
 
-void incode_sphere_compute(struct incode_sphere_batch *b)
-{
+void incode_sphere_compute(struct incode_sphere_batch *b) {
     for (int at = 0; at < BATCH; at += INCODE_VD_LANES)
         compute(b, at);
 }
 
 static void load(const struct incode_complex *x, struct incode_sphere_batch *b,
-                 const double o[3], const uint32_t *cell, uint32_t count)
-{
+                 const double o[3], const uint32_t *cell, uint32_t count) {
     for (uint32_t j = 0; j < count; j++) {
         const struct incode_cell *c = incode_complex_cell(x, cell[j]);
         for (int i = 0; i < 3; i++) {
@@ -128,8 +121,7 @@ static void load(const struct incode_complex *x, struct incode_sphere_batch *b,
 }
 
 void incode_complex_set_spheres(struct incode_complex *x, uint32_t last,
-                                const uint32_t *cell, uint32_t count)
-{
+                                const uint32_t *cell, uint32_t count) {
     struct incode_sphere_batch b;
     memset(&b, 0, sizeof b);
     for (uint32_t first = 0; first < count; first += BATCH) {

@@ -33,14 +33,12 @@
 
 #include "complex.h"
 
-static inline bool incode_sphere_is_infinite(const struct incode_cell *c)
-{
+static inline bool incode_sphere_is_infinite(const struct incode_cell *c) {
     return (c->flags & INCODE_CELL_INFINITE) != 0;
 }
 
 /* S, whose exponent as a double has 11 bits. */
-static inline double incode_sphere_scale(const struct incode_cell *c)
-{
+static inline double incode_sphere_scale(const struct incode_cell *c) {
     uint64_t bits = (uint64_t)c->scale << 55 | (uint64_t)(c->flags >> 5) << 52;
     double s;
     memcpy(&s, &bits, sizeof s);
@@ -48,16 +46,14 @@ static inline double incode_sphere_scale(const struct incode_cell *c)
 }
 
 /* A coordinate of X, in S. */
-static inline int32_t incode_sphere_whole(const struct incode_cell *c, int k)
-{
+static inline int32_t incode_sphere_whole(const struct incode_cell *c, int k) {
     return c->sphere[k] * 256 + (int32_t)c->n[k].low;
 }
 
 /* |d|^2 - X d, or -X d: right but for *bound; without a branch. */
 static inline double incode_sphere_power(const struct incode_complex_point *v,
                                          const struct incode_cell *c,
-                                         const double p[3], double *bound)
-{
+                                         const double p[3], double *bound) {
     const double *o = v[c->v[3]].p;
     uint64_t finite = (uint64_t)(c->flags / INCODE_CELL_INFINITE & 1) - 1, lift;
     double s = incode_sphere_scale(c);
@@ -96,8 +92,7 @@ void incode_sphere_compute(struct incode_sphere_batch *b);
 /* Cell j of a batch keeps what there is for it; its other flags are 0. */
 static inline void incode_sphere_keep(struct incode_cell *c,
                                       const struct incode_sphere_batch *b,
-                                      uint32_t j)
-{
+                                      uint32_t j) {
     for (int k = 0; k < 3; k++) {
         c->sphere[k] = (int16_t)(b->kept[j] >> 16 * k);
         c->n[k].low = (uint8_t)(b->low[j] >> 8 * k);

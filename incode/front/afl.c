@@ -9,21 +9,18 @@
 static const char *const INCONSISTENT =
     "a face is open twice: pages contradict each other, or spilled faces";
 
-static uint32_t power_below(uint32_t n)
-{
+static uint32_t power_below(uint32_t n) {
     uint32_t power = 1;
     while (power <= n / 2)
         power *= 2;
     return power;
 }
 
-static size_t held_words(uint32_t capacity)
-{
+static size_t held_words(uint32_t capacity) {
     return ((size_t)capacity + 63) / 64;
 }
 
-size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
-{
+size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks) {
     size_t heads = (size_t)power_below(capacity) + power_below(bricks);
     return capacity * sizeof(struct incode_afl_node) +
            bricks * sizeof(struct incode_touched) +
@@ -32,8 +29,7 @@ size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks)
 }
 
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
-                     uint32_t bricks, struct incode_pause *pause)
-{
+                     uint32_t bricks, struct incode_pause *pause) {
     INCODE_ASSERT(capacity > 0 && bricks > 0);
     memset(afl, 0, sizeof *afl);
     afl->pause = pause;
@@ -54,8 +50,7 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
 enum { AT_ONCE = 512 /* entries emptied in a breath */ };
 
 static void empty_heads(const struct incode_afl *afl, uint32_t *heads,
-                        uint32_t mask)
-{
+                        uint32_t mask) {
     for (uint32_t from = 0; from <= mask; from += AT_ONCE) {
         uint32_t left = mask + 1 - from;
         uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
@@ -65,8 +60,7 @@ static void empty_heads(const struct incode_afl *afl, uint32_t *heads,
     }
 }
 
-static void empty_entries(struct incode_afl *afl)
-{
+static void empty_entries(struct incode_afl *afl) {
     uint32_t all = afl->touched_capacity;
     for (uint32_t from = 0; from < all; from += AT_ONCE) {
         uint32_t end = from + (all - from < AT_ONCE ? all - from : AT_ONCE);
@@ -78,8 +72,7 @@ static void empty_entries(struct incode_afl *afl)
     }
 }
 
-void incode_afl_clear(struct incode_afl *afl)
-{
+void incode_afl_clear(struct incode_afl *afl) {
     empty_heads(afl, afl->heads, afl->mask);
     empty_heads(afl, afl->touched_heads, afl->touched_mask);
     empty_entries(afl);
@@ -92,23 +85,21 @@ void incode_afl_clear(struct incode_afl *afl)
     afl->fault = NULL;
 }
 
-static uint32_t *touched_head(const struct incode_afl *afl, uint32_t brick)
-{
+static uint32_t *touched_head(const struct incode_afl *afl, uint32_t brick) {
     return &afl->touched_heads[(brick * UINT32_C(2654435761) >> 8) &
                                afl->touched_mask];
 }
 
 struct incode_touched *incode_afl_find(const struct incode_afl *afl,
-                                       uint32_t brick)
-{
+                                       uint32_t brick) {
     uint32_t i = *touched_head(afl, brick);
     while (i != INCODE_AFL_NIL && afl->touched[i].brick != brick)
         i = afl->touched[i].next;
     return i == INCODE_AFL_NIL ? NULL : &afl->touched[i];
 }
 
-struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick)
-{
+struct incode_touched *incode_afl_touch(struct incode_afl *afl,
+                                        uint32_t brick) {
     struct incode_touched *entry = incode_afl_find(afl, brick);
     if (entry != NULL)
         return entry;
@@ -131,8 +122,7 @@ struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick)
     return entry;
 }
 
-void incode_afl_drop(struct incode_afl *afl, uint32_t brick)
-{
+void incode_afl_drop(struct incode_afl *afl, uint32_t brick) {
     uint32_t *link = touched_head(afl, brick);
     while (*link != INCODE_AFL_NIL && afl->touched[*link].brick != brick)
         link = &afl->touched[*link].next;
@@ -154,8 +144,7 @@ void incode_afl_drop(struct incode_afl *afl, uint32_t brick)
 
 enum { PARTS = 64 /* of a list that is spread */ };
 
-static bool is_wide(const struct incode_afl *afl, uint32_t key)
-{
+static bool is_wide(const struct incode_afl *afl, uint32_t key) {
     for (uint32_t i = 0; i < afl->wide_count; i++)
         if (afl->wide[i] == key)
             return true;
@@ -163,22 +152,19 @@ static bool is_wide(const struct incode_afl *afl, uint32_t key)
 }
 
 /* Parts of a vertex's list: distinct heads. */
-static uint32_t parts_of(const struct incode_afl *afl, uint32_t key)
-{
+static uint32_t parts_of(const struct incode_afl *afl, uint32_t key) {
     if (afl->wide_count == 0 || !is_wide(afl, key))
         return 1;
     return afl->mask < PARTS ? afl->mask + 1 : (uint32_t)PARTS;
 }
 
 static uint32_t *head_of(const struct incode_afl *afl, uint32_t key,
-                         uint32_t part)
-{
+                         uint32_t part) {
     return &afl->heads[((key * UINT32_C(2654435761) >> 7) + part) & afl->mask];
 }
 
 uint32_t *incode_afl_list(const struct incode_afl *afl, uint32_t key,
-                          uint32_t b, uint32_t c)
-{
+                          uint32_t b, uint32_t c) {
     uint32_t part = 0;
     if (afl->wide_count > 0)
         part = ((b + c) * UINT32_C(2654435761) >> 16) % parts_of(afl, key);
@@ -190,8 +176,7 @@ struct walk {
     uint32_t key, part, parts, looks;
 };
 
-static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk)
-{
+static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk) {
     uint32_t i = INCODE_AFL_NIL;
     while (i == INCODE_AFL_NIL && walk->part < walk->parts)
         i = *head_of(afl, walk->key, walk->part++);
@@ -199,15 +184,13 @@ static uint32_t walk_from(const struct incode_afl *afl, struct walk *walk)
 }
 
 static uint32_t walk_begin(const struct incode_afl *afl, uint32_t key,
-                           struct walk *walk)
-{
+                           struct walk *walk) {
     *walk = (struct walk){key, 0, parts_of(afl, key), 0};
     return walk_from(afl, walk);
 }
 
 static uint32_t walk_on(const struct incode_afl *afl, struct walk *walk,
-                        uint32_t i)
-{
+                        uint32_t i) {
     incode_afl_breathe_at(afl, ++walk->looks);
     i = afl->nodes[i].next;
     return i != INCODE_AFL_NIL ? i : walk_from(afl, walk);
@@ -215,8 +198,7 @@ static uint32_t walk_on(const struct incode_afl *afl, struct walk *walk,
 
 /* Puts the faces of a vertex that are in `parts` heads where they belong now.
  */
-static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
-{
+static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts) {
     uint32_t all = INCODE_AFL_NIL;
     for (uint32_t part = 0; part < parts; part++) {
         uint32_t *link = head_of(afl, key, part);
@@ -246,8 +228,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts)
 
 /* Makes room for one more list to be spread, if the next one in turn is short;
  * false: there is none. */
-static bool narrow_one(struct incode_afl *afl)
-{
+static bool narrow_one(struct incode_afl *afl) {
     if (afl->wide_count < INCODE_AFL_WIDE)
         return true;
     struct walk walk;
@@ -266,43 +247,36 @@ static bool narrow_one(struct incode_afl *afl)
 }
 
 /* Spreads a list that no hub has kept short. */
-static void widen(struct incode_afl *afl, uint32_t key)
-{
+static void widen(struct incode_afl *afl, uint32_t key) {
     if (afl->still || is_wide(afl, key) || !narrow_one(afl))
         return;
     afl->wide[afl->wide_count++] = key;
     list_anew(afl, key, 1);
 }
 
-static uint64_t bit_of(uint32_t v)
-{
+static uint64_t bit_of(uint32_t v) {
     return UINT64_C(1) << v % INCODE_BRICK_POINTS;
 }
 
-static bool is_held(const struct incode_afl *afl, uint32_t i)
-{
+static bool is_held(const struct incode_afl *afl, uint32_t i) {
     return (afl->held[i / 64] >> i % 64 & 1) != 0;
 }
 
-static bool is_foreign(const struct incode_afl *afl, uint32_t i)
-{
+static bool is_foreign(const struct incode_afl *afl, uint32_t i) {
     return (afl->foreign[i / 64] >> i % 64 & 1) != 0;
 }
 
-static void hold(struct incode_afl *afl, uint32_t i)
-{
+static void hold(struct incode_afl *afl, uint32_t i) {
     afl->held_count += !is_held(afl, i);
     afl->held[i / 64] |= UINT64_C(1) << i % 64;
 }
 
-static void let_go(struct incode_afl *afl, uint32_t i)
-{
+static void let_go(struct incode_afl *afl, uint32_t i) {
     afl->held_count -= is_held(afl, i);
     afl->held[i / 64] &= ~(UINT64_C(1) << i % 64);
 }
 
-static uint32_t take_node(struct incode_afl *afl)
-{
+static uint32_t take_node(struct incode_afl *afl) {
     uint32_t i = afl->free;
     if (i == INCODE_AFL_NIL) {
         INCODE_ASSERT(afl->unused < afl->capacity);
@@ -315,8 +289,7 @@ static uint32_t take_node(struct incode_afl *afl)
     return i;
 }
 
-static void unlink_node(struct incode_afl *afl, uint32_t *link)
-{
+static void unlink_node(struct incode_afl *afl, uint32_t *link) {
     uint32_t i = *link;
     let_go(afl, i);
     *link = afl->nodes[i].next;
@@ -327,15 +300,13 @@ static void unlink_node(struct incode_afl *afl, uint32_t *link)
 
 /* So many faces of a list have been passed. */
 static __attribute__((noinline)) void breathe_over(const struct incode_afl *afl,
-                                                   uint32_t passed)
-{
+                                                   uint32_t passed) {
     for (; passed > INCODE_AFL_BREATH; passed -= INCODE_AFL_BREATH)
         incode_afl_breathe(afl, 1);
 }
 
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
-                           uint32_t c)
-{
+                           uint32_t c) {
     uint32_t *link = incode_afl_list(afl, key, b, c), passed = 0;
     afl->searches++;
     while (*link != INCODE_AFL_NIL) {
@@ -370,8 +341,7 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
 }
 
 void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
-                     uint32_t c, enum incode_face_state state)
-{
+                     uint32_t c, enum incode_face_state state) {
     uint32_t i = take_node(afl);
     struct incode_afl_node *node = &afl->nodes[i];
     uint32_t *head = incode_afl_list(afl, key, b, c);
@@ -392,15 +362,13 @@ void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
 }
 
 void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
-                       uint32_t c)
-{
+                       uint32_t c) {
     if (!incode_afl_close_twin(afl, key, b, c))
         incode_afl_open(afl, key, b, c, INCODE_FACE_OPEN);
 }
 
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
-                         uint32_t (*pairs)[2], uint32_t limit, bool *more)
-{
+                         uint32_t (*pairs)[2], uint32_t limit, bool *more) {
     uint32_t taken = 0, looks = 0, parts = parts_of(afl, v);
     bool pending = false;
     *more = false;
@@ -433,8 +401,7 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
 }
 
 uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
-                         uint32_t (*pairs)[2], uint32_t limit)
-{
+                         uint32_t (*pairs)[2], uint32_t limit) {
     struct walk walk;
     uint32_t count = 0, i = walk_begin(afl, v, &walk);
     for (; i != INCODE_AFL_NIL && count < limit; i = walk_on(afl, &walk, i)) {
@@ -450,8 +417,7 @@ uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
 
 /* Whether a held face of v has b or c too. */
 static bool meets_held(struct incode_afl *afl, uint32_t v, uint32_t b,
-                       uint32_t c)
-{
+                       uint32_t c) {
     struct walk walk;
     uint32_t i = walk_begin(afl, v, &walk);
     for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i)) {
@@ -473,24 +439,20 @@ struct held_vertices {
     uint32_t faces; /* of the list, held or not */
 };
 
-static uint32_t held_bit(uint32_t v)
-{
+static uint32_t held_bit(uint32_t v) {
     return v * UINT32_C(2654435761) >> 22;
 }
 
-static void add_vertex(struct held_vertices *held, uint32_t v)
-{
+static void add_vertex(struct held_vertices *held, uint32_t v) {
     held->word[held_bit(v) / 64] |= UINT64_C(1) << held_bit(v) % 64;
 }
 
-static bool has_vertex(const struct held_vertices *held, uint32_t v)
-{
+static bool has_vertex(const struct held_vertices *held, uint32_t v) {
     return (held->word[held_bit(v) / 64] >> held_bit(v) % 64 & 1) != 0;
 }
 
 static void find_held(struct incode_afl *afl, uint32_t v,
-                      struct held_vertices *held)
-{
+                      struct held_vertices *held) {
     struct walk walk;
     uint32_t i = walk_begin(afl, v, &walk);
     memset(held, 0, sizeof *held);
@@ -507,16 +469,14 @@ static void find_held(struct incode_afl *afl, uint32_t v,
 
 /* Whether the face shares an edge at v with a held one, as far as is known. */
 static bool may_meet(struct incode_afl *afl, const struct held_vertices *held,
-                     const struct incode_afl_node *node)
-{
+                     const struct incode_afl_node *node) {
     return (has_vertex(held, node->b) || has_vertex(held, node->c)) &&
            (held->faces > INCODE_AFL_CROWD ||
             meets_held(afl, node->key, node->b, node->c));
 }
 
 uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
-                         uint32_t (*pairs)[2], uint32_t limit)
-{
+                         uint32_t (*pairs)[2], uint32_t limit) {
     struct held_vertices held;
     find_held(afl, v, &held);
     struct walk walk;
@@ -544,8 +504,7 @@ uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
 
 /* The node of an open face, or INCODE_AFL_NIL. */
 static uint32_t find_face(const struct incode_afl *afl, uint32_t key,
-                          uint32_t b, uint32_t c)
-{
+                          uint32_t b, uint32_t c) {
     uint32_t i = *incode_afl_list(afl, key, b, c);
     while (i != INCODE_AFL_NIL &&
            (afl->nodes[i].key != key || afl->nodes[i].b != b ||
@@ -555,8 +514,7 @@ static uint32_t find_face(const struct incode_afl *afl, uint32_t key,
 }
 
 bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
-                          uint32_t c)
-{
+                          uint32_t c) {
     uint32_t i = find_face(afl, key, b, c);
     if (i != INCODE_AFL_NIL)
         hold(afl, i);
@@ -564,13 +522,11 @@ bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
 }
 
 bool incode_afl_is_open(const struct incode_afl *afl, uint32_t key, uint32_t b,
-                        uint32_t c)
-{
+                        uint32_t c) {
     return find_face(afl, key, b, c) != INCODE_AFL_NIL;
 }
 
-uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)
-{
+uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v) {
     struct walk walk;
     uint32_t count = 0, i = walk_begin(afl, v, &walk);
     for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i))
@@ -583,8 +539,7 @@ uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v)
     return count;
 }
 
-void incode_afl_free(struct incode_afl *afl, uint32_t v)
-{
+void incode_afl_free(struct incode_afl *afl, uint32_t v) {
     struct walk walk;
     uint32_t i = walk_begin(afl, v, &walk);
     for (; i != INCODE_AFL_NIL; i = walk_on(afl, &walk, i))

@@ -77,22 +77,19 @@ struct incode_afl {
 
 #define INCODE_AFL_NIL UINT32_MAX
 
-static inline bool incode_touched_used(const struct incode_touched *entry)
-{
+static inline bool incode_touched_used(const struct incode_touched *entry) {
     return entry->brick != UINT32_MAX;
 }
 
 static inline void incode_afl_breathe(const struct incode_afl *afl,
-                                      uint32_t units)
-{
+                                      uint32_t units) {
     if (afl->pause != NULL)
         incode_breathe(afl->pause, units);
 }
 
 /* In a loop over many, at number i: now and then. */
 static inline void incode_afl_breathe_at(const struct incode_afl *afl,
-                                         uint32_t i)
-{
+                                         uint32_t i) {
     if (i % INCODE_AFL_BREATH == 0)
         incode_afl_breathe(afl, 1);
 }
@@ -102,8 +99,7 @@ static inline void incode_afl_breathe_at(const struct incode_afl *afl,
  * Returns how many have not ended, now the first of them.  Where faces have
  * gone since, it leads elsewhere, in vain. */
 static inline uint32_t incode_afl_fetch(const struct incode_afl *afl,
-                                        const uint32_t **link, uint32_t count)
-{
+                                        const uint32_t **link, uint32_t count) {
     uint32_t left = 0;
     for (uint32_t i = 0; i < count; i++) {
         uint32_t next = *link[i];

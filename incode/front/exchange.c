@@ -31,30 +31,25 @@ static const char *const INCONSISTENT =
 
 /* ---- maps ---- */
 
-static uint32_t position_of(const struct incode_front *front, uint32_t brick)
-{
+static uint32_t position_of(const struct incode_front *front, uint32_t brick) {
     return front->job.last - 1 - brick;
 }
 
-static void set_bit(uint64_t *map, uint32_t i)
-{
+static void set_bit(uint64_t *map, uint32_t i) {
     map[i / 64] |= UINT64_C(1) << i % 64;
 }
 
-static void clear_bit(uint64_t *map, uint32_t i)
-{
+static void clear_bit(uint64_t *map, uint32_t i) {
     map[i / 64] &= ~(UINT64_C(1) << i % 64);
 }
 
-static bool is_set(const uint64_t *map, uint32_t i)
-{
+static bool is_set(const uint64_t *map, uint32_t i) {
     return (map[i / 64] >> i % 64 & 1) != 0;
 }
 
 /* The lowest position of a map from word *from on, which moves up to it. */
 static bool lowest(const struct incode_exchange *e, const uint64_t *map,
-                   uint32_t *from, uint32_t *position)
-{
+                   uint32_t *from, uint32_t *position) {
     while (*from < e->words && map[*from] == 0)
         ++*from;
     if (*from == e->words)
@@ -63,8 +58,7 @@ static bool lowest(const struct incode_exchange *e, const uint64_t *map,
     return true;
 }
 
-static void note(uint64_t *map, uint32_t *from, uint32_t position)
-{
+static void note(uint64_t *map, uint32_t *from, uint32_t position) {
     set_bit(map, position);
     if (position / 64 < *from)
         *from = position / 64;
@@ -72,8 +66,7 @@ static void note(uint64_t *map, uint32_t *from, uint32_t position)
 
 void incode_front_exchange(struct incode_front *front,
                            const struct incode_front_peers *peers,
-                           const double lo[3], uint64_t *maps)
-{
+                           const double lo[3], uint64_t *maps) {
     struct incode_exchange *e = &front->exchange;
     size_t words = ((size_t)front->bricks + 63) / 64;
     INCODE_ASSERT(front->finished && front->face_rule == INCODE_FACE_OWN);
@@ -87,8 +80,7 @@ void incode_front_exchange(struct incode_front *front,
     front->room_faces += front->afl.capacity / 8; /* for what others send */
 }
 
-void incode_exchange_start(struct incode_front *front)
-{
+void incode_exchange_start(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     uint32_t own = front->job.last - front->job.first;
     struct incode_exchange fresh = {.on = true,
@@ -114,8 +106,7 @@ void incode_exchange_start(struct incode_front *front)
 
 /* ---- faces ---- */
 
-void incode_exchange_ready(struct incode_front *front, uint32_t v)
-{
+void incode_exchange_ready(struct incode_front *front, uint32_t v) {
     struct incode_exchange *e = &front->exchange;
     if (incode_own(front, v))
         note(e->ready, &e->ready_from,
@@ -124,16 +115,14 @@ void incode_exchange_ready(struct incode_front *front, uint32_t v)
         e->elsewhere = front->afl.touched_max;
 }
 
-void incode_exchange_returned(struct incode_front *front, uint32_t brick)
-{
+void incode_exchange_returned(struct incode_front *front, uint32_t brick) {
     front->exchange.quiet = false;
     front->exchange.changes++;
     incode_exchange_ready(front, brick * INCODE_BRICK_POINTS);
 }
 
 /* Notes that an open face has this vertex. */
-static void mark(struct incode_front *front, uint32_t v)
-{
+static void mark(struct incode_front *front, uint32_t v) {
     uint32_t brick = v / INCODE_BRICK_POINTS;
     if (!incode_own_brick(front, brick) ||
         position_of(front, brick) >= front->spill_from)
@@ -145,8 +134,7 @@ static void mark(struct incode_front *front, uint32_t v)
 }
 
 void incode_exchange_open(struct incode_front *front, const uint32_t f[3],
-                          enum incode_face_state state)
-{
+                          enum incode_face_state state) {
     struct incode_exchange *e = &front->exchange;
     if (state == INCODE_FACE_HELD && !incode_own(front, f[0]))
         state = INCODE_FACE_OPEN; /* of hubs: in nobody's turn */
@@ -161,8 +149,7 @@ void incode_exchange_open(struct incode_front *front, const uint32_t f[3],
 }
 
 bool incode_exchange_is_near_side(const struct incode_front *front,
-                                  const double *const p[4])
-{
+                                  const double *const p[4]) {
     bool near = false;
     for (unsigned left = front->exchange.below; left != 0; left &= left - 1) {
         unsigned d = (unsigned)__builtin_ctz(left);
@@ -177,8 +164,7 @@ bool incode_exchange_is_near_side(const struct incode_front *front,
 }
 
 bool incode_exchange_is_outward(const struct incode_front *front,
-                                const double *const p[3])
-{
+                                const double *const p[3]) {
     const double *floor = front->exchange.floor;
     double u[3], w[3], square_edge = 0;
     for (int d = 0; d < 3; d++) {
@@ -202,8 +188,7 @@ bool incode_exchange_is_outward(const struct incode_front *front,
 
 /* A tetrahedron or facet that another can have built. */
 static bool may_come(const struct incode_front *front, const uint32_t *v,
-                     unsigned count)
-{
+                     unsigned count) {
     bool own = false;
     for (unsigned i = 0; i < count; i++) {
         if (v[i] / INCODE_BRICK_POINTS >= front->bricks)
@@ -222,8 +207,7 @@ enum { FACES = 4, VERTICES = 3 };
 static_assert(INCODE_TAKEN_MAX * (FACES + VERTICES) <= INCODE_SPILL_FACES,
               "all that may be spilled of a message fits the empty buffer");
 
-bool incode_front_may_take(struct incode_front *front, uint32_t count)
-{
+bool incode_front_may_take(struct incode_front *front, uint32_t count) {
     uint32_t spilled = count * (FACES + VERTICES);
     INCODE_ASSERT(count <= INCODE_TAKEN_MAX);
     return front->finished ||
@@ -232,8 +216,7 @@ bool incode_front_may_take(struct incode_front *front, uint32_t count)
 }
 
 /* Room for the faces and vertices of one more; if not, why. */
-static const char *room_fault(struct incode_front *front)
-{
+static const char *room_fault(struct incode_front *front) {
     const struct incode_afl *afl = &front->afl;
     if (!incode_front_may_take(front, 1))
         return UNASKED;
@@ -244,8 +227,7 @@ static const char *room_fault(struct incode_front *front)
                : TOO_SMALL;
 }
 
-int incode_front_take(struct incode_front *front, const uint32_t v[4])
-{
+int incode_front_take(struct incode_front *front, const uint32_t v[4]) {
     static const uint8_t face[4][3] = {
         {0, 3, 2}, {0, 1, 3}, {1, 2, 3}, {0, 2, 1}};
     struct incode_exchange *e = &front->exchange;
@@ -285,15 +267,13 @@ int incode_front_take(struct incode_front *front, const uint32_t v[4])
 
 /* ---- commits ---- */
 
-static uint64_t all_of(const struct incode_front *front, uint32_t brick)
-{
+static uint64_t all_of(const struct incode_front *front, uint32_t brick) {
     uint32_t count = brick == front->job.last - 1 ? front->exchange.last_count
                                                   : INCODE_BRICK_POINTS;
     return ~UINT64_C(0) >> (INCODE_BRICK_POINTS - count);
 }
 
-static void begin_sweep(struct incode_front *front)
-{
+static void begin_sweep(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     e->sweep++;
     e->sweeping = true;
@@ -305,16 +285,14 @@ static void begin_sweep(struct incode_front *front)
 /* Whether all that is known of an own brick is at hand.  Faces wait with their
  * highest own vertex that is no hub, so those that are spilled have no other
  * vertex in such a brick. */
-static bool is_at_hand(const struct incode_front *front, uint32_t brick)
-{
+static bool is_at_hand(const struct incode_front *front, uint32_t brick) {
     return position_of(front, brick) < front->spill_from &&
            !(front->unspill_pending && front->unspill_brick == brick) &&
            (!front->spilled_any || !incode_front_has_hub(front, brick));
 }
 
 static bool is_closed(const struct incode_front *front,
-                      const struct incode_touched *entry)
-{
+                      const struct incode_touched *entry) {
     return incode_touched_used(entry) &&
            incode_own_brick(front, entry->brick) &&
            is_at_hand(front, entry->brick) &&
@@ -323,8 +301,7 @@ static bool is_closed(const struct incode_front *front,
 }
 
 /* Commits bricks that the sweep has not met. */
-static void sweep_entries(struct incode_front *front)
-{
+static void sweep_entries(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     uint32_t end = e->sweep_entry + SWEEP_ENTRIES, commits = 0;
     end = end < front->afl.touched_max ? end : front->afl.touched_max;
@@ -343,8 +320,7 @@ static void sweep_entries(struct incode_front *front)
     e->sweeping = e->sweep_entry < front->afl.touched_max;
 }
 
-static enum incode_turn sweep_on(struct incode_front *front)
-{
+static enum incode_turn sweep_on(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     struct incode_afl *afl = &front->afl;
     if (e->sweep_head > afl->mask) {
@@ -365,8 +341,7 @@ static enum incode_turn sweep_on(struct incode_front *front)
     return INCODE_TURN_WORKED;
 }
 
-static enum incode_turn finish(struct incode_front *front)
-{
+static enum incode_turn finish(struct incode_front *front) {
     if (front->afl.count > 0) {
         front->fault = "faces are open although all stars are closed";
         return INCODE_TURN_WAIT;
@@ -382,8 +357,7 @@ static enum incode_turn finish(struct incode_front *front)
 enum found { NONE, FOUND, MORE };
 
 uint64_t incode_exchange_pending(const struct incode_front *front,
-                                 uint32_t brick)
-{
+                                 uint32_t brick) {
     const struct incode_touched *entry = incode_afl_find(&front->afl, brick);
     bool returning = front->unspill_pending && front->unspill_brick == brick;
     return entry == NULL || returning ? 0 : entry->pending & ~entry->waiting;
@@ -391,8 +365,7 @@ uint64_t incode_exchange_pending(const struct incode_front *front,
 
 /* The position beyond which no star is begun: as long as others wait for pages,
  * near them, as what is built far ahead opens faces there again. */
-static uint32_t window_end(const struct incode_front *front)
-{
+static uint32_t window_end(const struct incode_front *front) {
     uint32_t end = UINT32_MAX;
     for (uint32_t left = front->busy; left != 0; left &= left - 1) {
         uint32_t v = front->task[__builtin_ctz(left)].v;
@@ -405,8 +378,7 @@ static uint32_t window_end(const struct incode_front *front)
 }
 
 /* The next own vertex with faces to be pursued. */
-static enum found next_own(struct incode_front *front, uint32_t *v)
-{
+static enum found next_own(struct incode_front *front, uint32_t *v) {
     struct incode_exchange *e = &front->exchange;
     uint32_t position, looked = 0, end = window_end(front);
     while (lowest(e, e->ready, &e->ready_from, &position) && position < end) {
@@ -426,8 +398,7 @@ static enum found next_own(struct incode_front *front, uint32_t *v)
 }
 
 /* The same in lists of others' vertices, from an entry on to all others. */
-static enum found next_elsewhere(struct incode_front *front, uint32_t *v)
-{
+static enum found next_elsewhere(struct incode_front *front, uint32_t *v) {
     struct incode_exchange *e = &front->exchange;
     for (uint32_t looked = 0; e->elsewhere > 0; e->elsewhere--, e->at++) {
         if (looked++ == LOOKS)
@@ -452,8 +423,7 @@ static enum found next_elsewhere(struct incode_front *front, uint32_t *v)
 
 /* Lets the faces of one vertex go that were put off, or looks through a brick
  * that has none; false: there are none. */
-static bool let_go(struct incode_front *front)
-{
+static bool let_go(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     uint32_t position;
     if (!lowest(e, e->deferred, &e->deferred_from, &position))
@@ -471,8 +441,7 @@ static bool let_go(struct incode_front *front)
 
 /* A vertex here and there, from the last one down, until one has a first
  * tetrahedron that is the front's own. */
-static bool next_try(struct incode_front *front, uint32_t *v)
-{
+static bool next_try(struct incode_front *front, uint32_t *v) {
     struct incode_exchange *e = &front->exchange;
     uint32_t own = front->job.last - front->job.first;
     uint64_t count = (uint64_t)(own - 1) * INCODE_BRICK_POINTS + e->last_count;
@@ -490,8 +459,7 @@ static bool next_try(struct incode_front *front, uint32_t *v)
 }
 
 /* The next vertex that none has reached, each once. */
-static enum found next_seed(struct incode_front *front, uint32_t *v)
-{
+static enum found next_seed(struct incode_front *front, uint32_t *v) {
     struct incode_exchange *e = &front->exchange;
     uint32_t own = front->job.last - front->job.first, looked = 0;
     for (; e->seeding && e->seed_position < own; e->seed_position++) {
@@ -520,8 +488,7 @@ static enum found next_seed(struct incode_front *front, uint32_t *v)
     return NONE;
 }
 
-void incode_front_seed_all(struct incode_front *front)
-{
+void incode_front_seed_all(struct incode_front *front) {
     struct incode_exchange *e = &front->exchange;
     e->seeding = true;
     e->seed_position = e->seed_slot = 0;
@@ -530,8 +497,8 @@ void incode_front_seed_all(struct incode_front *front)
 
 /* Where nothing is to be pursued: what was put off, first tetrahedra, what is
  * spilled, what has been closed. */
-static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
-{
+static enum incode_turn next_of_all(struct incode_front *front,
+                                    uint32_t *which) {
     struct incode_exchange *e = &front->exchange;
     uint32_t v;
     if (next_try(front, &v))
@@ -562,8 +529,7 @@ static enum incode_turn next_of_all(struct incode_front *front, uint32_t *which)
 }
 
 enum incode_turn incode_exchange_next(struct incode_front *front,
-                                      uint32_t *which)
-{
+                                      uint32_t *which) {
     struct incode_exchange *e = &front->exchange;
     uint32_t v;
     if (e->quiet)
@@ -588,8 +554,7 @@ enum incode_turn incode_exchange_next(struct incode_front *front,
 }
 
 enum incode_turn incode_exchange_count(struct incode_front *front,
-                                       uint32_t count)
-{
+                                       uint32_t count) {
     front->exchange.last_count = count;
     return INCODE_TURN_WORKED;
 }

@@ -63,8 +63,7 @@
 #include "front.h"
 
 /* Bytes of the maps for so many bricks. */
-static inline size_t incode_exchange_bytes(uint32_t bricks)
-{
+static inline size_t incode_exchange_bytes(uint32_t bricks) {
     return 3 * (((size_t)bricks + 63) / 64) * sizeof(uint64_t);
 }
 
@@ -90,14 +89,12 @@ int incode_front_take(struct incode_front *front, const uint32_t v[4]);
 void incode_front_seed_all(struct incode_front *front);
 
 /* Whether there is nothing to do until a tetrahedron comes. */
-static inline bool incode_front_is_quiet(const struct incode_front *front)
-{
+static inline bool incode_front_is_quiet(const struct incode_front *front) {
     return front->finished || front->exchange.quiet;
 }
 
 /* Own bricks that are not committed. */
-static inline uint32_t incode_front_left(const struct incode_front *front)
-{
+static inline uint32_t incode_front_left(const struct incode_front *front) {
     return front->finished ? 0 : front->exchange.left;
 }
 
@@ -125,8 +122,8 @@ bool incode_front_fetch(struct incode_front *front);
 
 /* Whether a face, or a tetrahedron, is another's to build. */
 static inline bool incode_exchange_is_foreign(const struct incode_front *front,
-                                              const uint32_t *v, unsigned count)
-{
+                                              const uint32_t *v,
+                                              unsigned count) {
     return front->exchange.on && !incode_own(front, v[incode_lowest(v, count)]);
 }
 
@@ -137,8 +134,7 @@ bool incode_exchange_is_near_side(const struct incode_front *front,
                                   const double *const p[4]);
 
 static inline bool incode_exchange_is_near(const struct incode_front *front,
-                                           const double *const p[4])
-{
+                                           const double *const p[4]) {
     return front->exchange.below != 0 && incode_exchange_is_near_side(front, p);
 }
 
@@ -154,8 +150,7 @@ void incode_exchange_open(struct incode_front *front, const uint32_t f[3],
 /* The same, or closes its twin. */
 static inline void incode_exchange_toggle(struct incode_front *front,
                                           const uint32_t f[3],
-                                          enum incode_face_state state)
-{
+                                          enum incode_face_state state) {
     if (!incode_afl_close_twin(&front->afl, f[0], f[1], f[2]))
         incode_exchange_open(front, f, state);
 }
@@ -173,8 +168,7 @@ void incode_exchange_returned(struct incode_front *front, uint32_t brick);
 /* A tetrahedron or facet of the hull was built; shared: others have a vertex of
  * it, and are told. */
 static inline void incode_exchange_share(struct incode_front *front,
-                                         const uint32_t v[4], bool shared)
-{
+                                         const uint32_t v[4], bool shared) {
     struct incode_exchange *e = &front->exchange;
     e->changes++;
     e->fetched = 0;

@@ -18,8 +18,7 @@ static const char *const TOO_SMALL =
 
 /* ---- memory ---- */
 
-size_t incode_front_bytes(const struct incode_front_share *share)
-{
+size_t incode_front_bytes(const struct incode_front_share *share) {
     return incode_afl_bytes(share->faces, share->entries);
 }
 
@@ -27,8 +26,7 @@ void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside,
-                       struct incode_pause *pause)
-{
+                       struct incode_pause *pause) {
     INCODE_ASSERT(bricks > 0);
     memset(front, 0, sizeof *front);
     front->afl.pause = pause;
@@ -41,8 +39,7 @@ void incode_front_init(struct incode_front *front, void *memory,
     incode_front_move(front, memory, share);
 }
 
-void incode_front_abandon(struct incode_front *front)
-{
+void incode_front_abandon(struct incode_front *front) {
     front->finished = true;
     front->unspill_pending = false;
     front->afl.count = 0;
@@ -50,8 +47,7 @@ void incode_front_abandon(struct incode_front *front)
 }
 
 void incode_front_move(struct incode_front *front, void *memory,
-                       const struct incode_front_share *share)
-{
+                       const struct incode_front_share *share) {
     uint32_t most = front->afl.count_max;
     INCODE_ASSERT(front->finished && share->faces >= INCODE_FACES_MIN &&
                   (share->entries >= INCODE_ENTRIES_MIN ||
@@ -63,8 +59,7 @@ void incode_front_move(struct incode_front *front, void *memory,
 }
 
 void incode_front_start(struct incode_front *front,
-                        const struct incode_job *job)
-{
+                        const struct incode_job *job) {
     INCODE_ASSERT(job->first <= job->last && job->last <= front->bricks);
     front->job = *job;
     incode_afl_clear(&front->afl);
@@ -85,8 +80,7 @@ void incode_front_start(struct incode_front *front,
 
 void incode_front_take_over(struct incode_front *front,
                             const struct incode_job *job,
-                            const uint64_t *passed)
-{
+                            const uint64_t *passed) {
     incode_front_start(front, job);
     front->passed = passed;
     front->spill_from = 0;
@@ -95,16 +89,14 @@ void incode_front_take_over(struct incode_front *front,
 
 /* ---- faces ---- */
 
-static bool is_hub(const struct incode_front *front, uint32_t v)
-{
+static bool is_hub(const struct incode_front *front, uint32_t v) {
     for (uint32_t i = 0; i < front->hub_count; i++)
         if (front->hubs[i] == v)
             return true;
     return false;
 }
 
-bool incode_front_has_hub(const struct incode_front *front, uint32_t brick)
-{
+bool incode_front_has_hub(const struct incode_front *front, uint32_t brick) {
     for (uint32_t i = 0; i < front->hub_count; i++)
         if (front->hubs[i] / INCODE_BRICK_POINTS == brick)
             return true;
@@ -114,8 +106,7 @@ bool incode_front_has_hub(const struct incode_front *front, uint32_t brick)
 /* Does the triangle's box meet the region's?  A function of the face alone, so
  * that both its tetrahedra agree. */
 static bool in_region(const struct incode_front *front,
-                      const double *const p[3])
-{
+                      const double *const p[3]) {
     for (int d = 0; d < 3; d++) {
         double a = p[0][d], b = p[1][d], c = p[2][d];
         double lo = a < b ? a : b, hi = a < b ? b : a;
@@ -127,8 +118,7 @@ static bool in_region(const struct incode_front *front,
     return true;
 }
 
-static unsigned key_of(const struct incode_front *front, const uint32_t f[3])
-{
+static unsigned key_of(const struct incode_front *front, const uint32_t f[3]) {
     unsigned best = 0;
     int best_class = 4;
     for (unsigned i = 0; i < 3; i++) {
@@ -145,8 +135,7 @@ static unsigned key_of(const struct incode_front *front, const uint32_t f[3])
 
 bool incode_front_key_slow(const struct incode_front *front,
                            const uint32_t f[3], const double *const p[3],
-                           unsigned *turn)
-{
+                           unsigned *turn) {
     if (!incode_own(front, f[0]) && !incode_own(front, f[1]) &&
         !incode_own(front, f[2]) &&
         (front->face_rule != INCODE_FACE_PAPER || !in_region(front, p)))
@@ -155,8 +144,7 @@ bool incode_front_key_slow(const struct incode_front *front,
     return true;
 }
 
-static void spill_one(struct incode_front *front, const uint32_t f[3])
-{
+static void spill_one(struct incode_front *front, const uint32_t f[3]) {
     INCODE_ASSERT(front->spill_count < INCODE_SPILL_FACES);
     memcpy(front->spill[front->spill_count++].v, f, sizeof front->spill[0].v);
     front->spilled_any = true;
@@ -165,8 +153,7 @@ static void spill_one(struct incode_front *front, const uint32_t f[3])
         (void)incode_front_flush(front);
 }
 
-bool incode_front_flush(struct incode_front *front)
-{
+bool incode_front_flush(struct incode_front *front) {
     if (front->spill_count == 0)
         return true;
     if (!front->outside.spill(front->outside.context, front->spill,
@@ -176,15 +163,13 @@ bool incode_front_flush(struct incode_front *front)
     return true;
 }
 
-static bool is_spilled(const struct incode_front *front, uint32_t brick)
-{
+static bool is_spilled(const struct incode_front *front, uint32_t brick) {
     return incode_position(front, brick) >= front->spill_from;
 }
 
 /* In the list, which is at hand. */
 static void toggle_at_hand(struct incode_front *front, const uint32_t f[3],
-                           bool held)
-{
+                           bool held) {
     if (!front->exchange.on)
         incode_afl_toggle(&front->afl, f[0], f[1], f[2]);
     else if (!incode_afl_close_twin(&front->afl, f[0], f[1], f[2]))
@@ -196,16 +181,14 @@ static void toggle_at_hand(struct incode_front *front, const uint32_t f[3],
 }
 
 void incode_front_toggle(struct incode_front *front, const uint32_t f[3],
-                         bool held)
-{
+                         bool held) {
     if (is_spilled(front, f[0] / INCODE_BRICK_POINTS))
         spill_one(front, f);
     else
         toggle_at_hand(front, f, held);
 }
 
-void incode_front_reached(struct incode_front *front, uint32_t v)
-{
+void incode_front_reached(struct incode_front *front, uint32_t v) {
     uint32_t brick = v / INCODE_BRICK_POINTS;
     if (!incode_own_brick(front, brick))
         return;
@@ -218,8 +201,7 @@ void incode_front_reached(struct incode_front *front, uint32_t v)
     entry->reached |= UINT64_C(1) << (v % INCODE_BRICK_POINTS);
 }
 
-bool incode_front_is_reached(const struct incode_front *front, uint32_t v)
-{
+bool incode_front_is_reached(const struct incode_front *front, uint32_t v) {
     const struct incode_touched *entry =
         incode_afl_find(&front->afl, v / INCODE_BRICK_POINTS);
     return entry != NULL &&
@@ -230,8 +212,7 @@ bool incode_front_is_reached(const struct incode_front *front, uint32_t v)
 
 /* Puts the open face (v, b, c) into the list where it belongs now. */
 static void list_again(struct incode_front *front, uint32_t v, uint32_t b,
-                       uint32_t c)
-{
+                       uint32_t c) {
     const uint32_t f[3] = {v, b, c};
     unsigned turn = key_of(front, f);
     const uint32_t g[3] = {f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]};
@@ -239,8 +220,7 @@ static void list_again(struct incode_front *front, uint32_t v, uint32_t b,
 }
 
 /* Makes the vertex with a crowded list a hub; false: there is none. */
-static bool find_hub(struct incode_front *front)
-{
+static bool find_hub(struct incode_front *front) {
     uint32_t v = front->afl.crowded;
     if (v == INCODE_NONE)
         return false;
@@ -256,8 +236,7 @@ static bool find_hub(struct incode_front *front)
     return true;
 }
 
-bool incode_front_drain(struct incode_front *front)
-{
+bool incode_front_drain(struct incode_front *front) {
     if (front->draining == INCODE_NONE && !find_hub(front))
         return false;
     /* Faces of three hubs stay: too few to fill the array. */
@@ -288,8 +267,7 @@ bool incode_front_drain(struct incode_front *front)
  * one at work and the farthest one touched.  Bricks before the one at work are
  * passed, but for others' and those of an exchange, whose faces wait for what
  * others send: where nothing farther is left, the first touched one counts. */
-static uint32_t spill_position(const struct incode_front *front)
-{
+static uint32_t spill_position(const struct incode_front *front) {
     uint32_t nearest = UINT32_MAX, farthest = 0, work = front->current;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         const struct incode_touched *entry = &front->afl.touched[i];
@@ -312,8 +290,7 @@ static uint32_t spill_position(const struct incode_front *front)
 /* Moves a brick's faces and marks out, as far as there is room for them; true:
  * all of them. */
 static bool evict_brick(struct incode_front *front,
-                        const struct incode_touched *entry)
-{
+                        const struct incode_touched *entry) {
     uint32_t brick = entry->brick;
     for (uint32_t slot = 0; slot < INCODE_BRICK_POINTS; slot++) {
         uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
@@ -345,8 +322,7 @@ static bool evict_brick(struct incode_front *front,
 }
 
 /* Evicts one brick beyond the threshold, or notes that none is left. */
-static void evict_next(struct incode_front *front)
-{
+static void evict_next(struct incode_front *front) {
     while (front->spill_cursor < front->afl.touched_max) {
         const struct incode_touched *entry =
             &front->afl.touched[front->spill_cursor];
@@ -360,15 +336,13 @@ static void evict_next(struct incode_front *front)
     front->spill_cursor = INCODE_NONE;
 }
 
-bool incode_front_has_room(const struct incode_front *front)
-{
+bool incode_front_has_room(const struct incode_front *front) {
     return front->afl.capacity - front->afl.count >= front->room_faces &&
            front->afl.touched_capacity - front->afl.touched_count >=
                front->room_entries;
 }
 
-bool incode_front_room(struct incode_front *front)
-{
+bool incode_front_room(struct incode_front *front) {
     INCODE_ASSERT(front->fault == NULL);
     if (front->spill_count > 0 && !incode_front_flush(front))
         return false;
@@ -392,8 +366,7 @@ bool incode_front_room(struct incode_front *front)
 
 /* A face or a mark that can have been spilled. */
 static bool may_return(const struct incode_front *front, uint32_t brick,
-                       const uint32_t f[3])
-{
+                       const uint32_t f[3]) {
     bool face = f[1] / INCODE_BRICK_POINTS < front->bricks &&
                 f[2] / INCODE_BRICK_POINTS < front->bricks && f[0] != f[1] &&
                 f[0] != f[2] && f[1] != f[2];
@@ -403,8 +376,7 @@ static bool may_return(const struct incode_front *front, uint32_t brick,
 
 int incode_front_unspill(struct incode_front *front, uint32_t brick,
                          const struct incode_face *faces, size_t count,
-                         bool last)
-{
+                         bool last) {
     if (!front->unspill_pending || brick != front->unspill_brick)
         return -1;
     struct incode_touched *entry = NULL;

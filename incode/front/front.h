@@ -176,8 +176,7 @@ struct incode_front_share {
 };
 
 /* Entries with which a fourth is free when all of some bricks are touched. */
-static inline uint32_t incode_front_entries(uint32_t bricks)
-{
+static inline uint32_t incode_front_entries(uint32_t bricks) {
     return bricks + bricks / 3 + 1;
 }
 
@@ -267,35 +266,31 @@ void incode_front_done(struct incode_front *front, unsigned task);
 
 /* The vertex that a task works on. */
 static inline uint32_t incode_front_vertex(const struct incode_front *front,
-                                           unsigned task)
-{
+                                           unsigned task) {
     return front->task[task].v;
 }
 
 /* Whether it wants a first tetrahedron, as none has its vertex. */
 static inline bool incode_front_is_seed(const struct incode_front *front,
-                                        unsigned task)
-{
+                                        unsigned task) {
     return front->task[task].seed;
 }
 
 /* The tasks that are suspended, one bit each. */
-static inline uint32_t incode_front_suspended(const struct incode_front *front)
-{
+static inline uint32_t
+incode_front_suspended(const struct incode_front *front) {
     return front->busy;
 }
 
 /* The job is done, or none was begun. */
-static inline bool incode_front_is_finished(const struct incode_front *front)
-{
+static inline bool incode_front_is_finished(const struct incode_front *front) {
     return front->finished;
 }
 
 /* The own bricks that are not passed yet: [*first, *last), none where *first is
  * not less. */
 static inline void incode_front_own_left(const struct incode_front *front,
-                                         uint32_t *first, uint32_t *last)
-{
+                                         uint32_t *first, uint32_t *last) {
     *first = front->job.first + front->current;
     *last = front->job.last;
 }
@@ -303,21 +298,18 @@ static inline void incode_front_own_left(const struct incode_front *front,
 /* ---- faces (front.c) ---- */
 
 static inline bool incode_own_brick(const struct incode_front *front,
-                                    uint32_t brick)
-{
+                                    uint32_t brick) {
     return brick - front->job.first < front->job.last - front->job.first;
 }
 
-static inline bool incode_own(const struct incode_front *front, uint32_t v)
-{
+static inline bool incode_own(const struct incode_front *front, uint32_t v) {
     return incode_own_brick(front, v / INCODE_BRICK_POINTS);
 }
 
 /* Bricks counted from the job's first, the others after its last; or, in an
  * exchange, from the last one down. */
 static inline uint32_t incode_position(const struct incode_front *front,
-                                       uint32_t brick)
-{
+                                       uint32_t brick) {
     if (front->exchange.on)
         return brick < front->job.last
                    ? front->job.last - 1 - brick
@@ -328,8 +320,7 @@ static inline uint32_t incode_position(const struct incode_front *front,
 
 /* The brick there. */
 static inline uint32_t incode_brick_at(const struct incode_front *front,
-                                       uint32_t position)
-{
+                                       uint32_t position) {
     if (front->exchange.on)
         return (front->job.last - 1 + front->bricks - position) % front->bricks;
     return (front->job.first + position) % front->bricks;
@@ -337,15 +328,13 @@ static inline uint32_t incode_brick_at(const struct incode_front *front,
 
 /* Of two vertices, whether the first comes before in the order of work. */
 static inline bool incode_precedes(const struct incode_front *front, uint32_t v,
-                                   uint32_t w)
-{
+                                   uint32_t w) {
     return front->exchange.on ? v > w : v < w;
 }
 
 /* Which of three vertices comes first. */
 static inline unsigned incode_front_first(const struct incode_front *front,
-                                          const uint32_t v[3])
-{
+                                          const uint32_t v[3]) {
     unsigned least = incode_precedes(front, v[1], v[0]);
     return incode_precedes(front, v[2], v[least]) ? 2 : least;
 }
@@ -358,8 +347,7 @@ bool incode_front_key_slow(const struct incode_front *front,
 
 static inline bool incode_front_key(const struct incode_front *front,
                                     const uint32_t v[3],
-                                    const double *const p[3], unsigned *turn)
-{
+                                    const double *const p[3], unsigned *turn) {
     if (front->hub_count != 0 || !incode_own(front, v[0]) ||
         !incode_own(front, v[1]) || !incode_own(front, v[2]))
         return incode_front_key_slow(front, v, p, turn);
@@ -395,25 +383,21 @@ bool incode_star_open(struct incode_front *front, uint32_t v);
 
 /* Whether the star is to be put off: it is nearly full, or has built enough; or
  * none of its faces at hand is left. */
-static inline bool incode_star_is_full(const struct incode_front *front)
-{
+static inline bool incode_star_is_full(const struct incode_front *front) {
     return front->star.faces > INCODE_STAR_FACES - 4;
 }
 
-static inline bool incode_star_is_closed(const struct incode_front *front)
-{
+static inline bool incode_star_is_closed(const struct incode_front *front) {
     return front->star.faces == 0;
 }
 
-static inline bool incode_star_is_enough(const struct incode_front *front)
-{
+static inline bool incode_star_is_enough(const struct incode_front *front) {
     return front->star.built >= front->built_max;
 }
 
 /* Takes one face out of the star, the last one opened; false: there is none. */
 static inline bool incode_star_take(struct incode_front *front,
-                                    struct incode_star_face *face)
-{
+                                    struct incode_star_face *face) {
     struct incode_star *star = &front->star;
     if (star->faces == 0)
         return false;

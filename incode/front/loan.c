@@ -11,8 +11,7 @@ static const double *const NOWHERE[4] = {NULL, NULL, NULL, NULL};
 /* ---- lending ---- */
 
 /* The farthest position before *end that may have faces to be pursued. */
-static bool farthest(const struct incode_exchange *e, uint32_t *end)
-{
+static bool farthest(const struct incode_exchange *e, uint32_t *end) {
     while (*end > 0) {
         uint32_t word = (*end - 1) / 64, bits = (*end - 1) % 64 + 1;
         uint64_t left = e->ready[word] & ~UINT64_C(0) >> (64 - bits);
@@ -26,15 +25,13 @@ static bool farthest(const struct incode_exchange *e, uint32_t *end)
 }
 
 /* Where lending begins: behind what is spilled. */
-static uint32_t end_of(const struct incode_front *front)
-{
+static uint32_t end_of(const struct incode_front *front) {
     uint32_t own = front->job.last - front->job.first;
     return own < front->spill_from ? own : front->spill_from;
 }
 
 /* Ready vertices, as far as they need to be counted. */
-static uint32_t count_ready(const struct incode_front *front)
-{
+static uint32_t count_ready(const struct incode_front *front) {
     uint32_t end = end_of(front), count = 0;
     for (uint32_t i = 0; i < LOOK_BRICKS && farthest(&front->exchange, &end) &&
                          count < INCODE_LOAN_SHARE * INCODE_LOAN_VERTICES;
@@ -46,8 +43,7 @@ static uint32_t count_ready(const struct incode_front *front)
 
 /* Lends one vertex, as many of its faces as there is room for. */
 static bool lend_vertex(struct incode_front *front, uint32_t v,
-                        struct incode_loan *loan)
-{
+                        struct incode_loan *loan) {
     uint32_t pairs[INCODE_LOAN_FACES][2];
     uint32_t n =
         incode_afl_tell(&front->afl, v, pairs, INCODE_LOAN_FACES - loan->count);
@@ -64,8 +60,8 @@ static bool lend_vertex(struct incode_front *front, uint32_t v,
     return n > 0;
 }
 
-bool incode_front_lend_run(struct incode_front *front, struct incode_loan *loan)
-{
+bool incode_front_lend_run(struct incode_front *front,
+                           struct incode_loan *loan) {
     if (front->finished || !front->exchange.on || front->exchange.quiet ||
         front->hub_count > 0 || front->spill_cursor != INCODE_NONE)
         return false;
@@ -96,8 +92,7 @@ bool incode_front_lend_run(struct incode_front *front, struct incode_loan *loan)
 
 /* ---- what is found ---- */
 
-bool incode_found_is_sound(const struct incode_found *found, uint32_t bricks)
-{
+bool incode_found_is_sound(const struct incode_found *found, uint32_t bricks) {
     bool sound = found->count <= INCODE_LOAN_FACES;
     for (uint32_t i = 0; sound && i < found->count; i++) {
         const uint32_t *v = found->v[i];
@@ -112,8 +107,7 @@ bool incode_found_is_sound(const struct incode_found *found, uint32_t bricks)
 }
 
 /* Whether the face (v[0], v[1], v[2]) is open here. */
-static bool is_open(const struct incode_front *front, const uint32_t v[3])
-{
+static bool is_open(const struct incode_front *front, const uint32_t v[3]) {
     unsigned turn;
     return incode_front_key(front, v, NULL, &turn) &&
            incode_afl_is_open(&front->afl, v[turn], v[(turn + 1) % 3],
@@ -121,8 +115,7 @@ static bool is_open(const struct incode_front *front, const uint32_t v[3])
 }
 
 /* A fault that the simulation has to find: it counts, though it came late. */
-static void plant(struct incode_front *front, const uint32_t v[4])
-{
+static void plant(struct incode_front *front, const uint32_t v[4]) {
 #ifdef INCODE_PLANT_LATE
     if (v[3] != INCODE_NONE)
         incode_front_seed(front, v, NOWHERE);
@@ -133,8 +126,7 @@ static void plant(struct incode_front *front, const uint32_t v[4])
 
 uint32_t incode_front_use_found(struct incode_front *front,
                                 const struct incode_found *found, uint32_t from,
-                                uint32_t most)
-{
+                                uint32_t most) {
     uint32_t used = 0;
     for (; used < most && from + used < found->count && front->fault == NULL;
          used++) {
@@ -151,8 +143,7 @@ uint32_t incode_front_use_found(struct incode_front *front,
 
 /* ---- the end of a loan ---- */
 
-static bool has_task(const struct incode_front *front, uint32_t v)
-{
+static bool has_task(const struct incode_front *front, uint32_t v) {
     for (uint32_t left = front->busy; left != 0; left &= left - 1)
         if (front->task[__builtin_ctz(left)].v == v)
             return true;
@@ -160,8 +151,7 @@ static bool has_task(const struct incode_front *front, uint32_t v)
 }
 
 void incode_front_return(struct incode_front *front,
-                         const struct incode_loan *loan)
-{
+                         const struct incode_loan *loan) {
     INCODE_ASSERT(front->finished || front->exchange.lent > 0);
     if (front->finished)
         return;

@@ -50,13 +50,11 @@ struct incode_found {
     uint32_t v[INCODE_LOAN_FACES][4];
 };
 
-static inline size_t incode_loan_bytes(const struct incode_loan *loan)
-{
+static inline size_t incode_loan_bytes(const struct incode_loan *loan) {
     return offsetof(struct incode_loan, v) + loan->count * sizeof loan->v[0];
 }
 
-static inline size_t incode_found_bytes(const struct incode_found *found)
-{
+static inline size_t incode_found_bytes(const struct incode_found *found) {
     return offsetof(struct incode_found, v) + found->count * sizeof found->v[0];
 }
 

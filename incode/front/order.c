@@ -16,14 +16,12 @@ enum {
 
 /* ---- tasks ---- */
 
-static uint64_t bit_of(uint32_t v)
-{
+static uint64_t bit_of(uint32_t v) {
     return UINT64_C(1) << (v % INCODE_BRICK_POINTS);
 }
 
 enum incode_turn incode_front_begin(struct incode_front *front, uint32_t v,
-                                    bool seed, uint32_t *which)
-{
+                                    bool seed, uint32_t *which) {
     uint32_t idle = ~front->busy & ALL_TASKS;
     if (idle == 0)
         return INCODE_TURN_WAIT;
@@ -32,8 +30,7 @@ enum incode_turn incode_front_begin(struct incode_front *front, uint32_t v,
     return INCODE_TURN_TASK;
 }
 
-void incode_front_run(struct incode_front *front, uint32_t most)
-{
+void incode_front_run(struct incode_front *front, uint32_t most) {
     front->built_max = front->spill_from < front->bricks ? INCODE_SPILL_BUILT
                                                          : INCODE_STAR_BUILT;
     size_t room = front->outside.emit_room(front->outside.context);
@@ -51,16 +48,14 @@ void incode_front_run(struct incode_front *front, uint32_t most)
 
 /* The brick of a task that has run; one that ran for the first time counts. */
 static struct incode_touched *count_run(struct incode_front *front,
-                                        struct incode_task *task)
-{
+                                        struct incode_task *task) {
     front->counts.vertices += task->born == 0;
     task->retries++;
     return incode_afl_touch(&front->afl, task->v / INCODE_BRICK_POINTS);
 }
 
 void incode_front_suspend(struct incode_front *front, unsigned task, bool fault,
-                          bool advanced)
-{
+                          bool advanced) {
     struct incode_task *t = &front->task[task];
     t->retries = advanced ? 1 : t->retries;
     front->counts.waited += fault && t->born == 0;
@@ -71,8 +66,7 @@ void incode_front_suspend(struct incode_front *front, unsigned task, bool fault,
     front->busy |= UINT32_C(1) << task;
 }
 
-void incode_front_done(struct incode_front *front, unsigned task)
-{
+void incode_front_done(struct incode_front *front, unsigned task) {
     struct incode_task *t = &front->task[task];
     struct incode_touched *entry = count_run(front, t);
     entry->waiting &= ~bit_of(t->v);
@@ -86,8 +80,7 @@ void incode_front_done(struct incode_front *front, unsigned task)
 /* A task that may go on, the oldest first; INCODE_TURN_WAIT: one has been
  * suspended so often that nothing else may run before it. */
 static enum incode_turn ready_task(const struct incode_front *front,
-                                   uint32_t waiting, uint32_t *task)
-{
+                                   uint32_t waiting, uint32_t *task) {
     const struct incode_task *oldest = NULL, *ready = NULL;
     for (uint32_t left = front->busy; left != 0; left &= left - 1) {
         unsigned i = (unsigned)__builtin_ctz(left);
@@ -108,8 +101,7 @@ static enum incode_turn ready_task(const struct incode_front *front,
 
 /* A task whose brick has been spilled meanwhile is void: its faces are gone
  * with it and come back with it. */
-static void drop_spilled_tasks(struct incode_front *front)
-{
+static void drop_spilled_tasks(struct incode_front *front) {
     for (uint32_t left = front->busy; left != 0; left &= left - 1) {
         unsigned i = (unsigned)__builtin_ctz(left);
         uint32_t brick = front->task[i].v / INCODE_BRICK_POINTS;
@@ -119,8 +111,7 @@ static void drop_spilled_tasks(struct incode_front *front)
 }
 
 enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
-                                   uint32_t *task)
-{
+                                   uint32_t *task) {
     if (front->finished)
         return INCODE_TURN_END;
     if (!incode_front_room(front)) {
@@ -141,8 +132,7 @@ enum incode_turn incode_front_turn(struct incode_front *front, uint32_t waiting,
 
 /* Asks for the nearest spilled brick.  From then on its toggles stay in memory
  * and add to those that return; it is not worked on before all are there. */
-static void fetch_spilled(struct incode_front *front)
-{
+static void fetch_spilled(struct incode_front *front) {
     if (front->unspill_pending || !incode_front_flush(front))
         return;
     uint32_t brick = incode_brick_at(front, front->spill_from);
@@ -153,8 +143,7 @@ static void fetch_spilled(struct incode_front *front)
     front->spill_from++;
 }
 
-bool incode_front_fetch(struct incode_front *front)
-{
+bool incode_front_fetch(struct incode_front *front) {
     if (front->spill_from == front->bricks ||
         front->spill_cursor != INCODE_NONE || !incode_front_has_room(front))
         return false;
@@ -163,8 +152,7 @@ bool incode_front_fetch(struct incode_front *front)
 }
 
 /* Brings spilled bricks back before they are needed while there is room. */
-static void fetch_ahead(struct incode_front *front)
-{
+static void fetch_ahead(struct incode_front *front) {
     if (front->spill_from < front->bricks &&
         front->spill_cursor == INCODE_NONE &&
         front->spill_from - front->current < FETCH_AHEAD &&
@@ -173,14 +161,12 @@ static void fetch_ahead(struct incode_front *front)
         fetch_spilled(front);
 }
 
-static bool is_returning(const struct incode_front *front, uint32_t brick)
-{
+static bool is_returning(const struct incode_front *front, uint32_t brick) {
     return front->unspill_pending && front->unspill_brick == brick;
 }
 
 /* The next own brick of the window with open faces; NULL: there is none. */
-static struct incode_touched *next_own(struct incode_front *front)
-{
+static struct incode_touched *next_own(struct incode_front *front) {
     uint32_t own = front->job.last - front->job.first;
     for (uint32_t i = 0; i < front->window; i++) {
         uint32_t position = front->current + i;
@@ -198,8 +184,7 @@ static struct incode_touched *next_own(struct incode_front *front)
 /* The next brick with open faces anywhere, the lowest position first, so that
  * what is left lies ahead and can be spilled.  Bricks without faces are
  * forgotten on the way. */
-static struct incode_touched *next_foreign(struct incode_front *front)
-{
+static struct incode_touched *next_foreign(struct incode_front *front) {
     struct incode_touched *best = NULL;
     uint32_t least = 0;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
@@ -222,15 +207,13 @@ static struct incode_touched *next_foreign(struct incode_front *front)
 }
 
 /* The first vertex of a brick that may have open faces. */
-static uint32_t first_pending(const struct incode_touched *entry)
-{
+static uint32_t first_pending(const struct incode_touched *entry) {
     return entry->brick * INCODE_BRICK_POINTS +
            (uint32_t)__builtin_ctzll(entry->pending & ~entry->waiting);
 }
 
 /* Everything is closed: the hubs' bricks are complete, too. */
-static enum incode_turn finish(struct incode_front *front)
-{
+static enum incode_turn finish(struct incode_front *front) {
     while (front->hub_count > 0) {
         uint32_t brick = front->hubs[--front->hub_count] / INCODE_BRICK_POINTS;
         if (incode_own_brick(front, brick) &&
@@ -248,8 +231,7 @@ static enum incode_turn finish(struct incode_front *front)
 
 /* Passes the current brick if it has been committed before: nothing of it is
  * open, so nothing of it is spilled. */
-static bool skip_passed(struct incode_front *front)
-{
+static bool skip_passed(struct incode_front *front) {
     uint32_t brick = front->job.first + front->current;
     if (front->passed == NULL || brick >= front->job.last ||
         is_returning(front, brick) ||
@@ -261,8 +243,8 @@ static bool skip_passed(struct incode_front *front)
     return true;
 }
 
-enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
-{
+enum incode_turn incode_front_next(struct incode_front *front,
+                                   uint32_t *which) {
     uint32_t own = front->job.last - front->job.first;
     const struct incode_touched *entry;
     if (front->exchange.on)
@@ -301,8 +283,7 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which)
 }
 
 uint32_t incode_front_lend(struct incode_front *front, uint32_t (*faces)[3],
-                           uint32_t most)
-{
+                           uint32_t most) {
     uint32_t count = 0;
     bool moving =
         front->spill_cursor != INCODE_NONE || front->draining != INCODE_NONE;
@@ -328,8 +309,7 @@ uint32_t incode_front_lend(struct incode_front *front, uint32_t (*faces)[3],
 
 /* Passes the current brick: all its lists are empty and all its vertices
  * reached, so none of its stars will open again but those of hubs. */
-static enum incode_turn pass_brick(struct incode_front *front)
-{
+static enum incode_turn pass_brick(struct incode_front *front) {
     uint32_t brick = front->job.first + front->current;
     if (!incode_front_has_hub(front, brick)) {
         front->outside.commit(front->outside.context, brick);
@@ -340,8 +320,7 @@ static enum incode_turn pass_brick(struct incode_front *front)
 }
 
 enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
-                                    uint32_t *which)
-{
+                                    uint32_t *which) {
     INCODE_ASSERT(count >= 1 && count <= INCODE_BRICK_POINTS);
     if (front->exchange.on)
         return incode_exchange_count(front, count);

@@ -24,8 +24,7 @@ enum incode_owner_rule {
 
 /* Which of four points is the smallest: by x alone, as a rule, and without a
  * branch, as nothing foretells which it is. */
-static inline unsigned incode_smallest(const double *const p[4])
-{
+static inline unsigned incode_smallest(const double *const p[4]) {
     unsigned least = 0;
     double x = p[0][0];
     for (unsigned i = 1; i < 4; i++) {
@@ -39,8 +38,7 @@ static inline unsigned incode_smallest(const double *const p[4])
 }
 
 /* Which of some vertex numbers is the lowest. */
-static inline unsigned incode_lowest(const uint32_t *v, unsigned count)
-{
+static inline unsigned incode_lowest(const uint32_t *v, unsigned count) {
     unsigned least = 0;
     for (unsigned i = 1; i < count; i++)
         least = v[i] < v[least] ? i : least;
@@ -50,8 +48,7 @@ static inline unsigned incode_lowest(const uint32_t *v, unsigned count)
 /* Which of a tetrahedron's vertices v, at p[0] to p[3], has it: 0 to 3. */
 static inline unsigned incode_owner(enum incode_owner_rule rule,
                                     const uint32_t v[4],
-                                    const double *const p[4])
-{
+                                    const double *const p[4]) {
     return rule == INCODE_OWNER_LOWEST ? incode_lowest(v, 4)
                                        : incode_smallest(p);
 }

@@ -14,8 +14,7 @@
 static const uint16_t NO_HINTS[4] = {INCODE_HINT_NONE, INCODE_HINT_NONE,
                                      INCODE_HINT_NONE, INCODE_HINT_NONE};
 
-static void put_back(struct incode_front *front)
-{
+static void put_back(struct incode_front *front) {
     struct incode_star *star = &front->star;
     for (uint32_t i = 0; i < star->faces; i++) {
         const uint32_t f[3] = {star->v, star->b[i], star->c[i]};
@@ -28,8 +27,7 @@ static void put_back(struct incode_front *front)
 }
 
 static inline void push_face(struct incode_star *star, uint32_t b, uint32_t c,
-                             uint16_t ib, uint16_t ic)
-{
+                             uint16_t ib, uint16_t ic) {
     INCODE_ASSERT(star->faces < INCODE_STAR_FACES);
     uint32_t i = star->faces++;
     star->b[i] = b;
@@ -38,8 +36,7 @@ static inline void push_face(struct incode_star *star, uint32_t b, uint32_t c,
     star->ic[i] = ic;
 }
 
-static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
-{
+static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c) {
     incode_vi bs = incode_vi_all((int32_t)b), cs = incode_vi_all((int32_t)c);
     for (uint32_t i = 0; i < star->faces; i += INCODE_VF_LANES) {
         uint32_t found = incode_vf_mask((incode_vi_load(star->b + i) == bs) &
@@ -60,8 +57,7 @@ static bool remove_face(struct incode_star *star, uint32_t b, uint32_t c)
 }
 
 static void toggle_here(struct incode_front *front, uint32_t b, uint32_t c,
-                        uint16_t ib, uint16_t ic)
-{
+                        uint16_t ib, uint16_t ic) {
     struct incode_star *star = &front->star;
     if (remove_face(star, c, b))
         return;
@@ -71,8 +67,7 @@ static void toggle_here(struct incode_front *front, uint32_t b, uint32_t c,
 }
 
 /* Toggles what has waited, when the lists of the last ones are there, too. */
-static void toggle_later(struct incode_front *front)
-{
+static void toggle_later(struct incode_front *front) {
     enum { ROUNDS = 3 };
     struct incode_star *star = &front->star;
     for (unsigned i = 0; i < ROUNDS && star->links > 0; i++)
@@ -85,8 +80,7 @@ static void toggle_later(struct incode_front *front)
 /* A face toggles in another vertex's list: where nobody else looks there before
  * the star is shut, it waits until then, and its list comes meanwhile. */
 static void toggle_there(struct incode_front *front, const uint32_t f[3],
-                         bool held)
-{
+                         bool held) {
     struct incode_star *star = &front->star;
     if (held) {
         incode_front_toggle(front, f, true);
@@ -104,8 +98,7 @@ static void toggle_there(struct incode_front *front, const uint32_t f[3],
 /* A tetrahedron is inside where all its vertices are own and none is a hub. */
 static void toggle_face(struct incode_front *front, const uint32_t v[3],
                         const double *const p[3], const uint16_t hint[3],
-                        bool inside, bool near)
-{
+                        bool inside, bool near) {
     unsigned turn;
     if (inside)
         turn = incode_front_first(front, v);
@@ -128,8 +121,7 @@ static void toggle_face(struct incode_front *front, const uint32_t v[3],
     toggle_here(front, f[1], f[2], hint[(turn + 1) % 3], hint[(turn + 2) % 3]);
 }
 
-static bool all_own(const struct incode_front *front, const uint32_t v[4])
-{
+static bool all_own(const struct incode_front *front, const uint32_t v[4]) {
     return incode_own(front, v[0]) && incode_own(front, v[1]) &&
            incode_own(front, v[2]) && incode_own(front, v[3]);
 }
@@ -139,8 +131,7 @@ static bool all_own(const struct incode_front *front, const uint32_t v[4])
  * taken out already. */
 static void build(struct incode_front *front, const uint32_t v[4],
                   const double *const p[4], const uint16_t hint[4],
-                  bool through)
-{
+                  bool through) {
     struct incode_star *star = &front->star;
     bool all = all_own(front, v);
     star->built++;
@@ -173,8 +164,7 @@ static void build(struct incode_front *front, const uint32_t v[4],
 
 /* A fault that the simulation has to find: a face that is its owner's to pursue
  * is pursued here as well. */
-static bool is_planted(const struct incode_front *front)
-{
+static bool is_planted(const struct incode_front *front) {
 #ifdef INCODE_PLANT_KEPT
     return front->counts.built % 16 == 0;
 #else
@@ -184,8 +174,7 @@ static bool is_planted(const struct incode_front *front)
 }
 
 /* The face (v[0], v[1], v[2]) is of the hull. */
-static void find_hull(struct incode_front *front, const uint32_t v[4])
-{
+static void find_hull(struct incode_front *front, const uint32_t v[4]) {
     front->counts.hull_facets++;
     if (front->exchange.on) {
         front->star.built++; /* it takes as much room */
@@ -197,16 +186,14 @@ static void find_hull(struct incode_front *front, const uint32_t v[4])
 
 /* The tetrahedron beside the face that was taken out, whose first vertex has it
  * in its list, is another's: the face stays open until it comes. */
-static void leave(struct incode_front *front, const uint32_t v[4])
-{
+static void leave(struct incode_front *front, const uint32_t v[4]) {
     front->star.built++;
     front->counts.built++;
     front->counts.foreign++;
     incode_exchange_toggle(front, v, INCODE_FACE_FOREIGN);
 }
 
-static void emit(struct incode_front *front)
-{
+static void emit(struct incode_front *front) {
     struct incode_star *star = &front->star;
     if (star->kept > 0)
         front->outside.emit(front->outside.context, star->v,
@@ -216,8 +203,7 @@ static void emit(struct incode_front *front)
 
 /* ---- a whole star ---- */
 
-bool incode_star_open(struct incode_front *front, uint32_t v)
-{
+bool incode_star_open(struct incode_front *front, uint32_t v) {
     struct incode_star *star = &front->star;
     uint32_t pairs[INCODE_STAR_FACES / 2][2];
     star->v = v;
@@ -232,13 +218,11 @@ bool incode_star_open(struct incode_front *front, uint32_t v)
 }
 
 void incode_star_put(struct incode_front *front,
-                     const struct incode_star_face *face)
-{
+                     const struct incode_star_face *face) {
     push_face(&front->star, face->b, face->c, face->hint[0], face->hint[1]);
 }
 
-bool incode_star_find(struct incode_front *front, uint32_t b, uint32_t c)
-{
+bool incode_star_find(struct incode_front *front, uint32_t b, uint32_t c) {
     struct incode_star *star = &front->star;
     /* It may be among those that did not fit at hand. */
     return remove_face(star, b, c) ||
@@ -246,8 +230,7 @@ bool incode_star_find(struct incode_front *front, uint32_t b, uint32_t c)
 }
 
 void incode_star_build(struct incode_front *front, const uint32_t v[4],
-                       const double *const p[4], const uint16_t hint[4])
-{
+                       const double *const p[4], const uint16_t hint[4]) {
     if (v[3] == INCODE_NONE)
         find_hull(front, v);
     else if (incode_exchange_is_foreign(front, v, 4) && !is_planted(front))
@@ -256,8 +239,7 @@ void incode_star_build(struct incode_front *front, const uint32_t v[4],
         build(front, v, p, hint, true);
 }
 
-void incode_star_shut(struct incode_front *front)
-{
+void incode_star_shut(struct incode_front *front) {
     toggle_later(front);
     put_back(front);
     emit(front);
@@ -266,8 +248,7 @@ void incode_star_shut(struct incode_front *front)
 /* ---- by itself ---- */
 
 static void build_alone(struct incode_front *front, const uint32_t v[4],
-                        const double *const p[4], bool through)
-{
+                        const double *const p[4], bool through) {
     struct incode_star *star = &front->star;
     star->v = v[0];
     star->faces = star->built = star->kept = 0;
@@ -277,8 +258,8 @@ static void build_alone(struct incode_front *front, const uint32_t v[4],
     incode_star_shut(front);
 }
 
-bool incode_front_face(struct incode_front *front, uint32_t v, uint32_t face[3])
-{
+bool incode_front_face(struct incode_front *front, uint32_t v,
+                       uint32_t face[3]) {
     uint32_t pair[1][2];
     bool more;
     if (incode_afl_take(&front->afl, v, pair, 1, &more) == 0)
@@ -293,8 +274,7 @@ bool incode_front_face(struct incode_front *front, uint32_t v, uint32_t face[3])
 }
 
 bool incode_front_use(struct incode_front *front, const uint32_t v[4],
-                      const double *const p[4])
-{
+                      const double *const p[4]) {
     unsigned turn;
     if (!incode_front_key(front, v, p, &turn)) {
         front->fault = "a vertex has moved while its face was under search";
@@ -318,8 +298,7 @@ bool incode_front_use(struct incode_front *front, const uint32_t v[4],
 }
 
 void incode_front_seed(struct incode_front *front, const uint32_t v[4],
-                       const double *const p[4])
-{
+                       const double *const p[4]) {
     if (incode_exchange_is_foreign(front, v, 4)) {
         front->counts.built++; /* in vain */
         front->counts.foreign++;

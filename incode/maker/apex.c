@@ -20,16 +20,14 @@ enum {
     POINTS_A_UNIT = 4 /* of a look at all of them */
 };
 
-static void breathe_over_points(const struct incode_make *n)
-{
+static void breathe_over_points(const struct incode_make *n) {
     struct incode_maker *m = n->maker;
     incode_maker_breathe(m, FACE_UNITS + m->local.near / POINTS_A_UNIT);
 }
 
 /* A regular face's circumcentre is right to 1e-9 of its distance: the sine of
  * its angle at v is at least 1/100. */
-static void set_pencil(struct incode_make *f, const struct incode_sphere *s)
-{
+static void set_pencil(struct incode_make *f, const struct incode_sphere *s) {
     double cn[3], nb[3], nn = incode_dot(s->n, s->n);
     double product = s->lb * s->lc, size = s->lb > s->lc ? s->lb : s->lc;
     f->regular = nn > 1e-4 * product * product && product > 1e-12 && size < 1e6;
@@ -48,8 +46,7 @@ static void set_pencil(struct incode_make *f, const struct incode_sphere *s)
 }
 
 static void copy_point(double p[3], const struct incode_local_points *local,
-                       uint32_t i)
-{
+                       uint32_t i) {
     p[0] = local->p[0][i];
     p[1] = local->p[1][i];
     p[2] = local->p[2][i];
@@ -57,8 +54,7 @@ static void copy_point(double p[3], const struct incode_local_points *local,
 
 /* Takes i as the best if it is strictly beyond the face and inside the best's
  * sphere. */
-static void consider(struct incode_make *n, uint32_t i)
-{
+static void consider(struct incode_make *n, uint32_t i) {
     struct incode_local_points *local = &n->maker->local;
     struct incode_tally *tally = &n->maker->counts.tally;
     if (i == n->b || i == n->c || i == n->best || i == local->self)
@@ -93,8 +89,7 @@ static void consider(struct incode_make *n, uint32_t i)
     }
 }
 
-void incode_make_sphere(struct incode_make *n)
-{
+void incode_make_sphere(struct incode_make *n) {
     double r[3];
     copy_point(n->store[3], &n->maker->local, n->best);
     incode_local_relative(&n->maker->local, n->best, r);
@@ -110,8 +105,7 @@ void incode_make_sphere(struct incode_make *n)
 /* The best of those in doubt, in twice the precision if that can tell: the
  * first of some meets the next of them. */
 static bool rank_first(struct incode_make *n, const uint16_t *first,
-                       uint32_t count)
-{
+                       uint32_t count) {
     const struct incode_local_points *local = &n->maker->local;
     struct incode_close_candidates close;
     uint16_t index[INCODE_CLOSE_MAX];
@@ -145,8 +139,7 @@ static bool rank_first(struct incode_make *n, const uint16_t *first,
 
 /* The best of the first in the pencil, at *t of it; false: it does not stand
  * against the other local points yet. */
-static bool contest_first(struct incode_make *n, double *t)
-{
+static bool contest_first(struct incode_make *n, double *t) {
     const struct incode_local_points *local = &n->maker->local;
     uint16_t first[INCODE_NEAR_ALL];
     double most;
@@ -186,8 +179,7 @@ static bool contest_first(struct incode_make *n, double *t)
 /* The one of some points that is first in the pencil, as far as doubles tell:
  * on a curve, where each point would beat the one before, it beats all. */
 static uint32_t deepest(const struct incode_make *n, const uint16_t *inside,
-                        uint32_t count)
-{
+                        uint32_t count) {
     const struct incode_local_points *local = &n->maker->local;
     uint32_t at = inside[0];
     double most = -__builtin_inf();
@@ -208,8 +200,7 @@ static uint32_t deepest(const struct incode_make *n, const uint16_t *inside,
 /* The best of all local points, by the predicates where bounds do not tell:
  * what is inside the sphere of each better one is chosen again.  Of an
  * irregular face's candidates none has been looked at. */
-static void contest(struct incode_make *n)
-{
+static void contest(struct incode_make *n) {
     const struct incode_local_points *local = &n->maker->local;
     uint16_t inside[INCODE_NEAR_ALL];
     for (uint32_t i = 0; i < local->near && !n->regular; i++) {
@@ -230,8 +221,7 @@ static void contest(struct incode_make *n)
     }
 }
 
-static enum incode_near contest_all(struct incode_make *n)
-{
+static enum incode_near contest_all(struct incode_make *n) {
     const struct incode_local_points *local = &n->maker->local;
     bool fits;
     double t;
@@ -249,8 +239,7 @@ static enum incode_near contest_all(struct incode_make *n)
     return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
 }
 
-void incode_search_from(struct incode_make *n, struct incode_search *s)
-{
+void incode_search_from(struct incode_make *n, struct incode_search *s) {
     const struct incode_local_points *local = &n->maker->local;
     struct incode_query *q = &s->query;
     memset(q, 0, sizeof *q);
@@ -294,8 +283,7 @@ enum { COPLANAR_POINTS = 3, COPLANAR_ASKED = 12 };
 
 /* Whether no sphere tells where the apex is, and local points are in doubt
  * about the face or the face itself is thin. */
-static bool is_doubtful(const struct incode_make *n)
-{
+static bool is_doubtful(const struct incode_make *n) {
     const struct incode_local_points *local = &n->maker->local;
     const struct incode_sphere *s = &n->sphere;
     uint32_t count = 0;
@@ -320,8 +308,7 @@ static bool is_doubtful(const struct incode_make *n)
  * and is taken for one of the hull's side. */
 enum lie { UNKNOWN, INTERIOR, COPLANAR };
 
-static enum lie lie_of(const struct incode_make *n)
-{
+static enum lie lie_of(const struct incode_make *n) {
     const struct incode_maker *m = n->maker;
     const struct incode_sphere *sphere = &n->sphere;
     enum lie lie = n->regular ? UNKNOWN : COPLANAR;
@@ -340,8 +327,7 @@ static enum lie lie_of(const struct incode_make *n)
 /* Lets some local points say how far the apex may be: where one's sphere is
  * too ill-conditioned to tell, another's may do.  True: the best at hand is
  * it. */
-static bool reach_fits(struct incode_make *n)
-{
+static bool reach_fits(struct incode_make *n) {
     const struct incode_local_points *local = &n->maker->local;
     uint32_t asked = 0;
     bool fits = false;
@@ -372,8 +358,7 @@ static bool reach_fits(struct incode_make *n)
 }
 
 /* Whether the local points decide on an apex. */
-static bool contest_near_degenerate(struct incode_make *n)
-{
+static bool contest_near_degenerate(struct incode_make *n) {
     const struct incode_maker *m = n->maker;
     const struct incode_local_points *local = &m->local;
     n->degenerate.known = true;
@@ -392,8 +377,7 @@ static bool contest_near_degenerate(struct incode_make *n)
 
 enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
                                   uint32_t c, uint32_t *apex,
-                                  struct incode_search *s)
-{
+                                  struct incode_search *s) {
     struct incode_local_points *local = &m->local;
     struct incode_make n;
     n.maker = m;

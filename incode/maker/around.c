@@ -22,15 +22,13 @@ struct look {
     uint32_t bricks, pages; /* indices of the former, then of the latter */
 };
 
-static void set_done(struct look *look, uint32_t index)
-{
+static void set_done(struct look *look, uint32_t index) {
     look->done[index / 64] |= UINT64_C(1) << (index % 64);
 }
 
 /* Bricks go first, those beside the vertex's own before others: they are near
  * and draw the cap in. */
-static void reach(struct incode_maker *m, struct look *look)
-{
+static void reach(struct incode_maker *m, struct look *look) {
     const struct incode_horizon *h = &m->horizon;
     uint32_t pages[INCODE_HORIZON_MAX];
     incode_maker_breathe(m, h->count / BOXES_A_UNIT);
@@ -52,8 +50,7 @@ enum { CROWD = 32 /* boxes: so many are many */ };
 /* Where a cap reaches many boxes, points may lie on one sphere up to rounding:
  * empty spheres met before rule out others. */
 static void bound(struct incode_maker *m, const struct incode_query *q,
-                  struct look *look)
-{
+                  struct look *look) {
     struct incode_radical_bound radical;
     if (look->bricks + look->pages < CROWD || q->best == INCODE_NONE ||
         look->cap.bounded)
@@ -69,8 +66,8 @@ static void bound(struct incode_maker *m, const struct incode_query *q,
 
 /* Splits the pages that the cap reaches; false: one is missing, or there is no
  * room. */
-static bool split(struct incode_maker *m, struct look *look, uint32_t *missing)
-{
+static bool split(struct incode_maker *m, struct look *look,
+                  uint32_t *missing) {
     for (uint32_t i = 0; i < look->pages; i++) {
         uint32_t at = look->index[look->bricks + i];
         if (incode_horizon_split(&m->horizon, &m->walker, at, &look->cap,
@@ -85,8 +82,7 @@ static bool split(struct incode_maker *m, struct look *look, uint32_t *missing)
 
 /* A bound of the errors of a vector's components is small enough to vanish
  * among the roundings to single precision. */
-static bool is_sure(const double a[3], const double bound[3])
-{
+static bool is_sure(const double a[3], const double bound[3]) {
     return INCODE_SPHERE_EPS * bound[0] < 0x1p-26 * incode_max_norm(a) &&
            INCODE_SPHERE_EPS * bound[1] < 0x1p-26 * incode_max_norm(a) &&
            INCODE_SPHERE_EPS * bound[2] < 0x1p-26 * incode_max_norm(a);
@@ -94,8 +90,7 @@ static bool is_sure(const double a[3], const double bound[3])
 
 static bool sphere_cap(const struct incode_horizon *h,
                        const struct incode_query *q,
-                       struct incode_horizon_cap *cap)
-{
+                       struct incode_horizon_cap *cap) {
     const struct incode_sphere *s = &q->sphere;
     double det = s->det - INCODE_SPHERE_EPS * s->pdet;
     return s->has_apex && is_sure(s->m, s->pm) && is_sure(s->n, s->pn) &&
@@ -106,8 +101,7 @@ static bool sphere_cap(const struct incode_horizon *h,
 /* That of all spheres through the face. */
 static bool plane_cap(const struct incode_horizon *h,
                       const struct incode_query *q,
-                      struct incode_horizon_cap *cap)
-{
+                      struct incode_horizon_cap *cap) {
     const struct incode_sphere *s = &q->sphere;
     return is_sure(s->n, s->pn) &&
            incode_horizon_cap(h, cap, q->pv, q->scale, s->n, 0, s->n);
@@ -117,8 +111,7 @@ static bool plane_cap(const struct incode_horizon *h,
  * is not beyond the face comes last.  c0: centre of the circle, relative to the
  * vertex in the horizon's units. */
 static float middle(const struct incode_horizon *h, const struct look *look,
-                    const float c0[3], uint32_t i)
-{
+                    const float c0[3], uint32_t i) {
     float square = 0, level = 0, along = 0;
     for (int d = 0; d < 3; d++) {
         float y = (h->lo[d][i] + h->hi[d][i]) * 0.5F - look->cap.v[d];
@@ -133,8 +126,7 @@ static float middle(const struct incode_horizon *h, const struct look *look,
 }
 
 /* The centre of the face's circle, about, in the horizon's units. */
-static void set_middle(const struct incode_make *n, float c0[3])
-{
+static void set_middle(const struct incode_make *n, float c0[3]) {
     const struct incode_sphere *s = &n->sphere;
     double cn[3], nb[3], nn = incode_dot(s->n, s->n);
     double ratio = n->maker->horizon.scale / n->maker->local.scale;
@@ -149,8 +141,7 @@ static void set_middle(const struct incode_make *n, float c0[3])
 /* Puts what is first in the pencil first; where it is a page, that alone is
  * left. */
 static void choose_first(struct incode_maker *m, struct look *look,
-                         const float c0[3])
-{
+                         const float c0[3]) {
     const struct incode_horizon *h = &m->horizon;
     uint32_t count = look->bricks + look->pages, first = 0;
     incode_maker_breathe(m, count / BOXES_A_UNIT);
@@ -176,8 +167,7 @@ static void choose_first(struct incode_maker *m, struct look *look,
  * is missing.  *frame: set where there are any. */
 static bool points_of(struct incode_maker *m, struct look *look, uint32_t index,
                       uint64_t *in, const struct incode_frame **frame,
-                      uint32_t *missing)
-{
+                      uint32_t *missing) {
     struct incode_horizon *h = &m->horizon;
     uint32_t brick = h->page[index];
     const struct incode_frame *f = NULL;
@@ -201,8 +191,7 @@ static bool points_of(struct incode_maker *m, struct look *look, uint32_t index,
 /* Considers the points of the bricks, up to a first candidate; false: one is
  * missing, or the best's sphere tells nothing. */
 static bool visit_bricks(struct incode_maker *m, struct incode_query *q,
-                         struct look *look)
-{
+                         struct look *look) {
     bool none = q->best == INCODE_NONE;
     for (uint32_t i = 0; i < look->bricks; i++) {
         const struct incode_frame *f;
@@ -233,8 +222,7 @@ enum { TRIES = 8 /* boxes, for a first candidate */ };
 /* At first, only points that are clearly beyond the face count, so that those
  * in its plane need not be told apart in vain.  What is coplanar up to rounding
  * is left to those who know of half-spaces. */
-static bool search_spheres(struct incode_make *n, struct incode_search *s)
-{
+static bool search_spheres(struct incode_make *n, struct incode_search *s) {
     struct incode_maker *m = n->maker;
     const struct incode_horizon *h = &m->horizon;
     struct incode_query *q = &s->query;
@@ -287,8 +275,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s)
 enum { BATCH = 8 /* bricks looked at before the ball is drawn in */ };
 
 /* The bit of a vertex in its brick, 0 in others. */
-static uint64_t bit_of(uint32_t id, uint32_t brick)
-{
+static uint64_t bit_of(uint32_t id, uint32_t brick) {
     return (uint64_t)(id / INCODE_BRICK_POINTS == brick)
            << id % INCODE_BRICK_POINTS;
 }
@@ -296,8 +283,7 @@ static uint64_t bit_of(uint32_t id, uint32_t brick)
 /* The bits of a brick's points, but for the face's and the best so far, which
  * are in the ball. */
 static uint64_t others(const struct incode_query *q,
-                       const struct incode_frame *frame)
-{
+                       const struct incode_frame *frame) {
     uint32_t brick = frame->number;
     uint64_t all = frame->count < INCODE_BRICK_POINTS
                        ? (UINT64_C(1) << frame->count) - 1
@@ -310,8 +296,7 @@ static uint64_t others(const struct incode_query *q,
  * there, or of all spheres. */
 static bool pencil_cap(const struct incode_make *n,
                        const struct incode_query *q,
-                       struct incode_horizon_cap *cap)
-{
+                       struct incode_horizon_cap *cap) {
     const struct incode_horizon *h = &n->maker->horizon;
     const struct incode_pencil *pencil = &n->pencil;
     double m[3], t = incode_pencil_later(pencil, q->t);
@@ -326,8 +311,7 @@ static bool pencil_cap(const struct incode_make *n,
  * or too much lies in the cap. */
 static bool look_at(struct incode_make *n, struct incode_query *q,
                     struct look *look, const uint32_t *index, uint32_t count,
-                    struct incode_hits *hits)
-{
+                    struct incode_hits *hits) {
     for (uint32_t i = 0; i < count; i++) {
         const struct incode_frame *f;
         uint64_t in;
@@ -345,8 +329,7 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
 
 /* The same for a better one, with the bound that holds for all before it. */
 static bool next_cap(const struct incode_make *n, const struct incode_query *q,
-                     struct look *look)
-{
+                     struct look *look) {
     struct incode_horizon_cap old = look->cap;
     if (!pencil_cap(n, q, &look->cap))
         return false;
@@ -362,8 +345,7 @@ static bool next_cap(const struct incode_make *n, const struct incode_query *q,
  * missing, or too much lies in the cap. */
 static bool look_at_bricks(struct incode_make *n, struct incode_query *q,
                            struct look *look, struct incode_hits *hits,
-                           bool *much)
-{
+                           bool *much) {
     double square = q->square;
     uint32_t batch = square < __builtin_inf() ? BATCH : 1;
     *much = false;
@@ -382,8 +364,7 @@ static bool look_at_bricks(struct incode_make *n, struct incode_query *q,
 
 /* Looks at all that the ball reaches. */
 static bool look_around(struct incode_make *n, struct incode_query *q,
-                        struct incode_hits *hits)
-{
+                        struct incode_hits *hits) {
     struct incode_maker *m = n->maker;
     struct look look = {.done = {0}};
     float c0[3];
@@ -414,8 +395,7 @@ static bool look_around(struct incode_make *n, struct incode_query *q,
 /* The first of the hits and of the best so far, at t, which does not count if a
  * hit's place is certainly before. */
 static void settle(struct incode_make *n, struct incode_query *q, double t,
-                   const struct incode_hits *hits)
-{
+                   const struct incode_hits *hits) {
     struct incode_tally *tally = &n->maker->counts.tally;
     double last = incode_pencil_later(&n->pencil, q->t);
     bool any = q->best != INCODE_NONE && t <= last;
@@ -434,8 +414,7 @@ static void settle(struct incode_make *n, struct incode_query *q, double t,
     }
 }
 
-static void set_query(struct incode_make *n, struct incode_query *q)
-{
+static void set_query(struct incode_make *n, struct incode_query *q) {
     const struct incode_local_points *local = &n->maker->local;
     memcpy(q->pv, n->pv, sizeof q->pv);
     memcpy(q->pb, n->pb, sizeof q->pb);
@@ -455,8 +434,7 @@ static void set_query(struct incode_make *n, struct incode_query *q)
     q->t = q->square = __builtin_inf();
 }
 
-static bool search_pencil(struct incode_make *n, struct incode_search *s)
-{
+static bool search_pencil(struct incode_make *n, struct incode_search *s) {
     struct incode_maker *m = n->maker;
     struct incode_query *q = &s->query;
     struct incode_hits hits;
@@ -484,8 +462,7 @@ static bool search_pencil(struct incode_make *n, struct incode_search *s)
     return true;
 }
 
-bool incode_apex_around(struct incode_make *n, struct incode_search *s)
-{
+bool incode_apex_around(struct incode_make *n, struct incode_search *s) {
     struct incode_maker *m = n->maker;
     uint64_t before = m->counts.candidates;
     bool found = false;

@@ -5,8 +5,7 @@
 
 /* Three numbers along the axes' two directions, in the order of a box's walls;
  * the lanes from `first` on. */
-INCODE_INLINE incode_vd both_ways(const double a[3], int first)
-{
+INCODE_INLINE incode_vd both_ways(const double a[3], int first) {
 #if INCODE_VECTOR == 64
     (void)first;
     return (incode_vd){a[0], a[1], a[2], 0, -a[0], -a[1], -a[2], 0};
@@ -23,8 +22,7 @@ INCODE_INLINE incode_vd both_ways(const double a[3], int first)
 }
 
 bool incode_cap_fits(const double walls[8], const struct incode_pencil *pencil,
-                     double t)
-{
+                     double t) {
     double circle = incode_dot(pencil->c0, pencil->c0);
     double square = circle + 0.25 * t * t, radius = __builtin_sqrt(square);
     incode_vd zero = incode_vd_all(0);
@@ -48,8 +46,7 @@ bool incode_cap_fits(const double walls[8], const struct incode_pencil *pencil,
 }
 
 /* The centre is m / (2 det), the radius its length. */
-bool incode_sphere_fits(const double wall[8], const struct incode_sphere *s)
-{
+bool incode_sphere_fits(const double wall[8], const struct incode_sphere *s) {
     if (!(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
         !(s->det > INCODE_SPHERE_LEAST)) /* squares below would underflow */
         return false;

@@ -13,8 +13,8 @@ struct range {
 
 /* The cells of dimension d within `reach` of the centre. */
 static struct range range_of(const struct incode_cell_search *c,
-                             const struct incode_grid *g, int d, uint32_t reach)
-{
+                             const struct incode_grid *g, int d,
+                             uint32_t reach) {
     uint32_t at = c->centre[d], last = g->cells[d] - 1;
     return (struct range){at > reach ? at - reach : 0,
                           last - at > reach ? at + reach : last};
@@ -27,16 +27,14 @@ struct lane_boxes {
 };
 
 static uint32_t passing(const struct incode_query *q,
-                        const struct lane_boxes *boxes, unsigned count)
-{
+                        const struct lane_boxes *boxes, unsigned count) {
     const double *const lo[3] = {boxes->lo[0], boxes->lo[1], boxes->lo[2]};
     const double *const hi[3] = {boxes->hi[0], boxes->hi[1], boxes->hi[2]};
     return incode_query_boxes(q, lo, hi, count);
 }
 
 static void set_range(struct lane_boxes *boxes, const struct incode_grid *g,
-                      int d, struct range range)
-{
+                      int d, struct range range) {
     boxes->lo[d][0] = incode_cells_lowest(g, d, range.first);
     boxes->hi[d][0] = incode_cells_highest(g, d, range.last);
 }
@@ -45,8 +43,7 @@ static void set_range(struct lane_boxes *boxes, const struct incode_grid *g,
  * the whole box, one beyond each side. */
 static bool more_beyond(const struct incode_cell_search *c,
                         const struct incode_grid *g,
-                        const struct incode_query *q)
-{
+                        const struct incode_query *q) {
     struct lane_boxes boxes;
     unsigned count = 0;
     memset(&boxes, 0, sizeof boxes);
@@ -86,8 +83,7 @@ struct batch {
 
 /* Vertex i of the list; false: page *missing is. */
 static bool listed(const struct incode_grid *g, uint32_t i, uint32_t *id,
-                   uint32_t *missing)
-{
+                   uint32_t *missing) {
     if (!incode_cells_word(g, g->tree->list_base, i, id, missing))
         return false;
     /* What a page may hold at most is one too many for a vertex. */
@@ -99,8 +95,7 @@ static bool listed(const struct incode_grid *g, uint32_t i, uint32_t *id,
  * those. */
 static bool fill_batch(const struct incode_cell_search *c,
                        const struct incode_grid *g, struct batch *batch,
-                       uint32_t *missing)
-{
+                       uint32_t *missing) {
     const struct incode_frame *f = NULL;
     uint32_t brick = INCODE_NONE;
     memset(batch->p, 0, sizeof batch->p);
@@ -126,8 +121,7 @@ static bool fill_batch(const struct incode_cell_search *c,
 }
 
 static void look_at(struct incode_cell_search *c, struct incode_walker *walker,
-                    struct incode_query *q, const struct batch *batch)
-{
+                    struct incode_query *q, const struct batch *batch) {
     struct incode_tally *tally = walker->tally;
     const double *const axis[3] = {batch->p[0], batch->p[1], batch->p[2]};
     uint32_t lanes = incode_query_lanes(q, axis);
@@ -150,8 +144,7 @@ static void look_at(struct incode_cell_search *c, struct incode_walker *walker,
 
 /* Asks for the bricks of the next points, which will be missing, too. */
 static void ask_ahead(const struct incode_cell_search *c,
-                      const struct incode_grid *g)
-{
+                      const struct incode_grid *g) {
     uint32_t id, page;
     for (uint32_t i = c->list; i < c->end && i < c->list + ASK_AHEAD; i++) {
         if (!listed(g, i, &id, &page))
@@ -161,8 +154,7 @@ static void ask_ahead(const struct incode_cell_search *c,
 }
 
 /* Rows and points that a call may look at. */
-static uint32_t work_of(const struct incode_walker *walker)
-{
+static uint32_t work_of(const struct incode_walker *walker) {
     const uint32_t most = INCODE_CELL_SEARCH_WORK / INCODE_CELL_SEARCH_UNIT;
     uint32_t units = walker->left < most ? walker->left : most;
     return units == 0 ? 1 : units * INCODE_CELL_SEARCH_UNIT;
@@ -172,8 +164,7 @@ static uint32_t work_of(const struct incode_walker *walker)
 static enum incode_walk finish_piece(struct incode_cell_search *c,
                                      const struct incode_grid *g,
                                      struct incode_walker *walker,
-                                     struct incode_query *q, uint32_t *work)
-{
+                                     struct incode_query *q, uint32_t *work) {
     while (c->list < c->end) {
         struct batch batch;
         incode_walker_breathe(walker, BATCH_UNITS);
@@ -207,8 +198,7 @@ struct shell {
     uint32_t work;
 };
 
-static bool is_within(struct range range, uint32_t i)
-{
+static bool is_within(struct range range, uint32_t i) {
     return i >= range.first && i <= range.last;
 }
 
@@ -217,8 +207,7 @@ static bool is_within(struct range range, uint32_t i)
 static enum incode_walk next_piece(struct incode_cell_search *c,
                                    const struct incode_grid *g,
                                    const struct incode_walker *walker,
-                                   struct incode_query *q, struct shell *s)
-{
+                                   struct incode_query *q, struct shell *s) {
     bool crosses = c->any_done && is_within(s->inner[1], c->y) &&
                    is_within(s->inner[2], c->z);
     uint32_t row = (c->z * g->cells[1] + c->y) * g->cells[0];
@@ -262,8 +251,7 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
 static bool passes(const struct incode_grid *g,
                    const struct incode_walker *walker,
                    const struct incode_query *q, struct shell *s,
-                   struct tested *tested, int d, uint32_t i)
-{
+                   struct tested *tested, int d, uint32_t i) {
     if (i >= tested->first && i < tested->end)
         return (tested->mask >> (i - tested->first) & 1) != 0;
     struct lane_boxes boxes;
@@ -289,8 +277,7 @@ static bool passes(const struct incode_grid *g,
 static enum incode_walk run_row(struct incode_cell_search *c,
                                 const struct incode_grid *g,
                                 struct incode_walker *walker,
-                                struct incode_query *q, struct shell *s)
-{
+                                struct incode_query *q, struct shell *s) {
     if (c->x == s->outer[0].first &&
         !passes(g, walker, q, s, &s->rows, 1, c->y))
         return INCODE_WALK_DONE;
@@ -310,8 +297,7 @@ static enum incode_walk run_row(struct incode_cell_search *c,
 static enum incode_walk run_layer(struct incode_cell_search *c,
                                   const struct incode_grid *g,
                                   struct incode_walker *walker,
-                                  struct incode_query *q, struct shell *s)
-{
+                                  struct incode_query *q, struct shell *s) {
     if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
         !passes(g, walker, q, s, &s->layers, 2, c->z))
         return INCODE_WALK_DONE;
@@ -332,8 +318,7 @@ static enum incode_walk run_layer(struct incode_cell_search *c,
 static enum incode_walk run_shell(struct incode_cell_search *c,
                                   const struct incode_grid *g,
                                   struct incode_walker *walker,
-                                  struct incode_query *q)
-{
+                                  struct incode_query *q) {
     struct shell s;
     memset(&s, 0, sizeof s);
     for (int d = 0; d < 3; d++) {
@@ -356,8 +341,7 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
 }
 
 static void start_shell(struct incode_cell_search *c,
-                        const struct incode_grid *g)
-{
+                        const struct incode_grid *g) {
     c->x = range_of(c, g, 0, c->reach).first;
     c->y = range_of(c, g, 1, c->reach).first;
     c->z = range_of(c, g, 2, c->reach).first;
@@ -366,8 +350,7 @@ static void start_shell(struct incode_cell_search *c,
 
 void incode_cell_search_begin(struct incode_cell_search *c,
                               const struct incode_grid *grid,
-                              const struct incode_query *q)
-{
+                              const struct incode_query *q) {
     memset(c, 0, sizeof *c);
     for (int d = 0; d < 3; d++) {
         double middle = q->pv[d] / 3 + q->pb[d] / 3 + q->pc[d] / 3;
@@ -381,8 +364,7 @@ void incode_cell_search_begin(struct incode_cell_search *c,
 enum incode_walk incode_cell_search_run(struct incode_cell_search *c,
                                         const struct incode_grid *grid,
                                         struct incode_walker *walker,
-                                        struct incode_query *q)
-{
+                                        struct incode_query *q) {
     enum incode_walk r = run_shell(c, grid, walker, q);
     if (r != INCODE_WALK_DONE || !more_beyond(c, grid, q))
         return r;

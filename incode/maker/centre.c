@@ -12,8 +12,7 @@ enum {
     COPY_TRIES = 64
 };
 
-static double longest_side(const double lo[3], const double hi[3])
-{
+static double longest_side(const double lo[3], const double hi[3]) {
     double extent = 0;
     for (int d = 0; d < 3; d++)
         extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
@@ -23,8 +22,7 @@ static double longest_side(const double lo[3], const double hi[3])
 /* Half-width of the box of local points: the extent of the leaf, times what has
  * lately given the wanted number of points around a vertex. */
 static double first_radius(const struct incode_maker *m, const double lo[3],
-                           const double hi[3])
-{
+                           const double hi[3]) {
     double extent = longest_side(lo, hi);
     if (!(extent > 0)) {
         for (int d = 0; d < 3; d++) {
@@ -37,8 +35,7 @@ static double first_radius(const struct incode_maker *m, const double lo[3],
     return radius < 0x1p1000 ? radius : 0x1p1000;
 }
 
-static void learn_spread(struct incode_maker *m, uint32_t points)
-{
+static void learn_spread(struct incode_maker *m, uint32_t points) {
     if (points > NEAR_WANTED * 9 / 8)
         m->spread *= 0.98;
     else if (points < NEAR_WANTED * 7 / 8)
@@ -49,8 +46,7 @@ static void learn_spread(struct incode_maker *m, uint32_t points)
 /* Brings the points around the leaf of a vertex to hand. */
 static enum incode_outcome copy_around_leaf(struct incode_maker *m,
                                             struct incode_search *s, uint32_t v,
-                                            const struct incode_frame *f)
-{
+                                            const struct incode_frame *f) {
     struct incode_local_points *local = &m->local;
     uint32_t leaf = v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
     alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
@@ -83,8 +79,7 @@ enum { HORIZON_TRIES = 12 };
  * none where there are too many whatever the box. */
 static enum incode_outcome list_bricks(struct incode_maker *m,
                                        struct incode_search *s, uint32_t brick,
-                                       const struct incode_frame *f)
-{
+                                       const struct incode_frame *f) {
     struct incode_horizon *h = &m->horizon;
     double lo[3], hi[3];
     bool full = false;
@@ -121,8 +116,7 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
 }
 
 enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
-                                        uint32_t v)
-{
+                                        uint32_t v) {
     struct incode_search *s = &m->search[search];
     struct incode_local_points *local = &m->local;
     uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;

@@ -17,8 +17,7 @@
 #define FINE 1e-27
 #define TINY 1e-250
 
-bool incode_close_add(struct incode_close_candidates *f, const double p[3])
-{
+bool incode_close_add(struct incode_close_candidates *f, const double p[3]) {
     if (f->count == INCODE_CLOSE_MAX)
         return false;
     for (int d = 0; d < 3; d++)
@@ -34,8 +33,7 @@ struct face {
     double denominator;  /* over |r| */
 };
 
-bool incode_close_may_tell(const double b[3], const double c[3])
-{
+bool incode_close_may_tell(const double b[3], const double c[3]) {
     bool exact = true;
     for (int k = 0; k < 3; k++) {
         double e, f;
@@ -47,8 +45,7 @@ bool incode_close_may_tell(const double b[3], const double c[3])
 }
 
 static void set_face(struct face *f, const double v[3], const double pb[3],
-                     const double pc[3], double scale)
-{
+                     const double pc[3], double scale) {
     struct incode_dd_vector b = incode_dd_relative(pb, v, scale);
     struct incode_dd_vector c = incode_dd_relative(pc, v, scale);
     struct incode_dd w[3];
@@ -78,8 +75,7 @@ struct places {
 INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
                              const struct face *f,
                              const struct incode_close_candidates *close,
-                             const double v[3], double scale)
-{
+                             const double v[3], double scale) {
     struct incode_lanes r[3], n[3], m[3];
     incode_vd size = incode_vd_all(0), tiny = incode_vd_all(TINY);
     for (int d = 0; d < 3; d++) {
@@ -119,15 +115,13 @@ INCODE_INLINE uint32_t place(struct places *out, uint32_t i,
 
 static bool is_beyond(const struct incode_close_candidates *f, uint32_t i,
                       const double v[3], const double b[3], const double c[3],
-                      struct incode_tally *tally)
-{
+                      struct incode_tally *tally) {
     const double p[3] = {f->p[0][i], f->p[1][i], f->p[2][i]};
     return incode_orient3d(tally, v, b, c, p) > 0;
 }
 
 /* The first of them, if it is certain, without a branch on which it is. */
-static uint32_t first_of(const struct places *at, uint32_t count)
-{
+static uint32_t first_of(const struct places *at, uint32_t count) {
     incode_vd infinite = incode_vd_all(__builtin_inf()), least = infinite;
     alignas(64) double gap[INCODE_CLOSE_MAX];
     uint32_t best = 0, near = 0;
@@ -159,8 +153,7 @@ static uint32_t first_of(const struct places *at, uint32_t count)
 uint32_t incode_close_first(struct incode_close_candidates *f,
                             const double v[3], const double b[3],
                             const double c[3], double scale,
-                            struct incode_tally *tally)
-{
+                            struct incode_tally *tally) {
     struct face face;
     struct places at;
     uint32_t doubt = 0;

@@ -4,8 +4,7 @@
 /* The points of a horizon's bricks, copied in its units. */
 
 void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
-                         const struct incode_frame *frame)
-{
+                         const struct incode_frame *frame) {
     const struct incode_brick *b = &frame->page.brick;
     const double *const axis[3] = {b->x, b->y, b->z};
     uint32_t copy = h->next;
@@ -26,8 +25,7 @@ void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
 }
 
 static uint64_t points_beyond(const float (*point)[INCODE_BRICK_POINTS],
-                              const struct incode_horizon_cap *cap, float far)
-{
+                              const struct incode_horizon_cap *cap, float far) {
     incode_vf most = incode_vf_all(cap->level + far * cap->slack);
     uint64_t out = 0;
     for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
@@ -42,8 +40,7 @@ static uint64_t points_beyond(const float (*point)[INCODE_BRICK_POINTS],
 }
 
 uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
-                               const struct incode_horizon_cap *cap)
-{
+                               const struct incode_horizon_cap *cap) {
     const float(*point)[INCODE_BRICK_POINTS] = h->point[h->copy[index]];
     float far = h->far[index] + cap->near;
     /* A half-space says nothing of points that are beyond all bounds. */

@@ -7,8 +7,7 @@
 /* Relative error of a sum of some numbers of twice the precision. */
 #define FINE 1e-29
 
-static struct incode_dd ratio(struct incode_dd a, struct incode_dd b)
-{
+static struct incode_dd ratio(struct incode_dd a, struct incode_dd b) {
     struct incode_dd q = {a.hi / b.hi, 0}, r;
     double rest = incode_dd_minus(a, incode_dd_times(q, b)).hi / b.hi;
     r.hi = incode_fast_two_sum(q.hi, rest, &r.lo);
@@ -17,8 +16,7 @@ static struct incode_dd ratio(struct incode_dd a, struct incode_dd b)
 
 /* False: too little is known of it. */
 static bool circum_of(struct incode_circum *c, const double *const p[4],
-                      double scale)
-{
+                      double scale) {
     struct incode_near_degenerate degenerate;
     degenerate.known = degenerate.regular = false;
     degenerate.count = 0;
@@ -46,8 +44,7 @@ static bool circum_of(struct incode_circum *c, const double *const p[4],
 
 /* Nearly the same sphere, as far as doubles can tell. */
 static bool is_same(const struct incode_circum *a,
-                    const struct incode_circum *b)
-{
+                    const struct incode_circum *b) {
     double gap[3], size = incode_dd_max_norm(a->twice) / a->scale;
     for (int k = 0; k < 3; k++)
         gap[k] = a->p[k] * 2 + a->twice[k].hi / a->scale - b->p[k] * 2 -
@@ -56,8 +53,7 @@ static bool is_same(const struct incode_circum *a,
 }
 
 void incode_empty_spheres_add(struct incode_empty_spheres *e,
-                              const double *const p[4], double scale)
-{
+                              const double *const p[4], double scale) {
     struct incode_circum c;
     if (!circum_of(&c, p, scale))
         return;
@@ -78,8 +74,7 @@ void incode_empty_spheres_add(struct incode_empty_spheres *e,
  * less that in the empty sphere is (N - M - 2 d) . r - (|d|^2 - N . d). */
 static bool bound_of(struct incode_radical_bound *c,
                      const struct incode_circum *b,
-                     const struct incode_circum *empty)
-{
+                     const struct incode_circum *empty) {
     struct incode_dd_vector d = incode_dd_relative(b->p, empty->p, b->scale);
     struct incode_dd there[3], negative[3];
     double share = b->scale / empty->scale, size = 0;
@@ -109,8 +104,7 @@ static bool bound_of(struct incode_radical_bound *c,
 void incode_radical_bound_set(struct incode_radical_bound *c,
                               const struct incode_empty_spheres *e,
                               const double *const p[4], double scale,
-                              const double n[3])
-{
+                              const double n[3]) {
     struct incode_circum best;
     double most = 0;
     c->set = false;

@@ -8,8 +8,7 @@
 /* Index of vertex `id` among the local points, fetched and appended if it is
  * far; INCODE_AGAIN: the room for far vertices is used up. */
 static enum incode_outcome resolve(struct incode_maker *m, uint32_t id,
-                                   uint16_t *index, uint32_t *page)
-{
+                                   uint16_t *index, uint32_t *page) {
     if (*index != INCODE_LOCAL_NONE)
         return INCODE_OK;
     uint32_t i = incode_local_find(&m->local, id);
@@ -27,8 +26,7 @@ static enum incode_outcome resolve(struct incode_maker *m, uint32_t id,
 
 /* The answer at three local points. */
 static void set_answer(struct incode_answer *a, const struct incode_maker *m,
-                       uint16_t b, uint16_t c, uint16_t apex)
-{
+                       uint16_t b, uint16_t c, uint16_t apex) {
     const struct incode_local_points *local = &m->local;
     const uint16_t near[3] = {b, c, apex};
     a->f[0] = local->vertex;
@@ -43,16 +41,14 @@ static void set_answer(struct incode_answer *a, const struct incode_maker *m,
 }
 
 static void set_hull(struct incode_answer *a, uint32_t v, uint32_t b,
-                     uint32_t c)
-{
+                     uint32_t c) {
     const uint32_t f[4] = {v, b, c, INCODE_NONE};
     memcpy(a->f, f, sizeof a->f);
 }
 
 enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
                                       uint32_t b, uint32_t c, uint16_t near[2],
-                                      struct incode_answer *a)
-{
+                                      struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
     uint32_t apex;
     enum incode_outcome r = resolve(m, b, &near[0], &s->page);
@@ -77,8 +73,7 @@ enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
 }
 
 enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
-                                        struct incode_answer *a)
-{
+                                        struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
     const struct incode_query *q = &s->query;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
@@ -113,16 +108,14 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
 
 /* ---- faces as they come ---- */
 
-static bool is_at_hand(const struct incode_maker *m, uint32_t v)
-{
+static bool is_at_hand(const struct incode_maker *m, uint32_t v) {
     return m->local.vertex == v && m->local.leaf == v / INCODE_LEAF_POINTS &&
            m->horizon.centre == v / INCODE_BRICK_POINTS;
 }
 
 static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,
                                        const uint32_t f[3],
-                                       struct incode_answer *a)
-{
+                                       struct incode_answer *a) {
     enum incode_outcome r = is_at_hand(m, f[0]) ? INCODE_MORE : INCODE_AGAIN;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
     for (bool begun = false; r == INCODE_AGAIN || r == INCODE_MORE;
@@ -146,8 +139,7 @@ enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
                                         const uint32_t (*faces)[3],
                                         uint32_t count,
                                         struct incode_answer *answers,
-                                        uint32_t *done)
-{
+                                        uint32_t *done) {
     while (*done < count) {
         const uint32_t *f = faces[*done];
         struct incode_answer *a = &answers[*done];

@@ -18,8 +18,7 @@ enum { LOOKS = 16 /* a call, at most */ };
 
 static void begin_walk(struct incode_maker *m, struct incode_search *search,
                        uint32_t v, enum incode_question question,
-                       const struct incode_frame *frame, const double p[3])
-{
+                       const struct incode_frame *frame, const double p[3]) {
     struct incode_query *q = &search->query;
     memset(q, 0, sizeof *q);
     q->question = question;
@@ -42,8 +41,7 @@ static void begin_walk(struct incode_maker *m, struct incode_search *search,
 }
 
 static void look(struct incode_maker *m, struct incode_search *search,
-                 const double pv[3])
-{
+                 const double pv[3]) {
     struct incode_first *s = &search->first;
     uint32_t v = search->query.v;
     const struct incode_frame *f =
@@ -63,15 +61,13 @@ static void look(struct incode_maker *m, struct incode_search *search,
     m->counts.calls++;
 }
 
-static void set_point(uint32_t *v, double p[3], const struct incode_query *q)
-{
+static void set_point(uint32_t *v, double p[3], const struct incode_query *q) {
     *v = q->best;
     memcpy(p, q->best_p, sizeof q->best_p);
 }
 
 /* Takes in what one look has found; true: the tetrahedron is settled. */
-static bool looked(struct incode_maker *m, struct incode_search *search)
-{
+static bool looked(struct incode_maker *m, struct incode_search *search) {
     struct incode_first *s = &search->first;
     const struct incode_query *q = &search->query;
     if (s->stage == INCODE_FIRST_APEX) {
@@ -98,8 +94,7 @@ static bool looked(struct incode_maker *m, struct incode_search *search)
 }
 
 static void settle(struct incode_maker *m, struct incode_search *search,
-                   const double pv[3], struct incode_answer *a)
-{
+                   const double pv[3], struct incode_answer *a) {
     const struct incode_first *s = &search->first;
     const uint32_t f[4] = {search->query.v, s->u, s->w, s->a};
     const double *const p[4] = {pv, s->pu, s->pw, s->pa};
@@ -117,8 +112,7 @@ static void settle(struct incode_maker *m, struct incode_search *search,
 
 static void start(struct incode_maker *m, struct incode_search *search,
                   uint32_t v, const struct incode_frame *frame,
-                  const double p[3])
-{
+                  const double p[3]) {
     memset(&search->first, 0, sizeof search->first);
     search->first.w = search->first.a = INCODE_NONE;
     search->first.stage = INCODE_FIRST_NEAREST;
@@ -128,8 +122,7 @@ static void start(struct incode_maker *m, struct incode_search *search,
 
 /* Takes in the nearest neighbour or the third point of a walk that is over. */
 static void walked(struct incode_maker *m, struct incode_search *search,
-                   const struct incode_frame *frame, const double p[3])
-{
+                   const struct incode_frame *frame, const double p[3]) {
     struct incode_first *s = &search->first;
     const struct incode_query *q = &search->query;
     if (q->best == INCODE_NONE) {
@@ -146,8 +139,7 @@ static void walked(struct incode_maker *m, struct incode_search *search,
 }
 
 enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
-                                       uint32_t v, struct incode_answer *a)
-{
+                                       uint32_t v, struct incode_answer *a) {
     struct incode_search *search = &m->search[slot];
     struct incode_first *s = &search->first;
     struct incode_query *q = &search->query;

@@ -9,14 +9,12 @@
 /* Below this, what is left of a length or a product tells nothing. */
 #define VANISHED 1e-250
 
-static double length_of(const double a[3])
-{
+static double length_of(const double a[3]) {
     return __builtin_sqrt(incode_dot(a, a));
 }
 
 struct incode_dd incode_half_space_height(const struct incode_half_space *s,
-                                          const double x[3])
-{
+                                          const double x[3]) {
     struct incode_dd_vector r = incode_dd_relative(x, s->p, s->scale), n;
     for (int k = 0; k < 3; k++)
         n.d[k] = (struct incode_dd){s->n[k], 0};
@@ -26,24 +24,21 @@ struct incode_dd incode_half_space_height(const struct incode_half_space *s,
 enum { SLOPES = 1000000 }; /* one in so many is a direction of its own */
 
 /* Sine of the angle between two directions; more than 1 if it is not acute. */
-static double sine(const double a[3], const double b[3])
-{
+static double sine(const double a[3], const double b[3]) {
     double c[3], lengths = length_of(a) * length_of(b);
     incode_cross(c, a, b);
     return incode_dot(a, b) > 0 && lengths > 0 ? length_of(c) / lengths : 2;
 }
 
 bool incode_half_space_faces(const struct incode_half_space *half_space,
-                             const double n[3])
-{
+                             const double n[3]) {
     return sine(half_space->n, n) * SLOPES < 1;
 }
 
 /* How far above v, in the half-space's direction, a point can be; not a number
  * if that overflows. */
 static double depth_of(const struct incode_half_space *half_space,
-                       const double pv[3], double scale)
-{
+                       const double pv[3], double scale) {
     struct incode_dd height = incode_half_space_height(half_space, pv);
     struct incode_dd top = {half_space->most[0], half_space->most[1]};
     double ratio = scale / half_space->scale, far = 0;
@@ -64,8 +59,7 @@ static double depth_of(const struct incode_half_space *half_space,
  * so y lies in a disc around the centre's foot, and |h| is next to nothing. */
 static struct incode_ball ball_under(const struct incode_half_space *half_space,
                                      const struct incode_fine *sphere,
-                                     const double pv[3], double scale)
-{
+                                     const double pv[3], double scale) {
     struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
     double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
     if (!incode_half_space_faces(half_space, m))
@@ -91,8 +85,7 @@ static struct incode_ball ball_under(const struct incode_half_space *half_space,
 }
 
 void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
-                                   const double *const p[4], double scale)
-{
+                                   const double *const p[4], double scale) {
     double lengths = 1, longest = 1, r[3];
     incode_sphere_fine(&degenerate->sphere, p[0], p[1], p[2], p[3], scale);
     for (int i = 1; i < 4; i++) {
@@ -109,8 +102,7 @@ void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
 
 /* The least ball that is known to hold what comes before p[3]. */
 static struct incode_ball ball_of(struct incode_near_degenerate *degenerate,
-                                  const double *const p[4], double scale)
-{
+                                  const double *const p[4], double scale) {
     double r[3];
     struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
     for (int k = 0; k < 3; k++)
@@ -147,8 +139,7 @@ static struct incode_ball ball_of(struct incode_near_degenerate *degenerate,
 }
 
 void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
-                                   const double *const p[4], double scale)
-{
+                                   const double *const p[4], double scale) {
     struct incode_ball ball = ball_of(degenerate, p, scale);
     degenerate->ball =
         ball.radius < degenerate->ball.radius ? ball : degenerate->ball;
@@ -156,8 +147,7 @@ void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
 
 bool incode_near_degenerate_outside(
     const struct incode_near_degenerate *degenerate, const double pv[3],
-    const double p[3], double scale)
-{
+    const double p[3], double scale) {
     if (degenerate->spread == 0)
         return false;
     struct incode_dd_vector r = incode_dd_relative(p, pv, scale);

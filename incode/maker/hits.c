@@ -3,8 +3,7 @@
 #include "incode/predicates/simd.h"
 
 void incode_hits_draw_in(struct incode_query *q,
-                         const struct incode_pencil *pencil, double t)
-{
+                         const struct incode_pencil *pencil, double t) {
     double square = 0.25 * t * t;
     for (int d = 0; d < 3; d++) {
         q->centre[d] = pencil->c0[d] + 0.5 * t * pencil->n[d];
@@ -19,8 +18,7 @@ void incode_hits_draw_in(struct incode_query *q,
     q->round = true;
 }
 
-INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3])
-{
+INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3]) {
     return incode_vd_all(a[0]) * b[0] + incode_vd_all(a[1]) * b[1] +
            incode_vd_all(a[2]) * b[2];
 }
@@ -29,8 +27,7 @@ INCODE_INLINE incode_vd dot(const double a[3], const incode_vd b[3])
  * is false. */
 INCODE_INLINE incode_vd places(const struct incode_query *q,
                                const struct incode_pencil *pencil,
-                               const double *const xyz[3], uint32_t i)
-{
+                               const double *const xyz[3], uint32_t i) {
     incode_vd r[3], square = incode_vd_all(0);
     incode_vd far = incode_vd_all(INCODE_PENCIL_LEAST);
     for (int d = 0; d < 3; d++) {
@@ -48,8 +45,7 @@ INCODE_INLINE incode_vd places(const struct incode_query *q,
 
 void incode_hits_place(struct incode_query *q,
                        const struct incode_pencil *pencil,
-                       struct incode_hits *hits)
-{
+                       struct incode_hits *hits) {
     if (hits->placed == hits->count)
         return;
     const double *const xyz[3] = {hits->p[0], hits->p[1], hits->p[2]};
@@ -70,8 +66,7 @@ void incode_hits_place(struct incode_query *q,
 
 bool incode_hits_contends(const struct incode_query *q,
                           const struct incode_hits *hits, uint32_t i,
-                          double last)
-{
+                          double last) {
     double square = 0;
     if (hits->t[i] < __builtin_inf())
         return hits->t[i] <= last;
@@ -85,8 +80,7 @@ bool incode_hits_contends(const struct incode_query *q,
 /* Drops what has fallen out of the ball. */
 static void thin_out(const struct incode_query *q,
                      const struct incode_pencil *pencil,
-                     struct incode_hits *hits)
-{
+                     struct incode_hits *hits) {
     double last = incode_pencil_later(pencil, q->t);
     uint32_t kept = 0;
     for (uint32_t i = 0; i < hits->count; i++) {
@@ -102,8 +96,7 @@ static void thin_out(const struct incode_query *q,
 
 bool incode_hits_add(const struct incode_pencil *pencil, struct incode_query *q,
                      const struct incode_frame *frame, uint64_t in,
-                     struct incode_hits *hits)
-{
+                     struct incode_hits *hits) {
     const struct incode_brick *b = &frame->page.brick;
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctzll(in);

@@ -15,15 +15,13 @@ enum {
     BOX_UNITS = 2
 };
 
-size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies)
-{
+size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies) {
     struct incode_horizon *h = NULL;
     return boxes * (size_t)BOX_BYTES + copies * sizeof *h->point;
 }
 
 void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
-                         uint32_t copies, struct incode_pause *pause)
-{
+                         uint32_t copies, struct incode_pause *pause) {
     INCODE_ASSERT(boxes >= INCODE_HORIZON_MIN && boxes <= INCODE_HORIZON_MAX &&
                   boxes % 64 == 0 && copies >= 1 &&
                   copies <= INCODE_HORIZON_COPIES);
@@ -61,20 +59,17 @@ void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
 #define FARTHEST 1e15
 
 /* What is not a number may be anywhere. */
-static inline float below(double a)
-{
+static inline float below(double a) {
     a -= OUTWARD * (1 + __builtin_fabs(a));
     a = a < FARTHEST ? a : FARTHEST;
     return (float)(a > -FARTHEST ? a : -1e30);
 }
 
-static inline float below_number(double a)
-{
+static inline float below_number(double a) {
     return a == a ? below(a) : -1e30F;
 }
 
-static inline float above_number(double a)
-{
+static inline float above_number(double a) {
     return -below_number(-a);
 }
 
@@ -89,8 +84,7 @@ struct view {
 };
 
 /* The boxes' coordinates, widened by what their rounding may do. */
-static void set_sides(struct view *view)
-{
+static void set_sides(struct view *view) {
     const struct incode_boxes *boxes = view->boxes;
     incode_vf unit = incode_vf_all((float)view->unit), far, slack[3], at[3];
     for (int d = 0; d < 3; d++) {
@@ -114,8 +108,7 @@ static void set_sides(struct view *view)
 }
 
 /* Too far off to be told apart: anywhere. */
-static void set_anywhere(struct view *view)
-{
+static void set_anywhere(struct view *view) {
     for (int i = 0; i < INCODE_FANOUT; i++) {
         for (int d = 0; d < 3; d++) {
             view->lo[d][i] = -1e30F;
@@ -126,8 +119,7 @@ static void set_anywhere(struct view *view)
 }
 
 static void set_view(struct view *view, const struct incode_horizon *h,
-                     const struct incode_frame *frame)
-{
+                     const struct incode_frame *frame) {
     bool near = true;
     view->boxes = &frame->page.boxes;
     view->unit = view->boxes->unit * h->scale;
@@ -145,8 +137,7 @@ static void set_view(struct view *view, const struct incode_horizon *h,
 
 /* Adds a box of a page, with the axes' box of its child. */
 static uint32_t add_box(struct incode_horizon *h, const struct view *view,
-                        unsigned child, uint32_t page, uint32_t level)
-{
+                        unsigned child, uint32_t page, uint32_t level) {
     uint32_t i = h->count++;
     h->page[i] = page;
     h->level[i] = (uint8_t)level;
@@ -163,8 +154,7 @@ static uint32_t add_box(struct incode_horizon *h, const struct view *view,
 }
 
 static void set_lifted(struct incode_horizon *h, uint32_t i,
-                       const struct view *view, unsigned child)
-{
+                       const struct view *view, unsigned child) {
     struct incode_lifted l;
     double square = view->unit * view->unit;
     if (!(h->far[i] < FARTHEST) || !(square > 1e-30) ||
@@ -191,15 +181,13 @@ struct making {
 
 /* The children of a page, one bit each. */
 static uint32_t children_of(const struct incode_tree *tree, uint32_t level,
-                            uint32_t index)
-{
+                            uint32_t index) {
     uint32_t count = tree->count[level - 1] - index * INCODE_FANOUT;
     return count >= INCODE_FANOUT ? UINT32_MAX : (UINT32_C(1) << count) - 1;
 }
 
 /* The children that meet the horizon's box. */
-static uint32_t near_children(const struct making *m, const struct view *view)
-{
+static uint32_t near_children(const struct making *m, const struct view *view) {
     uint32_t near = 0;
     for (unsigned i = 0; i < INCODE_FANOUT; i += INCODE_VF_LANES) {
         incode_vm out = incode_vf_less(incode_vf_all(m->hi[0]),
@@ -215,8 +203,7 @@ static uint32_t near_children(const struct making *m, const struct view *view)
 }
 
 static bool add_brick(struct incode_horizon *h, const struct view *view,
-                      unsigned child, uint32_t brick)
-{
+                      unsigned child, uint32_t brick) {
     if (h->count == incode_horizon_near(h))
         return false;
     uint32_t i = add_box(h, view, child, brick, 0);
@@ -228,8 +215,7 @@ static bool add_brick(struct incode_horizon *h, const struct view *view,
 
 /* One box for all children that have none of their own. */
 static bool add_rest(struct incode_horizon *h, const struct view *view,
-                     uint32_t page, uint32_t level, uint32_t left)
-{
+                     uint32_t page, uint32_t level, uint32_t left) {
     if (left == 0)
         return true;
     if (h->count == incode_horizon_near(h))
@@ -256,8 +242,7 @@ static bool add_rest(struct incode_horizon *h, const struct view *view,
 }
 
 static enum incode_horizon_made add_page(struct making *m, uint32_t level,
-                                         uint32_t index)
-{
+                                         uint32_t index) {
     const struct incode_tree *tree = m->walker->tree;
     uint32_t page = tree->base[level] + index, first = index * INCODE_FANOUT;
     const struct incode_frame *f = incode_pager_get(m->walker->pager, page);
@@ -285,8 +270,7 @@ static enum incode_horizon_made add_page(struct making *m, uint32_t level,
     return INCODE_HORIZON_MADE;
 }
 
-static void set_empty(struct incode_horizon *h)
-{
+static void set_empty(struct incode_horizon *h) {
     h->count = h->near = h->next = 0;
     for (int d = 0; d < 3; d++) {
         h->box_lo[d] = __builtin_inf();
@@ -298,8 +282,7 @@ enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
                                              struct incode_walker *walker,
                                              uint32_t brick, const double lo[3],
                                              const double hi[3],
-                                             uint32_t *missing)
-{
+                                             uint32_t *missing) {
     struct making m = {.h = h, .walker = walker};
     double extent = 0;
     set_empty(h);
@@ -335,8 +318,7 @@ enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
 bool incode_horizon_cap(const struct incode_horizon *h,
                         struct incode_horizon_cap *cap, const double pv[3],
                         double scale, const double m[3], double det,
-                        const double n[3])
-{
+                        const double n[3]) {
     /* r = y ratio; the value is divided by ratio and by the size of M. */
     double ratio = scale / h->scale, d = det * ratio;
     double size = incode_max_norm(m), normal = incode_max_norm(n);
@@ -366,8 +348,7 @@ bool incode_horizon_cap(const struct incode_horizon *h,
 
 void incode_horizon_bound(const struct incode_horizon *h,
                           struct incode_horizon_cap *cap, double scale,
-                          const struct incode_radical_bound *radical)
-{
+                          const struct incode_radical_bound *radical) {
     double size = incode_max_norm(radical->g), ratio = scale / h->scale;
     double level = radical->level / (size * ratio);
     cap->bounded = radical->set && size > 1e-280 && size < 1e280 &&
@@ -385,8 +366,7 @@ struct sides {
     const float *lo[3], *hi[3], *far;
 };
 
-static struct sides sides_of(const struct incode_horizon *h)
-{
+static struct sides sides_of(const struct incode_horizon *h) {
     return (struct sides){
         {h->lo[0], h->lo[1], h->lo[2]}, {h->hi[0], h->hi[1], h->hi[2]}, h->far};
 }
@@ -394,8 +374,7 @@ static struct sides sides_of(const struct incode_horizon *h)
 /* A vector of them, from i on, that are certainly outside; and their doubt. */
 INCODE_INLINE uint32_t axes_outside(const struct sides *h,
                                     const struct incode_horizon_cap *cap,
-                                    uint32_t i, incode_vf *weight)
-{
+                                    uint32_t i, incode_vf *weight) {
     incode_vf zero = incode_vf_all(0), value = zero, level = zero;
     incode_vf d = incode_vf_all(cap->d);
     incode_vf far = incode_vf_load(h->far + i) + incode_vf_all(cap->near);
@@ -418,8 +397,7 @@ INCODE_INLINE uint32_t axes_outside(const struct sides *h,
 /* Those that are certainly beyond the cap's bound. */
 INCODE_INLINE uint32_t beyond_bound(const struct sides *h,
                                     const struct incode_horizon_cap *cap,
-                                    uint32_t i)
-{
+                                    uint32_t i) {
     incode_vf least = incode_vf_all(0);
     incode_vf far = incode_vf_load(h->far + i) + incode_vf_all(cap->near);
     for (int k = 0; k < 3; k++) {
@@ -435,8 +413,7 @@ INCODE_INLINE uint32_t beyond_bound(const struct sides *h,
 /* The same for lifted boxes. */
 INCODE_INLINE uint32_t lifted_outside(const struct incode_horizon *h,
                                       const struct incode_horizon_cap *cap,
-                                      uint32_t i, incode_vf weight)
-{
+                                      uint32_t i, incode_vf weight) {
     incode_vf g[3], d = incode_vf_all(cap->d), two = d + d;
     incode_vf value = d * incode_vf_load(h->lid + i);
     for (int k = 0; k < 3; k++) {
@@ -460,8 +437,7 @@ INCODE_INLINE uint32_t lifted_outside(const struct incode_horizon *h,
 uint32_t incode_horizon_reached(
     const struct incode_horizon *h, const struct incode_horizon_cap *cap,
     const uint64_t done[INCODE_HORIZON_MAX / 64],
-    uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING])
-{
+    uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING]) {
     const struct sides sides = sides_of(h);
     uint32_t count = 0;
     for (uint32_t i = 0; i < h->count; i += INCODE_VF_LANES) {
@@ -486,8 +462,7 @@ uint32_t incode_horizon_reached(
 
 /* The children that the cap reaches, by their axes' boxes. */
 static uint32_t reached_children(const struct view *view,
-                                 const struct incode_horizon_cap *cap)
-{
+                                 const struct incode_horizon_cap *cap) {
     struct sides sides = {{view->lo[0], view->lo[1], view->lo[2]},
                           {view->hi[0], view->hi[1], view->hi[2]},
                           view->far};
@@ -504,8 +479,7 @@ enum { SPARE = 32 /* boxes: for what is reached for certain */ };
 
 /* Whether the cap reaches the lifted box of the last one added. */
 static bool last_is_reached(const struct incode_horizon *h,
-                            const struct incode_horizon_cap *cap)
-{
+                            const struct incode_horizon_cap *cap) {
     uint32_t last = h->count - 1, lane = last % INCODE_VF_LANES;
     incode_vf far =
         incode_vf_load(h->far + last - lane) + incode_vf_all(cap->near);
@@ -517,8 +491,7 @@ static bool last_is_reached(const struct incode_horizon *h,
 enum incode_horizon_made
 incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
                      uint32_t index, const struct incode_horizon_cap *cap,
-                     uint32_t *missing)
-{
+                     uint32_t *missing) {
     const struct incode_tree *tree = walker->tree;
     uint32_t page = h->page[index], level = h->level[index];
     const struct incode_frame *f = incode_pager_get(walker->pager, page);
@@ -555,8 +528,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
 enum incode_walk incode_horizon_box(const struct incode_horizon *h,
                                     struct incode_walker *walker,
                                     struct incode_query *q, incode_visit *visit,
-                                    void *context)
-{
+                                    void *context) {
     incode_vf lo[3], hi[3];
     for (int d = 0; d < 3; d++) {
         lo[d] =

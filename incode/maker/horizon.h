@@ -78,8 +78,7 @@ void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
 
 /* Boxes that are listed from the start, at most; the others are for splitting.
  */
-static inline uint32_t incode_horizon_near(const struct incode_horizon *h)
-{
+static inline uint32_t incode_horizon_near(const struct incode_horizon *h) {
     return h->boxes / 8 * 5;
 }
 
@@ -157,8 +156,8 @@ enum incode_walk incode_horizon_box(const struct incode_horizon *h,
 
 /* Whether all bricks that meet a box are listed. */
 static inline bool incode_horizon_holds(const struct incode_horizon *h,
-                                        const double lo[3], const double hi[3])
-{
+                                        const double lo[3],
+                                        const double hi[3]) {
     bool holds = true;
     for (int d = 0; d < 3; d++)
         holds = holds && lo[d] >= h->box_lo[d] && hi[d] <= h->box_hi[d];

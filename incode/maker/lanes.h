@@ -16,29 +16,25 @@ struct incode_lanes {
 };
 
 INCODE_INLINE incode_vd incode_lanes_two_sum(incode_vd a, incode_vd b,
-                                             incode_vd *error)
-{
+                                             incode_vd *error) {
     incode_vd s = a + b, c = s - a;
     *error = (a - (s - c)) + (b - c);
     return s;
 }
 
 INCODE_INLINE incode_vd incode_lanes_fast_two_sum(incode_vd a, incode_vd b,
-                                                  incode_vd *error)
-{
+                                                  incode_vd *error) {
     incode_vd s = a + b;
     *error = b - (s - a);
     return s;
 }
 
-INCODE_INLINE struct incode_lanes incode_lanes_all(struct incode_dd a)
-{
+INCODE_INLINE struct incode_lanes incode_lanes_all(struct incode_dd a) {
     return (struct incode_lanes){incode_vd_all(a.hi), incode_vd_all(a.lo)};
 }
 
 INCODE_INLINE struct incode_lanes incode_lanes_plus(struct incode_lanes a,
-                                                    struct incode_lanes b)
-{
+                                                    struct incode_lanes b) {
     struct incode_lanes r;
     incode_vd e, f, s = incode_lanes_two_sum(a.hi, b.hi, &e);
     incode_vd t = incode_lanes_two_sum(a.lo, b.lo, &f);
@@ -48,15 +44,13 @@ INCODE_INLINE struct incode_lanes incode_lanes_plus(struct incode_lanes a,
 }
 
 INCODE_INLINE struct incode_lanes incode_lanes_minus(struct incode_lanes a,
-                                                     struct incode_lanes b)
-{
+                                                     struct incode_lanes b) {
     struct incode_lanes negative = {-b.hi, -b.lo};
     return incode_lanes_plus(a, negative);
 }
 
 INCODE_INLINE struct incode_lanes incode_lanes_times(struct incode_lanes a,
-                                                     struct incode_lanes b)
-{
+                                                     struct incode_lanes b) {
     struct incode_lanes r;
     incode_vd e, p = incode_vd_two_product(a.hi, b.hi, &e);
     e = incode_vd_fma(a.lo, b.hi, e);
@@ -66,8 +60,7 @@ INCODE_INLINE struct incode_lanes incode_lanes_times(struct incode_lanes a,
 
 INCODE_INLINE incode_vd incode_lanes_product(struct incode_lanes a,
                                              struct incode_lanes b,
-                                             incode_vd *rest)
-{
+                                             incode_vd *rest) {
     incode_vd e, p = incode_vd_two_product(a.hi, b.hi, &e);
     e = incode_vd_fma(a.lo, b.hi, e);
     *rest = incode_vd_fma(a.hi, b.lo, e);
@@ -76,8 +69,8 @@ INCODE_INLINE incode_vd incode_lanes_product(struct incode_lanes a,
 
 /* Errors as incode_dd_dot. */
 INCODE_INLINE struct incode_lanes
-incode_lanes_dot(const struct incode_lanes a[3], const struct incode_lanes b[3])
-{
+incode_lanes_dot(const struct incode_lanes a[3],
+                 const struct incode_lanes b[3]) {
     struct incode_lanes r;
     incode_vd e[3], f, g, p = incode_lanes_product(a[0], b[0], &e[0]);
     incode_vd q = incode_lanes_product(a[1], b[1], &e[1]);
@@ -89,8 +82,7 @@ incode_lanes_dot(const struct incode_lanes a[3], const struct incode_lanes b[3])
 
 /* (a - b) * scale, exact for a power of two that overflows nothing. */
 INCODE_INLINE struct incode_lanes incode_lanes_difference(incode_vd a, double b,
-                                                          double scale)
-{
+                                                          double scale) {
     struct incode_lanes r;
     r.hi = incode_lanes_two_sum(a, incode_vd_all(-b), &r.lo);
     r.hi *= incode_vd_all(scale);

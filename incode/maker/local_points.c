@@ -16,14 +16,12 @@ enum {
 };
 
 /* So many points are about to be worked on. */
-static void breathe_over(const struct incode_local_points *local, uint32_t n)
-{
+static void breathe_over(const struct incode_local_points *local, uint32_t n) {
     if (local->pause != NULL)
         incode_breathe(local->pause, n / POINTS_A_UNIT);
 }
 
-void incode_local_reset(struct incode_local_points *local)
-{
+void incode_local_reset(struct incode_local_points *local) {
     local->leaf = INCODE_NONE;
     local->around = local->count = 0;
     local->near = 0;
@@ -37,8 +35,7 @@ struct sides {
 
 /* Which points of a leaf lie in a box, one bit each. */
 INCODE_INLINE uint32_t inside(const struct sides *box,
-                              const double *const axis[3], uint32_t slot)
-{
+                              const double *const axis[3], uint32_t slot) {
     uint32_t in = 0;
     for (uint32_t i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
         incode_vl here = incode_vl_ones();
@@ -53,8 +50,7 @@ INCODE_INLINE uint32_t inside(const struct sides *box,
 
 static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
                         const struct incode_frame *frame, uint32_t brick,
-                        uint32_t leaves, void *context)
-{
+                        uint32_t leaves, void *context) {
     struct incode_local_points *local = context;
     const struct incode_brick *b = &frame->page.brick;
     const double *const axis[3] = {b->x, b->y, b->z};
@@ -90,8 +86,7 @@ enum incode_local_outcome
 incode_local_around(struct incode_local_points *local,
                     struct incode_walker *walker,
                     const struct incode_horizon *horizon, uint32_t leaf,
-                    const double lo[3], const double hi[3], double radius)
-{
+                    const double lo[3], const double hi[3], double radius) {
     struct incode_query *q = &local->query;
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_BOX;
@@ -131,23 +126,21 @@ incode_local_around(struct incode_local_points *local,
 #define UNITS_MOST 1610612736.0 /* 1.5 times 2^30 */
 #define UNITS_LEAST 4096        /* a radius */
 
-INCODE_INLINE incode_vd in_units(incode_vd p, double origin, double per_unit)
-{
+INCODE_INLINE incode_vd in_units(incode_vd p, double origin, double per_unit) {
     incode_vd a = (p - incode_vd_all(origin)) * incode_vd_all(per_unit);
     return incode_vd_max(incode_vd_min(a, incode_vd_all(UNITS_MOST)),
                          incode_vd_all(-UNITS_MOST));
 }
 
-static int32_t unit_of(const struct incode_local_points *local, int d, double p)
-{
+static int32_t unit_of(const struct incode_local_points *local, int d,
+                       double p) {
     double a = (p - local->origin[d]) * local->per_unit;
     a = a < UNITS_MOST ? a : UNITS_MOST;
     return (int32_t)(a > -UNITS_MOST ? a : -UNITS_MOST);
 }
 
 static void set_units(struct incode_local_points *local, const double origin[3],
-                      double half)
-{
+                      double half) {
     local->per_unit =
         incode_scale_for(half > 0x1p-900 ? half : 0x1p-900) * UNITS_HALF;
     memcpy(local->origin, origin, sizeof local->origin);
@@ -161,8 +154,7 @@ static void set_units(struct incode_local_points *local, const double origin[3],
 
 /* Units that tell apart what is around p: those of the leaf as a rule. */
 static void choose_units(struct incode_local_points *local, const double p[3],
-                         double radius)
-{
+                         double radius) {
     if (local->per_unit == 0) {
         double origin[3], half = radius;
         for (int d = 0; d < 3; d++) {
@@ -188,8 +180,7 @@ static void choose_units(struct incode_local_points *local, const double p[3],
 
 /* Relative coordinates from units, w and e of points [0, n), and padding that
  * no scan mistakes for a point: up to two vectors, with e infinite. */
-static void set_near(struct incode_local_points *local, uint32_t n)
-{
+static void set_near(struct incode_local_points *local, uint32_t n) {
     breathe_over(local, n);
     incode_vi lane = incode_vi_count();
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
@@ -227,8 +218,7 @@ static void set_near(struct incode_local_points *local, uint32_t n)
 
 /* Packs what lies in the box; false: too many.  Cutting is monotone: a point
  * within the box is within it in units. */
-static bool select_near(struct incode_local_points *local)
-{
+static bool select_near(struct incode_local_points *local) {
     incode_vi lo[3], span[3];
     bool whole = true;
     incode_vi at = incode_vi_count();
@@ -271,8 +261,7 @@ static bool select_near(struct incode_local_points *local)
 
 /* One side of a box: the wall at `wall` of its direction `sign`, relative. */
 static double side(const struct incode_local_points *local, int d, double wall,
-                   double end, double sign)
-{
+                   double end, double sign) {
     bool beyond = sign > 0 ? wall >= end : wall <= end;
     double gap = wall - local->p0[d]; /* not infinite by overflow */
     gap = gap < DBL_MAX ? gap : DBL_MAX;
@@ -281,8 +270,7 @@ static double side(const struct incode_local_points *local, int d, double wall,
 }
 
 static void set_box(struct incode_local_points *local, double radius,
-                    const double domain_lo[3], const double domain_hi[3])
-{
+                    const double domain_lo[3], const double domain_hi[3]) {
     local->radius = radius;
     local->scale = incode_scale_for(radius);
     local->wall[3] = local->wall[7] = __builtin_inf();
@@ -301,8 +289,7 @@ static void set_box(struct incode_local_points *local, double radius,
 
 /* More points than there is room for in a box too small for units: none is
  * taken, and the box certifies nothing. */
-static void give_up_near(struct incode_local_points *local)
-{
+static void give_up_near(struct incode_local_points *local) {
     local->near = 0;
     for (int d = 0; d < 3; d++) {
         local->lo[d] = local->rlo[d] = __builtin_inf();
@@ -313,8 +300,7 @@ static void give_up_near(struct incode_local_points *local)
 
 void incode_local_centre(struct incode_local_points *local, uint32_t vertex,
                          const double p[3], double radius,
-                         const double domain_lo[3], const double domain_hi[3])
-{
+                         const double domain_lo[3], const double domain_hi[3]) {
     local->vertex = vertex;
     memcpy(local->p0, p, sizeof local->p0);
     local->count = local->around; /* far vertices of the last one go */
@@ -337,8 +323,7 @@ void incode_local_centre(struct incode_local_points *local, uint32_t vertex,
 enum { NEAR_MOST = INCODE_NEAR_POINTS + INCODE_AROUND_EXTRA };
 
 /* Index of the first of n numbers that is `id`, or n. */
-static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id)
-{
+static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id) {
     incode_vi all = incode_vi_all((int32_t)id);
     for (uint32_t i = 0; i < n; i += INCODE_VF_LANES) {
         uint32_t m = incode_vf_mask(incode_vi_load(ids + i) == all);
@@ -351,8 +336,7 @@ static uint32_t find(const uint32_t *ids, uint32_t n, uint32_t id)
 }
 
 /* Scans see point i from now on. */
-static void see(struct incode_local_points *local, uint32_t i)
-{
+static void see(struct incode_local_points *local, uint32_t i) {
     uint32_t k = local->near++;
     double r[3], square = 0, length = 0;
     incode_local_relative(local, i, r);
@@ -378,8 +362,7 @@ static void see(struct incode_local_points *local, uint32_t i)
         local->e[next] = INFINITE;
 }
 
-uint32_t incode_local_find(struct incode_local_points *local, uint32_t id)
-{
+uint32_t incode_local_find(struct incode_local_points *local, uint32_t id) {
     uint32_t near = find(local->near_id, local->near, id);
     if (near < local->near)
         return local->at[near];
@@ -392,8 +375,7 @@ uint32_t incode_local_find(struct incode_local_points *local, uint32_t id)
 }
 
 uint32_t incode_local_append(struct incode_local_points *local, uint32_t id,
-                             const double p[3])
-{
+                             const double p[3]) {
     if (local->count == INCODE_AROUND_POINTS + INCODE_AROUND_EXTRA ||
         local->near == NEAR_MOST)
         return INCODE_LOCAL_NONE;
@@ -413,8 +395,7 @@ struct bits {
 
 /* The points whose bit is set. */
 static uint32_t list(const struct incode_local_points *local,
-                     const struct bits *bits, uint16_t out[INCODE_NEAR_ALL])
-{
+                     const struct bits *bits, uint16_t out[INCODE_NEAR_ALL]) {
     uint32_t count = 0;
     for (uint32_t i = 0; i < local->near; i += 64) {
         uint64_t word = bits->word[i / 64];
@@ -427,8 +408,7 @@ static uint32_t list(const struct incode_local_points *local,
     return count;
 }
 
-INCODE_INLINE void note(struct bits *bits, uint32_t i, incode_vm out)
-{
+INCODE_INLINE void note(struct bits *bits, uint32_t i, incode_vm out) {
     uint64_t in = ~incode_vm_bits(out) & INCODE_VF_ALL;
     if (i % 64 == 0)
         bits->word[i / 64] = 0;
@@ -437,8 +417,7 @@ INCODE_INLINE void note(struct bits *bits, uint32_t i, incode_vm out)
 
 uint32_t incode_local_first(const struct incode_local_points *local,
                             const struct incode_pencil *pencil, double *t,
-                            uint16_t out[INCODE_NEAR_ALL])
-{
+                            uint16_t out[INCODE_NEAR_ALL]) {
     alignas(64) float above[INCODE_NEAR_ALL], below[INCODE_NEAR_ALL];
     const double *c = pencil->c0;
     incode_vf nx = incode_vf_all((float)pencil->n[0]),
@@ -485,15 +464,13 @@ uint32_t incode_local_first(const struct incode_local_points *local,
     return list(local, &bits, out);
 }
 
-static float float_up(double a)
-{
+static float float_up(double a) {
     return (float)a * (1 + 0x1p-22F);
 }
 
 uint32_t incode_local_inside(const struct incode_local_points *local,
                              const struct incode_sphere *s,
-                             uint16_t out[INCODE_NEAR_ALL])
-{
+                             uint16_t out[INCODE_NEAR_ALL]) {
     /* One power of two for all coefficients keeps them in range. */
     double largest = incode_max_norm(s->m), det = __builtin_fabs(s->det);
     double scale = incode_scale_for(largest > det ? largest : det);

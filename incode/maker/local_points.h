@@ -97,8 +97,7 @@ uint32_t incode_local_append(struct incode_local_points *local, uint32_t id,
 /* Relative coordinates of point i, in double precision. */
 static inline void
 incode_local_relative(const struct incode_local_points *local, uint32_t i,
-                      double r[3])
-{
+                      double r[3]) {
     for (int d = 0; d < 3; d++)
         r[d] = (local->p[d][i] - local->p0[d]) * local->scale;
 }

@@ -10,19 +10,16 @@ enum { LOOKAHEAD_MAX = 48 /* bricks */ };
 
 /* ---- memory ---- */
 
-static size_t horizon_bytes(const struct incode_maker_share *share)
-{
+static size_t horizon_bytes(const struct incode_maker_share *share) {
     return incode_horizon_bytes(share->boxes, share->copies);
 }
 
-size_t incode_maker_bytes(const struct incode_maker_share *share)
-{
+size_t incode_maker_bytes(const struct incode_maker_share *share) {
     return horizon_bytes(share) + incode_pager_bytes(share->frames);
 }
 
 uint32_t incode_maker_frames(const struct incode_maker_share *share,
-                             size_t bytes)
-{
+                             size_t bytes) {
     if (bytes < horizon_bytes(share))
         return 0;
     bytes -= horizon_bytes(share);
@@ -34,8 +31,7 @@ uint32_t incode_maker_frames(const struct incode_maker_share *share,
     return frames;
 }
 
-static uint32_t lookahead_of(const struct incode_maker *m)
-{
+static uint32_t lookahead_of(const struct incode_maker *m) {
     uint32_t bricks = m->pager.frame_count / 24;
     if (m->tree.pages <= m->pager.frame_count)
         return m->tree.bricks; /* none pushes another out */
@@ -44,8 +40,7 @@ static uint32_t lookahead_of(const struct incode_maker *m)
 
 /* Takes its share of an arena, with nothing in it. */
 static void take(struct incode_maker *m, void *memory,
-                 const struct incode_maker_share *share, uint32_t bricks)
-{
+                 const struct incode_maker_share *share, uint32_t bricks) {
     INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN);
     incode_maker_breathe(m, INCODE_PAUSE_UNITS);
     incode_horizon_init(&m->horizon, memory, share->boxes, share->copies,
@@ -62,8 +57,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
                        const struct incode_page_source *source,
-                       const struct incode_pause *pause)
-{
+                       const struct incode_pause *pause) {
     INCODE_ASSERT(points->bricks > 0);
     memset(m, 0, sizeof *m);
     m->counts.tally.pause = *pause;
@@ -87,8 +81,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
 }
 
 void incode_maker_move(struct incode_maker *m, void *memory,
-                       const struct incode_maker_share *share)
-{
+                       const struct incode_maker_share *share) {
     struct incode_pager old = m->pager;
     INCODE_ASSERT(old.loading == 0);
     for (unsigned i = 0; i < INCODE_SEARCHES; i++)
@@ -101,22 +94,19 @@ void incode_maker_move(struct incode_maker *m, void *memory,
     m->ahead = 0;
 }
 
-void incode_maker_start(struct incode_maker *m)
-{
+void incode_maker_start(struct incode_maker *m) {
     m->fault = NULL;
     m->ahead = 0;
 }
 
-void incode_maker_forget(struct incode_maker *m, unsigned slot)
-{
+void incode_maker_forget(struct incode_maker *m, unsigned slot) {
     m->search[slot].stage = INCODE_SEARCH_NONE;
     m->search[slot].advanced = false;
 }
 
 /* ---- pages ---- */
 
-uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots)
-{
+uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots) {
     uint32_t waiting = 0;
     for (; slots != 0; slots &= slots - 1) {
         unsigned slot = (unsigned)__builtin_ctz(slots);
@@ -127,8 +117,7 @@ uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots)
 }
 
 int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
-                      size_t bytes)
-{
+                      size_t bytes) {
     if (!incode_pager_loading(&m->pager, page))
         return INCODE_PAGE_UNASKED;
     if (!incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes))
@@ -139,32 +128,28 @@ int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
 }
 
 int incode_maker_put(struct incode_maker *m, uint32_t page, const void *data,
-                     size_t bytes)
-{
+                     size_t bytes) {
     bool sound =
         incode_page_is_sound(&m->tree, m->lo, m->hi, page, data, bytes) &&
         incode_pager_put(&m->pager, page, data, bytes) == 0;
     return sound ? 0 : INCODE_PAGE_UNSOUND;
 }
 
-bool incode_maker_fetch(struct incode_maker *m, uint32_t page)
-{
+bool incode_maker_fetch(struct incode_maker *m, uint32_t page) {
     if (!incode_pager_loading(&m->pager, page) &&
         incode_pager_has_free(&m->pager))
         (void)incode_pager_get(&m->pager, page);
     return incode_pager_loading(&m->pager, page);
 }
 
-uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick)
-{
+uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick) {
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
     return f == NULL ? 0 : f->count;
 }
 
 static bool count_brick(struct incode_walker *walker, struct incode_query *q,
                         const struct incode_frame *frame, uint32_t brick,
-                        uint32_t leaves, void *context)
-{
+                        uint32_t leaves, void *context) {
     uint32_t *left = context;
     (void)walker, (void)q, (void)frame, (void)brick, (void)leaves;
     return --*left > 0;
@@ -172,8 +157,7 @@ static bool count_brick(struct incode_walker *walker, struct incode_query *q,
 
 /* more: bricks after it or, where `down`, before it. */
 static bool prefetch(struct incode_maker *m, uint32_t brick, uint32_t more,
-                     bool down)
-{
+                     bool down) {
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
     if (f == NULL) {
         for (uint32_t i = 1; i <= more; i++) {
@@ -199,16 +183,14 @@ static bool prefetch(struct incode_maker *m, uint32_t brick, uint32_t more,
 }
 
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
-                           uint32_t more)
-{
+                           uint32_t more) {
     return prefetch(m, brick, more, false);
 }
 
 /* Whether there is something to look ahead at, from `first` on before `last`;
  * *more: how many more than the one at m->ahead. */
 static bool may_look_ahead(struct incode_maker *m, uint32_t first,
-                           uint32_t last, uint32_t *more)
-{
+                           uint32_t last, uint32_t *more) {
     if (m->ahead < first)
         m->ahead = first;
     if (m->ahead >= last || m->ahead >= first + m->lookahead)
@@ -220,16 +202,14 @@ static bool may_look_ahead(struct incode_maker *m, uint32_t first,
 }
 
 void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
-                             uint32_t last)
-{
+                             uint32_t last) {
     uint32_t more;
     if (may_look_ahead(m, first, last, &more))
         m->ahead += prefetch(m, m->ahead, more, false);
 }
 
 void incode_maker_look_down(struct incode_maker *m, uint32_t last,
-                            uint32_t passed, uint32_t count)
-{
+                            uint32_t passed, uint32_t count) {
     uint32_t more;
     if (may_look_ahead(m, passed, count, &more))
         m->ahead += prefetch(m, last - 1 - m->ahead, more, true);

@@ -132,8 +132,8 @@ struct incode_maker {
 };
 
 /* So many units of incode/predicates/pause.h are about to be worked. */
-static inline void incode_maker_breathe(struct incode_maker *m, uint32_t units)
-{
+static inline void incode_maker_breathe(struct incode_maker *m,
+                                        uint32_t units) {
     incode_breathe(&m->counts.tally.pause, units);
 }
 
@@ -200,15 +200,13 @@ void incode_maker_forget(struct incode_maker *m, unsigned slot);
 
 /* Whether the search of an apex or a first tetrahedron is under way. */
 static inline bool incode_maker_is_searching(const struct incode_maker *m,
-                                             unsigned slot)
-{
+                                             unsigned slot) {
     return m->search[slot].stage != INCODE_SEARCH_NONE;
 }
 
 /* Indexes `naive` and `grid`: whether it got on when it was last asked. */
 static inline bool incode_maker_has_advanced(const struct incode_maker *m,
-                                             unsigned slot)
-{
+                                             unsigned slot) {
     return m->search[slot].advanced;
 }
 

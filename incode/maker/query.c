@@ -7,8 +7,7 @@
 #include "incode/predicates/check.h"
 #include "incode/predicates/simd.h"
 
-double incode_scale_for(double extent)
-{
+double incode_scale_for(double extent) {
     uint64_t bits;
     if (!(extent > DBL_MIN))
         extent = DBL_MIN;
@@ -23,8 +22,7 @@ double incode_scale_for(double extent)
     return scale;
 }
 
-void incode_query_face(struct incode_query *q)
-{
+void incode_query_face(struct incode_query *q) {
     double extent = 0;
     for (int d = 0; d < 3; d++) {
         double eb = __builtin_fabs(q->pb[d] - q->pv[d]);
@@ -43,8 +41,7 @@ void incode_query_face(struct incode_query *q)
 /* Sets the ball, relative and scaled, and the box around it; false: there is no
  * such box. */
 static bool set_ball(struct incode_query *q, const double centre[3],
-                     double radius)
-{
+                     double radius) {
     double inverse = 1 / q->scale, far = 0;
     for (int d = 0; d < 3; d++) {
         double lo = (centre[d] - radius) * inverse;
@@ -66,8 +63,7 @@ static bool set_ball(struct incode_query *q, const double centre[3],
 }
 
 /* Where the sphere says nothing, the points' half-space may. */
-static void bound_near_degenerate(struct incode_query *q)
-{
+static void bound_near_degenerate(struct incode_query *q) {
     if (q->best == INCODE_NONE)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
@@ -83,8 +79,7 @@ static void bound_near_degenerate(struct incode_query *q)
 
 /* The box of the best's sphere, widened by 1e-6 of its size and by the rounding
  * of all that leads to it; none where the sphere is ill-conditioned. */
-static void bound_sphere(struct incode_query *q)
-{
+static void bound_sphere(struct incode_query *q) {
     const struct incode_sphere *s = &q->sphere;
     q->boxed = q->round = q->lens = false;
     if (q->degenerate.known && incode_sphere_is_near_degenerate(s)) {
@@ -101,15 +96,13 @@ static void bound_sphere(struct incode_query *q)
     (void)set_ball(q, q->peak, radius);
 }
 
-void incode_query_shrink(struct incode_query *q)
-{
+void incode_query_shrink(struct incode_query *q) {
     q->shrinking = true;
     bound_sphere(q);
 }
 
 /* Where many points are to be looked at. */
-static void set_radical_bound(struct incode_query *q)
-{
+static void set_radical_bound(struct incode_query *q) {
     if (q->best == INCODE_NONE)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
@@ -118,14 +111,13 @@ static void set_radical_bound(struct incode_query *q)
                                  q->sphere.n);
 }
 
-void incode_query_look(struct incode_query *q)
-{
+void incode_query_look(struct incode_query *q) {
     if (++q->looked == INCODE_QUERY_CROWD)
         set_radical_bound(q);
 }
 
-void incode_query_start(struct incode_query *q, uint32_t id, const double p[3])
-{
+void incode_query_start(struct incode_query *q, uint32_t id,
+                        const double p[3]) {
     q->best = id;
     q->degenerate.spread = 0;
     q->radical.set = false;
@@ -146,8 +138,7 @@ enum {
 /* Whether a point is certainly outside the best's sphere, looked at more
  * closely where many points are in doubt. */
 static bool is_outside(struct incode_query *q, struct incode_tally *tally,
-                       const double p[3])
-{
+                       const double p[3]) {
     if (q->contests < CONTESTS) {
         q->contests++;
         if (!q->degenerate.known || (q->round && !q->lens))
@@ -162,8 +153,7 @@ static bool is_outside(struct incode_query *q, struct incode_tally *tally,
 }
 
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
-                           uint32_t id, const double p[3])
-{
+                           uint32_t id, const double p[3]) {
     incode_breathe(&tally->pause, CONSIDER_UNITS);
     if (q->best != INCODE_NONE && is_outside(q, tally, p))
         return;
@@ -193,8 +183,7 @@ struct boxes {
 };
 
 INCODE_INLINE incode_vl meets(const struct incode_query *q,
-                              const struct boxes *boxes, unsigned i)
-{
+                              const struct boxes *boxes, unsigned i) {
     incode_vl in = incode_vl_ones();
     for (int d = 0; d < 3; d++) {
         incode_vd lo = incode_vd_load(boxes->lo[d] + i);
@@ -205,8 +194,7 @@ INCODE_INLINE incode_vl meets(const struct incode_query *q,
 }
 
 INCODE_INLINE incode_vl not_done(const struct incode_query *q,
-                                 const struct boxes *boxes, unsigned i)
-{
+                                 const struct boxes *boxes, unsigned i) {
     incode_vl in = incode_vl_ones();
     for (int d = 0; d < 3; d++) {
         incode_vd lo = incode_vd_load(boxes->lo[d] + i);
@@ -220,8 +208,7 @@ INCODE_INLINE incode_vl not_done(const struct incode_query *q,
 /* Not certainly on the known side of the plane, nor outside the sphere: upper
  * bounds of both functions over the box, dimension by dimension. */
 INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
-                                      const struct boxes *boxes, unsigned i)
-{
+                                      const struct boxes *boxes, unsigned i) {
     const struct incode_sphere *s = &q->sphere;
     incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
     incode_vd value = zero, value_error = zero;
@@ -256,8 +243,7 @@ INCODE_INLINE incode_vl may_hold_apex(const struct incode_query *q,
 /* What meets the ball and is not certainly on the known side of the plane.  The
  * bound of the plane's rounding holds within the ball. */
 INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
-                                   const struct boxes *boxes, unsigned i)
-{
+                                   const struct boxes *boxes, unsigned i) {
     incode_vd zero = incode_vd_all(0), plane = incode_vd_all(q->plane_slack);
     incode_vd square = zero, scale = incode_vd_all(q->scale);
     for (int d = 0; d < 3; d++) {
@@ -276,8 +262,7 @@ INCODE_INLINE incode_vl meets_ball(const struct incode_query *q,
 }
 
 INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
-                                    const struct boxes *boxes, unsigned i)
-{
+                                    const struct boxes *boxes, unsigned i) {
     incode_vd zero = incode_vd_all(0), square = zero;
     for (int d = 0; d < 3; d++) {
         incode_vd v = incode_vd_all(q->pv[d]);
@@ -293,8 +278,7 @@ INCODE_INLINE incode_vl may_be_near(const struct incode_query *q,
 /* Not certainly beyond the radical plane. */
 INCODE_INLINE incode_vl below_radical_plane(const struct incode_query *q,
                                             const struct boxes *boxes,
-                                            unsigned i)
-{
+                                            unsigned i) {
     const struct incode_radical_bound *c = &q->radical;
     incode_vd least = incode_vd_all(0), far = least;
     for (int d = 0; d < 3; d++) {
@@ -310,8 +294,7 @@ INCODE_INLINE incode_vl below_radical_plane(const struct incode_query *q,
 
 /* May reach higher than the half-space so far. */
 INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
-                                 const struct boxes *boxes, unsigned i)
-{
+                                 const struct boxes *boxes, unsigned i) {
     const struct incode_half_space *s = &q->half_space;
     incode_vd top = incode_vd_all(INCODE_SPHERE_TINY), error = top;
     for (int d = 0; d < 3; d++) {
@@ -329,8 +312,7 @@ INCODE_INLINE incode_vl may_rise(const struct incode_query *q,
 }
 
 static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
-                        unsigned count)
-{
+                        unsigned count) {
     uint32_t mask = 0;
     for (unsigned i = 0; i < count; i += INCODE_VD_LANES) {
         incode_vl in = incode_vl_ones();
@@ -359,8 +341,7 @@ static uint32_t passing(const struct incode_query *q, const struct boxes *boxes,
 
 uint32_t incode_query_boxes(const struct incode_query *q,
                             const double *const lo[3],
-                            const double *const hi[3], unsigned count)
-{
+                            const double *const hi[3], unsigned count) {
     struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
     return passing(q, &boxes, count);
 }
@@ -385,15 +366,13 @@ enum {
 };
 
 /* Which child comes next in the walk's direction. */
-static inline unsigned next_child(const struct incode_query *q, uint32_t left)
-{
+static inline unsigned next_child(const struct incode_query *q, uint32_t left) {
     return (unsigned)(q->down ? 31 - __builtin_clz(left) : __builtin_ctz(left));
 }
 
 /* A page is missing: its next siblings will be, too, so ask for some now. */
 static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
-                                 uint32_t left, unsigned child)
-{
+                                 uint32_t left, unsigned child) {
     w->q->missing = base + first + child;
     for (int i = 0; i < ASK_AHEAD && left != 0; i++) {
         unsigned next = next_child(w->q, left);
@@ -406,8 +385,7 @@ static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
 /* The leaves of a brick that a question concerns.  Boxes are made for those
  * questions that take more of a point than what a box takes to make. */
 static __attribute__((noinline)) uint32_t
-passing_leaves(const struct incode_query *q, const struct incode_frame *frame)
-{
+passing_leaves(const struct incode_query *q, const struct incode_frame *frame) {
     alignas(64) double lo[3][INCODE_BRICK_LEAVES], hi[3][INCODE_BRICK_LEAVES];
     struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
     unsigned leaves = incode_frame_leaves(frame);
@@ -418,8 +396,7 @@ passing_leaves(const struct incode_query *q, const struct incode_frame *frame)
 }
 
 static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
-                                    const struct incode_frame *frame)
-{
+                                    const struct incode_frame *frame) {
     uint32_t leaves = passing_leaves(w->q, frame);
     incode_walker_spend(w->walker, 1);
     incode_walker_breathe(w->walker, VISIT_UNITS);
@@ -432,8 +409,8 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
 
 /* Bricks up to and with those below page `index` of `level`, in the walk's
  * direction. */
-static uint32_t bricks_to(const struct walk *w, uint32_t level, uint64_t index)
-{
+static uint32_t bricks_to(const struct walk *w, uint32_t level,
+                          uint64_t index) {
     uint64_t bricks = w->walker->tree->bricks;
     uint64_t begin = index << (5 * level), end = (index + 1) << (5 * level);
     return (uint32_t)(w->q->down     ? bricks - begin
@@ -448,8 +425,7 @@ static uint32_t bricks_to(const struct walk *w, uint32_t level, uint64_t index)
  * there is no sphere.  Not a number where something overflows. */
 static double least_value(const struct incode_query *q,
                           const struct incode_boxes *page,
-                          const struct incode_lifted *lifted)
-{
+                          const struct incode_lifted *lifted) {
     const struct incode_sphere *s = &q->sphere;
     const double *m = s->has_apex ? s->m : s->n;
     const double *pm = s->has_apex ? s->pm : s->pn;
@@ -476,8 +452,7 @@ static double least_value(const struct incode_query *q,
 
 /* Whether a child's lifted box may hold what an APEX query looks for. */
 static bool may_reach(const struct incode_query *q,
-                      const struct incode_boxes *page, unsigned child)
-{
+                      const struct incode_boxes *page, unsigned child) {
     struct incode_lifted lifted;
     return q->question != INCODE_QUERY_APEX ||
            !incode_boxes_lifted(page, child, &lifted) ||
@@ -487,8 +462,7 @@ static bool may_reach(const struct incode_query *q,
 /* Its own frame of the stack: the boxes are not needed farther down. */
 static __attribute__((noinline)) uint32_t
 passing_children(const struct incode_query *q, const struct incode_boxes *page,
-                 unsigned count)
-{
+                 unsigned count) {
     alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
     struct boxes boxes = {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}};
     incode_boxes_axes(page, lo, hi);
@@ -496,8 +470,7 @@ passing_children(const struct incode_query *q, const struct incode_boxes *page,
 }
 
 static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
-                                const struct incode_frame *frame)
-{
+                                const struct incode_frame *frame) {
     const struct incode_tree *tree = w->walker->tree;
     uint32_t first = index * INCODE_FANOUT;
     uint32_t count = tree->count[level - 1] - first;
@@ -541,8 +514,7 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
 
 enum incode_walk incode_walk(struct incode_walker *walker,
                              struct incode_query *q, incode_visit *visit,
-                             void *context)
-{
+                             void *context) {
     struct walk w = {walker, q, visit, context, false};
     uint32_t top = walker->tree->levels - 1;
     const struct incode_frame *root =
@@ -556,8 +528,7 @@ enum incode_walk incode_walk(struct incode_walker *walker,
 
 enum incode_walk incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
-                                   incode_visit *visit, void *context)
-{
+                                   incode_visit *visit, void *context) {
     struct walk w = {walker, q, visit, context, false};
     const struct incode_frame *f = incode_pager_get(walker->pager, brick);
     q->missing = brick;

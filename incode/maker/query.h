@@ -78,8 +78,7 @@ struct incode_query {
 /* Coordinates relative to the query's vertex, scaled. */
 static inline void incode_query_relative(double out[3],
                                          const struct incode_query *q,
-                                         const double p[3])
-{
+                                         const double p[3]) {
     for (int d = 0; d < 3; d++)
         out[d] = (p[d] - q->pv[d]) * q->scale;
 }
@@ -96,15 +95,13 @@ struct incode_walker {
 
 /* So many units were worked. */
 static inline void incode_walker_spend(struct incode_walker *walker,
-                                       uint32_t units)
-{
+                                       uint32_t units) {
     walker->left = walker->left > units ? walker->left - units : 0;
 }
 
 /* So many units of incode/predicates/pause.h are about to be worked. */
 static inline void incode_walker_breathe(const struct incode_walker *walker,
-                                         uint32_t units)
-{
+                                         uint32_t units) {
     incode_breathe(&walker->tally->pause, units);
 }
 

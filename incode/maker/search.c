@@ -4,8 +4,7 @@
 #include <string.h>
 
 bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
-                        uint32_t *page)
-{
+                        uint32_t *page) {
     uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
     *page = brick;
@@ -24,8 +23,7 @@ bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
 /* ---- hull planes ---- */
 
 bool incode_hull_known(struct incode_maker *m, const double pv[3],
-                       const double pb[3], const double pc[3])
-{
+                       const double pb[3], const double pc[3]) {
     struct incode_tally *tally = &m->counts.tally;
     for (uint32_t i = 0; i < m->plane_count; i++) {
         const struct incode_hull_plane *h = &m->planes[i];
@@ -40,8 +38,7 @@ bool incode_hull_known(struct incode_maker *m, const double pv[3],
 }
 
 void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
-                          const double below[3])
-{
+                          const double below[3]) {
     struct incode_hull_plane *h = &m->planes[m->plane_next];
     memcpy(h->p[0], q->pv, sizeof q->pv);
     memcpy(h->p[1], q->pb, sizeof q->pb);
@@ -54,8 +51,7 @@ void incode_hull_remember(struct incode_maker *m, const struct incode_query *q,
 
 /* The length of an edge off its first vertex, against the normal's largest
  * component; where the normal is not known, along any axis. */
-void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
-{
+void incode_hull_learn(struct incode_maker *m, const struct incode_query *q) {
     const double *n = q->sphere.n;
     double side = 1 / q->scale;
     unsigned largest = 0;
@@ -80,8 +76,7 @@ void incode_hull_learn(struct incode_maker *m, const struct incode_query *q)
 /* Begins a walk.  Where pages are replaced, one walk goes up and the next down:
  * it begins with the pages that the last walk used last.  Walks in one
  * direction would find each page evicted just before they come to it. */
-static void begin_walk(struct incode_maker *m, struct incode_query *q)
-{
+static void begin_walk(struct incode_maker *m, struct incode_query *q) {
     m->walks_down = !m->walks_down && !incode_pager_has_free(&m->pager);
     q->down = m->walks_down;
     q->cursor = 0;
@@ -89,8 +84,7 @@ static void begin_walk(struct incode_maker *m, struct incode_query *q)
 
 /* The box of the next look: only points that are clearly beyond the face count
  * there, so that those in its plane need not be told apart in vain. */
-void incode_search_box(struct incode_maker *m, struct incode_search *s)
-{
+void incode_search_box(struct incode_maker *m, struct incode_search *s) {
     struct incode_query *q = &s->query;
     bool all = true;
     for (int d = 0; d < 3; d++) {
@@ -103,8 +97,7 @@ void incode_search_box(struct incode_maker *m, struct incode_search *s)
     begin_walk(m, q);
 }
 
-void incode_search_last(struct incode_maker *m, struct incode_search *s)
-{
+void incode_search_last(struct incode_maker *m, struct incode_search *s) {
     struct incode_query *q = &s->query;
     s->final = true;
     q->done = q->strictly_beyond = false;
@@ -114,8 +107,8 @@ void incode_search_last(struct incode_maker *m, struct incode_search *s)
 
 void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const uint32_t f[3], const double pv[3],
-                         const double pb[3], const double pc[3], double radius)
-{
+                         const double pb[3], const double pc[3],
+                         double radius) {
     struct incode_query *q = &s->query;
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_APEX;
@@ -134,8 +127,7 @@ void incode_search_begin(struct incode_maker *m, struct incode_search *s,
     incode_search_box(m, s);
 }
 
-void incode_count_candidates(struct incode_maker *m, uint64_t looked)
-{
+void incode_count_candidates(struct incode_maker *m, uint64_t looked) {
     uint64_t n = looked < 2 ? 2 : looked;
     uint32_t octave = 63 - (uint32_t)__builtin_clzll(n);
     uint32_t half = 2 * octave + (uint32_t)(n >> (octave - 1) & 1);
@@ -147,23 +139,20 @@ void incode_count_candidates(struct incode_maker *m, uint64_t looked)
 enum { MANY = 1024 /* points */ };
 
 void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
-                         uint64_t looked)
-{
+                         uint64_t looked) {
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     if (q->best != INCODE_NONE && looked >= MANY)
         incode_empty_spheres_add(&m->empty, p, q->scale);
 }
 
-enum incode_outcome incode_search_suspend(struct incode_search *s)
-{
+enum incode_outcome incode_search_suspend(struct incode_search *s) {
     s->page = s->query.missing;
     s->advanced = s->page == INCODE_NONE;
     return s->advanced ? INCODE_MORE : INCODE_WAIT;
 }
 
 enum incode_outcome incode_search_run(struct incode_maker *m,
-                                      struct incode_search *s)
-{
+                                      struct incode_search *s) {
     struct incode_query *q = &s->query;
     for (;;) {
         uint64_t before = m->counts.candidates;

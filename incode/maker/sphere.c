@@ -7,8 +7,7 @@
 #define LOST 1e-290
 
 void incode_sphere_plane(struct incode_sphere *s, const double b[3],
-                         const double c[3])
-{
+                         const double c[3]) {
     incode_cross(s->n, b, c);
     s->lb = incode_max_norm(b);
     s->lc = incode_max_norm(c);
@@ -19,8 +18,7 @@ void incode_sphere_plane(struct incode_sphere *s, const double b[3],
 }
 
 void incode_sphere_apex(struct incode_sphere *s, const double b[3],
-                        const double c[3], const double a[3])
-{
+                        const double c[3], const double a[3]) {
     double ca[3], ab[3];
     incode_cross(ca, c, a);
     incode_cross(ab, a, b);
@@ -42,15 +40,13 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
 /* What is left: the roundings of the evaluation, at most 7 units on a term with
  * m or n, 8 on that with det, and 2^-100 of the old bounds.  As large as the
  * value itself, so that a bound overflows where a product does. */
-static double refined(double value, double bound)
-{
+static double refined(double value, double bound) {
     return __builtin_fabs(value) + 1e-15 * bound;
 }
 
 void incode_sphere_fine(struct incode_fine *f, const double v[3],
                         const double b[3], const double c[3], const double *a,
-                        double scale)
-{
+                        double scale) {
     struct incode_dd_vector rb = incode_dd_relative(b, v, scale),
                             rc = incode_dd_relative(c, v, scale);
     struct incode_dd_vector n = incode_dd_vector_product(rb.d, rc.d);
@@ -73,15 +69,13 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
 /* ---- bounds of each component ---- */
 
 static void relative(double r[3], const double p[3], const double v[3],
-                     double scale)
-{
+                     double scale) {
     for (int d = 0; d < 3; d++)
         r[d] = (p[d] - v[d]) * scale;
 }
 
 /* Of the components of a cross product: the sum of its two products. */
-static void cross_bound(double out[3], const double a[3], const double b[3])
-{
+static void cross_bound(double out[3], const double a[3], const double b[3]) {
     for (int d = 0; d < 3; d++) {
         int j = (d + 1) % 3, k = (d + 2) % 3;
         out[d] = __builtin_fabs(a[j] * b[k]) + __builtin_fabs(a[k] * b[j]);
@@ -91,8 +85,7 @@ static void cross_bound(double out[3], const double a[3], const double b[3])
 /* Bounds that tell the axes apart: where these have different scales, the
  * maximum norms are far too much. */
 static void sharpen(struct incode_sphere *s, const double b[3],
-                    const double c[3], const double *a)
-{
+                    const double c[3], const double *a) {
     double bc[3], ca[3], ab[3];
     cross_bound(bc, b, c);
     if (a == NULL) {
@@ -110,8 +103,7 @@ static void sharpen(struct incode_sphere *s, const double b[3],
 
 void incode_sphere_refine(struct incode_sphere *s, const double v[3],
                           const double b[3], const double c[3], const double *a,
-                          double scale)
-{
+                          double scale) {
     struct incode_fine fine;
     double rb[3], rc[3], ra[3];
     relative(rb, b, v, scale);

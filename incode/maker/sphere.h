@@ -42,20 +42,17 @@ struct incode_pencil {
 #define INCODE_SPHERE_LEAST 1e-100
 
 static inline void incode_cross(double out[3], const double a[3],
-                                const double b[3])
-{
+                                const double b[3]) {
     out[0] = a[1] * b[2] - a[2] * b[1];
     out[1] = a[2] * b[0] - a[0] * b[2];
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-static inline double incode_dot(const double a[3], const double b[3])
-{
+static inline double incode_dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-static inline double incode_max_norm(const double a[3])
-{
+static inline double incode_max_norm(const double a[3]) {
     /* The analyser forgets what another file's function filled.
      * NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage) */
     double x = __builtin_fabs(a[0]), y = __builtin_fabs(a[1]),
@@ -64,8 +61,7 @@ static inline double incode_max_norm(const double a[3])
     return l > z ? l : z;
 }
 
-static inline double incode_dd_max_norm(const struct incode_dd a[3])
-{
+static inline double incode_dd_max_norm(const struct incode_dd a[3]) {
     const double hi[3] = {a[0].hi, a[1].hi, a[2].hi};
     return incode_max_norm(hi);
 }
@@ -76,8 +72,7 @@ static inline double incode_dd_max_norm(const struct incode_dd a[3])
 /* Where in the pencil a point lies; false: it is not clearly beyond the face.
  */
 static inline bool incode_pencil_place(const struct incode_pencil *pencil,
-                                       const double r[3], double *t)
-{
+                                       const double r[3], double *t) {
     double beyond = incode_dot(pencil->n, r), far = incode_max_norm(r);
     if (!(beyond >
           2e-3 * (far > INCODE_PENCIL_LEAST ? far : INCODE_PENCIL_LEAST)))
@@ -88,8 +83,7 @@ static inline bool incode_pencil_place(const struct incode_pencil *pencil,
 
 /* A place that is certainly not before that of a point placed at t. */
 static inline double incode_pencil_later(const struct incode_pencil *pencil,
-                                         double t)
-{
+                                         double t) {
     return t + 1e-6 * (__builtin_fabs(t) + pencil->size);
 }
 
@@ -102,14 +96,12 @@ void incode_sphere_apex(struct incode_sphere *s, const double b[3],
  * would leave nearly every point in doubt (points on a line or plane up to
  * rounding). */
 static inline bool
-incode_plane_is_ill_conditioned(const struct incode_sphere *s)
-{
+incode_plane_is_ill_conditioned(const struct incode_sphere *s) {
     return incode_max_norm(s->pn) > 1024 * incode_max_norm(s->n);
 }
 
 static inline bool
-incode_sphere_is_ill_conditioned(const struct incode_sphere *s)
-{
+incode_sphere_is_ill_conditioned(const struct incode_sphere *s) {
     double det = __builtin_fabs(s->det), m = incode_max_norm(s->m);
     return s->pdet > 1024 * det || incode_max_norm(s->pm) > 1024 * m;
 }
@@ -117,8 +109,7 @@ incode_sphere_is_ill_conditioned(const struct incode_sphere *s)
 /* So ill-conditioned, or so much larger than its face, that it tells nothing of
  * where points lie that are coplanar up to rounding. */
 static inline bool
-incode_sphere_is_near_degenerate(const struct incode_sphere *s)
-{
+incode_sphere_is_near_degenerate(const struct incode_sphere *s) {
     double size = s->lb > s->lc ? s->lb : s->lc;
     return !(s->det > 1e9 * INCODE_SPHERE_EPS * s->pdet) ||
            !(s->det > INCODE_SPHERE_LEAST) ||
@@ -146,28 +137,24 @@ void incode_sphere_refine(struct incode_sphere *s, const double v[3],
                           double scale);
 
 static inline double incode_sphere_value(const struct incode_sphere *s,
-                                         const double p[3])
-{
+                                         const double p[3]) {
     return incode_dot(s->m, p) - s->det * incode_dot(p, p);
 }
 
-static inline double incode_absolute_dot(const double a[3], const double p[3])
-{
+static inline double incode_absolute_dot(const double a[3], const double p[3]) {
     return a[0] * __builtin_fabs(p[0]) + a[1] * __builtin_fabs(p[1]) +
            a[2] * __builtin_fabs(p[2]);
 }
 
 static inline double incode_sphere_error(const struct incode_sphere *s,
-                                         const double p[3])
-{
+                                         const double p[3]) {
     return INCODE_SPHERE_EPS *
                (incode_absolute_dot(s->pm, p) + s->pdet * incode_dot(p, p)) +
            INCODE_SPHERE_TINY;
 }
 
 static inline double incode_plane_error(const struct incode_sphere *s,
-                                        const double p[3])
-{
+                                        const double p[3]) {
     return INCODE_SPHERE_EPS * incode_absolute_dot(s->pn, p) +
            INCODE_SPHERE_TINY;
 }

@@ -20,8 +20,8 @@ struct lane_points {
 
 INCODE_INLINE void load_points(struct lane_points *p,
                                const struct incode_query *q,
-                               const struct incode_frame *frame, unsigned slot)
-{
+                               const struct incode_frame *frame,
+                               unsigned slot) {
     incode_vd scale = incode_vd_all(q->scale);
     p->r[0] =
         (incode_vd_load(frame->page.brick.x + slot) - incode_vd_all(q->pv[0])) *
@@ -37,8 +37,8 @@ INCODE_INLINE void load_points(struct lane_points *p,
 /* Points that are not certainly beaten, one bit each; depth: how far before the
  * best they lie in the face's pencil, as far as doubles tell. */
 INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
-                                  const struct lane_points *p, incode_vd *depth)
-{
+                                  const struct lane_points *p,
+                                  incode_vd *depth) {
     const struct incode_sphere *s = &q->sphere;
     incode_vd zero = incode_vd_all(0), plane = zero, plane_error = zero;
     incode_vd value = zero, value_error = zero, square = zero;
@@ -70,8 +70,7 @@ INCODE_INLINE uint32_t apex_lanes(const struct incode_query *q,
 
 /* Points that are certainly beyond the radical plane. */
 INCODE_INLINE uint32_t above_radical_lanes(const struct incode_query *q,
-                                           const struct lane_points *p)
-{
+                                           const struct lane_points *p) {
     incode_vd value = incode_vd_all(0), far = value;
     for (int d = 0; d < 3; d++) {
         value += incode_vd_all(q->radical.g[d]) * p->r[d];
@@ -84,8 +83,7 @@ INCODE_INLINE uint32_t above_radical_lanes(const struct incode_query *q,
 /* Points that lie in the ball and not certainly on the known side of the plane:
  * a coarser test, and a cheaper one. */
 INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
-                                  const struct lane_points *p)
-{
+                                  const struct lane_points *p) {
     incode_vd plane = incode_vd_all(q->plane_slack), square = incode_vd_all(0);
     for (int d = 0; d < 3; d++) {
         incode_vd gap = p->r[d] - incode_vd_all(q->centre[d]);
@@ -102,8 +100,7 @@ INCODE_INLINE uint32_t ball_lanes(const struct incode_query *q,
 /* incode_near_degenerate_outside for some points, one bit each. */
 INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
                                      const struct incode_frame *frame,
-                                     unsigned slot)
-{
+                                     unsigned slot) {
     const struct incode_brick *brick = &frame->page.brick;
     const double *const axis[3] = {brick->x + slot, brick->y + slot,
                                    brick->z + slot};
@@ -128,8 +125,7 @@ INCODE_INLINE uint32_t outside_lanes(const struct incode_query *q,
 /* ---- the points of a leaf ---- */
 
 uint32_t incode_query_lanes(const struct incode_query *q,
-                            const double *const axis[3])
-{
+                            const double *const axis[3]) {
     uint32_t mask = 0;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
         struct lane_points points;
@@ -144,16 +140,14 @@ uint32_t incode_query_lanes(const struct incode_query *q,
 }
 
 static void point_of(double p[3], const struct incode_frame *frame,
-                     unsigned slot)
-{
+                     unsigned slot) {
     p[0] = frame->page.brick.x[slot];
     p[1] = frame->page.brick.y[slot];
     p[2] = frame->page.brick.z[slot];
 }
 
 static void consider_near(struct incode_query *q, uint32_t id,
-                          const double p[3])
-{
+                          const double p[3]) {
     double r[3];
     incode_query_relative(r, q, p);
     double square = incode_dot(r, r);
@@ -167,8 +161,7 @@ static void consider_near(struct incode_query *q, uint32_t id,
 }
 
 static void consider_circle(struct incode_query *q, uint32_t id,
-                            const double p[3])
-{
+                            const double p[3]) {
     double r[3], n[3], e[3];
     incode_query_relative(r, q, p);
     incode_cross(n, q->rb, r);
@@ -188,8 +181,7 @@ static void consider_circle(struct incode_query *q, uint32_t id,
 }
 
 void incode_query_half_space(struct incode_query *q, const double pv[3],
-                             const double n[3], double scale)
-{
+                             const double n[3], double scale) {
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_HALF_SPACE;
     q->v = q->b = q->c = q->best = INCODE_NONE;
@@ -198,8 +190,7 @@ void incode_query_half_space(struct incode_query *q, const double pv[3],
     memcpy(q->half_space.p, pv, sizeof q->half_space.p);
 }
 
-static void consider_height(struct incode_query *q, const double p[3])
-{
+static void consider_height(struct incode_query *q, const double p[3]) {
     struct incode_half_space *s = &q->half_space;
     struct incode_dd top = {s->most[0], s->most[1]};
     double r[3], error = 0;
@@ -220,8 +211,7 @@ static void consider_height(struct incode_query *q, const double p[3])
     }
 }
 
-static bool is_done(const struct incode_query *q, const double p[3])
-{
+static bool is_done(const struct incode_query *q, const double p[3]) {
     bool done = true;
     for (int d = 0; d < 3; d++)
         done = done && p[d] >= q->done_lo[d] && p[d] <= q->done_hi[d];
@@ -239,8 +229,7 @@ struct chosen {
  * each. */
 static uint32_t apex_leaf(const struct incode_query *q,
                           const struct incode_frame *frame, unsigned first,
-                          uint32_t lanes, struct chosen *chosen)
-{
+                          uint32_t lanes, struct chosen *chosen) {
     uint32_t in = 0;
     for (unsigned i = 0; i < INCODE_LEAF_POINTS; i += INCODE_VD_LANES) {
         struct lane_points points;
@@ -264,15 +253,13 @@ static uint32_t apex_leaf(const struct incode_query *q,
 
 /* Of work, as incode/predicates/pause.h counts it: in twice the precision, too,
  * where points are nearly degenerate. */
-static uint32_t leaf_units(const struct incode_query *q)
-{
+static uint32_t leaf_units(const struct incode_query *q) {
     return q->degenerate.spread == 0 ? LEAF_UNITS : FINE_LEAF_UNITS;
 }
 
 static void choose(struct incode_walker *walker, struct incode_query *q,
                    const struct incode_frame *frame, uint32_t leaves,
-                   struct chosen *chosen)
-{
+                   struct chosen *chosen) {
     chosen->in = 0;
     chosen->ranked = q->question == INCODE_QUERY_APEX;
     for (; leaves != 0; leaves &= leaves - 1) {
@@ -295,8 +282,7 @@ static void choose(struct incode_walker *walker, struct incode_query *q,
 /* The same after an APEX query has found another best. */
 static void choose_again(const struct incode_query *q,
                          const struct incode_frame *frame,
-                         struct chosen *chosen)
-{
+                         struct chosen *chosen) {
     uint64_t in = chosen->in;
     chosen->in = 0;
     chosen->ranked = true;
@@ -309,8 +295,7 @@ static void choose_again(const struct incode_query *q,
 
 /* Takes one out; of those ranked, that which is first in the pencil.  On a
  * curve, where each point would beat the one before, it beats all at once. */
-static unsigned take(struct chosen *chosen)
-{
+static unsigned take(struct chosen *chosen) {
     unsigned first = (unsigned)__builtin_ctzll(chosen->in);
     uint64_t others = chosen->ranked ? chosen->in & (chosen->in - 1) : 0;
     for (; others != 0; others &= others - 1) {
@@ -324,8 +309,7 @@ static unsigned take(struct chosen *chosen)
 
 bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
                          const struct incode_frame *frame, uint32_t brick,
-                         uint32_t leaves, void *context)
-{
+                         uint32_t leaves, void *context) {
     struct chosen chosen;
     (void)context;
     choose(walker, q, frame, leaves, &chosen);

@@ -12,14 +12,12 @@ enum {
     SHELLS = 4          /* cells: nearer shells, if empty, are one step */
 };
 
-static struct incode_grid grid_of(struct incode_maker *m)
-{
+static struct incode_grid grid_of(struct incode_maker *m) {
     return (struct incode_grid){&m->pager, &m->tree, m->lo, m->hi, m->cells};
 }
 
 static enum incode_outcome begin(struct incode_maker *m,
-                                 struct incode_search *s, const uint32_t f[3])
-{
+                                 struct incode_search *s, const uint32_t f[3]) {
     double p[3][3];
     for (int i = 0; i < 3; i++)
         if (!incode_fetch_point(m, f[i], p[i], &s->page))
@@ -41,8 +39,7 @@ static enum incode_outcome begin(struct incode_maker *m,
 /* Every page of points in turn, from where the last search stands: several
  * searches share a page that has to be fetched. */
 static enum incode_outcome look_at_all(struct incode_maker *m,
-                                       struct incode_search *s)
-{
+                                       struct incode_search *s) {
     for (int i = 0; i < SWEEP_BRICKS && s->sweep_left > 0; i++) {
         if (i > 0 && m->walker.left == 0)
             break;
@@ -67,8 +64,7 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
 }
 
 static enum incode_outcome look_at_cells(struct incode_maker *m,
-                                         struct incode_search *s)
-{
+                                         struct incode_search *s) {
     struct incode_query *q = &s->query;
     struct incode_cell_search *c = &s->cells;
     const struct incode_grid grid = grid_of(m);
@@ -89,8 +85,7 @@ static enum incode_outcome look_at_cells(struct incode_maker *m,
     return r == INCODE_WALK_STOP ? INCODE_MORE : INCODE_OK;
 }
 
-static void set_answer(struct incode_answer *a, const struct incode_query *q)
-{
+static void set_answer(struct incode_answer *a, const struct incode_query *q) {
     const uint32_t f[4] = {q->v, q->b, q->c, q->best};
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
     memcpy(a->f, f, sizeof a->f);
@@ -102,8 +97,7 @@ static void set_answer(struct incode_answer *a, const struct incode_query *q)
 
 enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
                                       const uint32_t f[3],
-                                      struct incode_answer *a)
-{
+                                      struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
     enum incode_outcome r = INCODE_OK;
     s->advanced = false;

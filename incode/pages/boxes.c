@@ -8,16 +8,14 @@
 
 static_assert(sizeof(struct incode_boxes) == 1568, "the layout of a page");
 
-static double larger(double a, double b)
-{
+static double larger(double a, double b) {
     return a > b ? a : b;
 }
 
 /* ---- along the axes ---- */
 
 void incode_boxes_frame(const double lo[3], const double hi[3],
-                        double origin[3], double *unit)
-{
+                        double origin[3], double *unit) {
     double half = 0;
     for (int d = 0; d < 3; d++) {
         half = larger(half, 0.5 * hi[d] - 0.5 * lo[d]);
@@ -35,8 +33,7 @@ void incode_boxes_frame(const double lo[3], const double hi[3],
 }
 
 void incode_boxes_init(struct incode_boxes *boxes, const double lo[3],
-                       const double hi[3])
-{
+                       const double hi[3]) {
     memset(boxes, 0, sizeof *boxes);
     incode_boxes_frame(lo, hi, boxes->origin, &boxes->unit);
     for (int d = 0; d < 3; d++) {
@@ -48,8 +45,7 @@ void incode_boxes_init(struct incode_boxes *boxes, const double lo[3],
 }
 
 /* The next number below one that is normal or not 0. */
-static float below(float x)
-{
+static float below(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);
     bits += x > 0 ? UINT32_MAX : 1;
@@ -60,8 +56,7 @@ static float below(float x)
 /* The largest number of single precision, 0 or normal, that does not exceed
  * (p - origin) / unit.  What is lost in the difference is computed, too
  * (Knuth's sum of two), so that the comparison is exact. */
-static float rounded_down(double p, double origin, double unit)
-{
+static float rounded_down(double p, double origin, double unit) {
     double sum = p - origin, back = p - sum;
     double lost = (p - (sum + back)) + (back - origin);
     double x = sum * (1 / unit);
@@ -72,8 +67,7 @@ static float rounded_down(double p, double origin, double unit)
 }
 
 void incode_boxes_set(struct incode_boxes *boxes, unsigned child,
-                      const double lo[3], const double hi[3])
-{
+                      const double lo[3], const double hi[3]) {
     for (int d = 0; d < 3; d++) {
         double origin = boxes->origin[d], unit = boxes->unit;
         boxes->lo[d][child] = rounded_down(lo[d], origin, unit);
@@ -86,8 +80,8 @@ void incode_boxes_set(struct incode_boxes *boxes, unsigned child,
  * that rounding, which is monotone, does not pass it; nor does a limit to
  * finite numbers. */
 void incode_boxes_axes(const struct incode_boxes *boxes,
-                       double lo[3][INCODE_FANOUT], double hi[3][INCODE_FANOUT])
-{
+                       double lo[3][INCODE_FANOUT],
+                       double hi[3][INCODE_FANOUT]) {
     for (int d = 0; d < 3; d++) {
         double origin = boxes->origin[d], unit = boxes->unit;
         for (int i = 0; i < INCODE_FANOUT; i++) {
@@ -104,8 +98,7 @@ void incode_boxes_axes(const struct incode_boxes *boxes,
 enum { ONE = 32767 };
 
 void incode_boxes_turned(const struct incode_boxes *boxes, unsigned child,
-                         double axis[3][3])
-{
+                         double axis[3][3]) {
     int64_t square = (int64_t)ONE * ONE;
     double q[3];
     for (int d = 0; d < 3; d++) {
@@ -123,8 +116,7 @@ void incode_boxes_turned(const struct incode_boxes *boxes, unsigned child,
 }
 
 /* Of binary16, as if there were numbers beyond its largest. */
-static double half_precision(uint16_t bits)
-{
+static double half_precision(uint16_t bits) {
     int32_t exponent = bits >> 10 & 31, fraction = bits & 1023;
     return exponent == 0
                ? fraction * 0x1p-24
@@ -132,8 +124,7 @@ static double half_precision(uint16_t bits)
 }
 
 bool incode_boxes_lifted(const struct incode_boxes *boxes, unsigned child,
-                         struct incode_lifted *lifted)
-{
+                         struct incode_lifted *lifted) {
     if (!boxes->is_lifted[child])
         return false;
     double e = 0, square = 0;

@@ -7,16 +7,14 @@
 
 enum { GROUP = 32 }; /* frames of which a least time of use is noted */
 
-static uint32_t hash_size(uint32_t frames)
-{
+static uint32_t hash_size(uint32_t frames) {
     uint32_t size = 64;
     while (size < 2 * frames)
         size *= 2;
     return size;
 }
 
-size_t incode_pager_bytes(uint32_t frames)
-{
+size_t incode_pager_bytes(uint32_t frames) {
     size_t heads = hash_size(frames) * sizeof(uint16_t);
     size_t groups = (frames + GROUP - 1) / GROUP * sizeof(uint64_t);
     return frames * (sizeof(struct incode_frame) + sizeof(uint64_t) +
@@ -26,8 +24,7 @@ size_t incode_pager_bytes(uint32_t frames)
 
 void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks,
-                       struct incode_pause *pause)
-{
+                       struct incode_pause *pause) {
     INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME &&
                   (uintptr_t)memory % alignof(struct incode_frame) == 0);
     memset(pager, 0, sizeof *pager);
@@ -47,14 +44,12 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
                       (pager->hash_mask + 1) * sizeof pager->heads[0]);
 }
 
-static uint16_t *head_of(const struct incode_pager *pager, uint32_t page)
-{
+static uint16_t *head_of(const struct incode_pager *pager, uint32_t page) {
     return &pager
                 ->heads[(page * UINT32_C(2654435761) >> 12) & pager->hash_mask];
 }
 
-static uint16_t find(const struct incode_pager *pager, uint32_t page)
-{
+static uint16_t find(const struct incode_pager *pager, uint32_t page) {
     uint16_t i = *head_of(pager, page);
     while (i != INCODE_NO_FRAME && pager->slots[i].number != page)
         i = pager->slots[i].chain;
@@ -62,8 +57,7 @@ static uint16_t find(const struct incode_pager *pager, uint32_t page)
 }
 
 static void set_state(struct incode_pager *pager, uint16_t i,
-                      enum incode_frame_state state)
-{
+                      enum incode_frame_state state) {
     uint64_t *oldest = &pager->oldest[i / GROUP];
     pager->slots[i].state = (uint8_t)state;
     pager->used[i] &= ~INCODE_FRAME_WAITING;
@@ -73,8 +67,7 @@ static void set_state(struct incode_pager *pager, uint16_t i,
 }
 
 /* Where the least of some times is. */
-static uint32_t least_of(const uint64_t *time, uint32_t count)
-{
+static uint32_t least_of(const uint64_t *time, uint32_t count) {
     uint32_t at = 0;
     for (uint32_t i = 1; i < count; i++)
         at = time[i] < time[at] ? i : at;
@@ -84,8 +77,7 @@ static uint32_t least_of(const uint64_t *time, uint32_t count)
 /* The frame that is ready and was not used for longest.  Times only grow, so
  * that what a group's least was is a lower bound: the group with the least of
  * these has it if its bound still holds, else the bound is raised. */
-static uint16_t find_oldest(struct incode_pager *pager)
-{
+static uint16_t find_oldest(struct incode_pager *pager) {
     for (;;) {
         uint32_t group = least_of(pager->oldest, pager->group_count);
         uint32_t first = group * GROUP, left = pager->frame_count - first;
@@ -100,8 +92,7 @@ static uint16_t find_oldest(struct incode_pager *pager)
     }
 }
 
-static void unchain(struct incode_pager *pager, uint16_t i)
-{
+static void unchain(struct incode_pager *pager, uint16_t i) {
     uint16_t *link = head_of(pager, pager->slots[i].number);
     while (*link != i)
         link = &pager->slots[*link].chain;
@@ -110,8 +101,7 @@ static void unchain(struct incode_pager *pager, uint16_t i)
 
 /* A frame to load into: never used, or the least recently used that is not
  * waiting for its page. */
-static uint16_t take_frame(struct incode_pager *pager)
-{
+static uint16_t take_frame(struct incode_pager *pager) {
     if (pager->free < pager->frame_count) {
         pager->frames_used++;
         return pager->free++;
@@ -125,8 +115,7 @@ static uint16_t take_frame(struct incode_pager *pager)
 }
 
 /* A frame for a page that is on its way. */
-static void reserve(struct incode_pager *pager, uint32_t page)
-{
+static void reserve(struct incode_pager *pager, uint32_t page) {
     uint16_t i = take_frame(pager);
     INCODE_ASSERT(i != INCODE_NO_FRAME);
     struct incode_slot *slot = &pager->slots[i];
@@ -140,8 +129,7 @@ static void reserve(struct incode_pager *pager, uint32_t page)
     pager->loading++;
 }
 
-static void ask(struct incode_pager *pager, uint32_t page)
-{
+static void ask(struct incode_pager *pager, uint32_t page) {
     if (pager->loading + pager->held >= pager->loading_max ||
         !pager->source.request(pager->source.context, page))
         return;
@@ -149,8 +137,8 @@ static void ask(struct incode_pager *pager, uint32_t page)
     pager->requests++;
 }
 
-struct incode_frame *incode_pager_get(struct incode_pager *pager, uint32_t page)
-{
+struct incode_frame *incode_pager_get(struct incode_pager *pager,
+                                      uint32_t page) {
     uint16_t i = find(pager, page);
     if (i == INCODE_NO_FRAME) {
         ask(pager, page);
@@ -163,14 +151,12 @@ struct incode_frame *incode_pager_get(struct incode_pager *pager, uint32_t page)
     return NULL;
 }
 
-bool incode_pager_loading(const struct incode_pager *pager, uint32_t page)
-{
+bool incode_pager_loading(const struct incode_pager *pager, uint32_t page) {
     uint16_t i = find(pager, page);
     return i != INCODE_NO_FRAME && pager->slots[i].state != INCODE_FRAME_READY;
 }
 
-uint32_t incode_pager_awaited(const struct incode_pager *pager)
-{
+uint32_t incode_pager_awaited(const struct incode_pager *pager) {
     for (uint16_t i = 0; pager->loading > 0 && i < pager->free; i++) {
         if (pager->slots[i].state == INCODE_FRAME_LOADING)
             return pager->slots[i].number;
@@ -179,8 +165,7 @@ uint32_t incode_pager_awaited(const struct incode_pager *pager)
 }
 
 static void load_brick(struct incode_frame *f, const uint8_t *data,
-                       size_t points)
-{
+                       size_t points) {
     double *axis[3] = {f->page.brick.x, f->page.brick.y, f->page.brick.z};
     for (int d = 0; d < 3; d++) {
         memcpy(axis[d], data + (size_t)d * points * sizeof(double),
@@ -192,8 +177,7 @@ static void load_brick(struct incode_frame *f, const uint8_t *data,
 }
 
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
-                         const void *data, size_t bytes)
-{
+                         const void *data, size_t bytes) {
     uint16_t i = find(pager, page);
     if (i == INCODE_NO_FRAME || pager->slots[i].state != INCODE_FRAME_LOADING)
         return -1;
@@ -218,8 +202,7 @@ int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
 }
 
 int incode_pager_put(struct incode_pager *pager, uint32_t page,
-                     const void *data, size_t bytes)
-{
+                     const void *data, size_t bytes) {
     uint16_t i = find(pager, page);
     if (i == INCODE_NO_FRAME && incode_pager_has_free(pager)) {
         reserve(pager, page);
@@ -230,15 +213,13 @@ int incode_pager_put(struct incode_pager *pager, uint32_t page,
                : 0;
 }
 
-bool incode_pager_has(const struct incode_pager *pager, uint32_t page)
-{
+bool incode_pager_has(const struct incode_pager *pager, uint32_t page) {
     uint16_t i = find(pager, page);
     return i != INCODE_NO_FRAME && pager->slots[i].state == INCODE_FRAME_READY;
 }
 
 size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
-                         void *data)
-{
+                         void *data) {
     if (!incode_pager_has(pager, page))
         return 0;
     const struct incode_frame *f = &pager->frames[find(pager, page)];
@@ -253,14 +234,12 @@ size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
     return 3 * axis;
 }
 
-uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page)
-{
+uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page) {
     uint16_t i = find(pager, page);
     return i == INCODE_NO_FRAME ? NULL : &pager->frames[i].label;
 }
 
-bool incode_pager_release(struct incode_pager *pager, bool now)
-{
+bool incode_pager_release(struct incode_pager *pager, bool now) {
     if (pager->held == 0)
         return false;
     pager->shuffle ^= pager->shuffle << 13;
@@ -282,8 +261,7 @@ bool incode_pager_release(struct incode_pager *pager, bool now)
 /* What is past the last point repeats it, so that no leaf is empty. */
 void incode_frame_leaf_boxes(const struct incode_frame *f,
                              double lo[3][INCODE_BRICK_LEAVES],
-                             double hi[3][INCODE_BRICK_LEAVES])
-{
+                             double hi[3][INCODE_BRICK_LEAVES]) {
     const struct incode_brick *b = &f->page.brick;
     const double *const axis[3] = {b->x, b->y, b->z};
     for (int d = 0; d < 3; d++) {
@@ -309,8 +287,7 @@ void incode_frame_leaf_boxes(const struct incode_frame *f,
 }
 
 double incode_frame_box(const struct incode_frame *f, double lo[3],
-                        double hi[3])
-{
+                        double hi[3]) {
     alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
         leaf_hi[3][INCODE_BRICK_LEAVES];
     double extent = 0;

@@ -52,8 +52,7 @@ struct incode_slot {
 };
 
 /* How many leaves a brick has, 1 to INCODE_BRICK_LEAVES. */
-static inline unsigned incode_frame_leaves(const struct incode_frame *f)
-{
+static inline unsigned incode_frame_leaves(const struct incode_frame *f) {
     return (f->count + INCODE_LEAF_POINTS - 1U) / INCODE_LEAF_POINTS;
 }
 
@@ -125,8 +124,7 @@ int incode_pager_put(struct incode_pager *pager, uint32_t page,
                      const void *data, size_t bytes);
 
 /* Whether a frame was never used: nothing has been evicted yet. */
-static inline bool incode_pager_has_free(const struct incode_pager *pager)
-{
+static inline bool incode_pager_has_free(const struct incode_pager *pager) {
     return pager->free < pager->frame_count;
 }
 

@@ -1,12 +1,11 @@
 #include "pages.h"
 
-static uint32_t divide_up(uint64_t n, uint32_t by)
-{
+static uint32_t divide_up(uint64_t n, uint32_t by) {
     return (uint32_t)((n + by - 1) / by);
 }
 
-void incode_tree_init(struct incode_tree *tree, uint32_t bricks, uint32_t cells)
-{
+void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
+                      uint32_t cells) {
     *tree = (struct incode_tree){.bricks = bricks};
     uint32_t level = 0, base = 0, count = bricks;
     while (level < 2 || tree->count[level - 1] > 1) {
@@ -27,8 +26,7 @@ void incode_tree_init(struct incode_tree *tree, uint32_t bricks, uint32_t cells)
     }
 }
 
-uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page)
-{
+uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page) {
     uint32_t level = 0;
     while (level < tree->levels && page >= tree->base[level + 1]) {
         level++;
@@ -36,8 +34,7 @@ uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page)
     return level;
 }
 
-uint32_t incode_bricks_cut(uint32_t first, uint32_t count)
-{
+uint32_t incode_bricks_cut(uint32_t first, uint32_t count) {
     uint64_t from = first, to = from + count, middle = from + count / 2;
     uint64_t fifth = ((uint64_t)count + 4) / 5;
     for (uint64_t step = (uint64_t)1 << 25; step > 1; step >>= 5) {

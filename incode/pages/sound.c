@@ -4,8 +4,7 @@
 #include <string.h>
 
 /* Numbers outside [lo, hi], NaN included; data need not be aligned to them. */
-static bool outside(const uint8_t *data, uint32_t count, double lo, double hi)
-{
+static bool outside(const uint8_t *data, uint32_t count, double lo, double hi) {
     int bad = 0;
     for (uint32_t i = 0; i < count; i++) {
         double a;
@@ -16,8 +15,7 @@ static bool outside(const uint8_t *data, uint32_t count, double lo, double hi)
 }
 
 static bool brick_is_sound(const double lo[3], const double hi[3],
-                           const uint8_t *data, size_t bytes)
-{
+                           const uint8_t *data, size_t bytes) {
     uint32_t points = (uint32_t)(bytes / (3 * sizeof *lo));
     bool good = points >= 1 && bytes <= INCODE_BRICK_BYTES &&
                 points * 3 * sizeof *lo == bytes;
@@ -27,8 +25,7 @@ static bool brick_is_sound(const double lo[3], const double hi[3],
 }
 
 /* A normal power of two. */
-static bool is_power_of_two(double unit)
-{
+static bool is_power_of_two(double unit) {
     uint64_t bits;
     memcpy(&bits, &unit, sizeof bits);
     return bits << 12 == 0 && bits >> 52 >= 1 && bits >> 52 <= 2046;
@@ -37,8 +34,7 @@ static bool is_power_of_two(double unit)
 /* Boxes of children in the box of all, but for being rounded outward; those of
  * none are empty. */
 static bool axes_are_sound(const struct incode_boxes *boxes, const double lo[3],
-                           const double hi[3], uint32_t children)
-{
+                           const double hi[3], uint32_t children) {
     double unit = boxes->unit, slack = unit * 0x1p-20;
     int bad = !is_power_of_two(unit);
     for (int d = 0; d < 3; d++) {
@@ -60,8 +56,7 @@ static bool axes_are_sound(const struct incode_boxes *boxes, const double lo[3],
 /* Turns are of unit quaternions, half axes finite; where there is no child
  * there is no lifted box. */
 static bool lifted_are_sound(const struct incode_boxes *boxes,
-                             uint32_t children)
-{
+                             uint32_t children) {
     int bad = 0;
     for (uint32_t i = 0; i < INCODE_FANOUT; i++) {
         int64_t square = 0;
@@ -77,8 +72,7 @@ static bool lifted_are_sound(const struct incode_boxes *boxes,
 }
 
 static bool boxes_are_sound(const double lo[3], const double hi[3],
-                            const uint8_t *data, uint32_t children)
-{
+                            const uint8_t *data, uint32_t children) {
     struct incode_boxes boxes;
     memcpy(&boxes, data, sizeof boxes);
     return axes_are_sound(&boxes, lo, hi, children) &&
@@ -86,8 +80,7 @@ static bool boxes_are_sound(const double lo[3], const double hi[3],
 }
 
 /* Beyond the end of a list stands INCODE_NONE. */
-static bool words_are_sound(uint32_t vertices, const uint8_t *data)
-{
+static bool words_are_sound(uint32_t vertices, const uint8_t *data) {
     int bad = 0;
     for (uint32_t i = 0; i < INCODE_PAGE_WORDS; i++) {
         uint32_t word;
@@ -99,8 +92,7 @@ static bool words_are_sound(uint32_t vertices, const uint8_t *data)
 
 bool incode_page_is_sound(const struct incode_tree *tree, const double lo[3],
                           const double hi[3], uint32_t page, const void *data,
-                          size_t bytes)
-{
+                          size_t bytes) {
     uint32_t level = incode_tree_level(tree, page);
     if (level == 0)
         return brick_is_sound(lo, hi, data, bytes);

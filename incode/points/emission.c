@@ -15,22 +15,19 @@ enum {
 
 /* Which of a cell's vertices is the smallest, whose brick owns it. */
 static unsigned owner_of(const struct incode_complex *x,
-                         const struct incode_cell *c)
-{
+                         const struct incode_cell *c) {
     const double *const p[4] = {x->point[c->v[0]].p, x->point[c->v[1]].p,
                                 x->point[c->v[2]].p, x->point[c->v[3]].p};
     return incode_smallest(p);
 }
 
-static bool is_own(const struct incode_insertion *n, uint32_t id)
-{
+static bool is_own(const struct incode_insertion *n, uint32_t id) {
     uint32_t brick = id / INCODE_BRICK_POINTS;
     return brick >= n->own_first && brick < n->own_last;
 }
 
 /* No point has a cell. */
-static void forget_cells(struct incode_insertion *n)
-{
+static void forget_cells(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     for (uint32_t v = 0; v < x->points; v++) {
         if (v % AT_ONCE == 0)
@@ -41,8 +38,7 @@ static void forget_cells(struct incode_insertion *n)
 
 /* Leaves a cell at each vertex of an own brick that has not been taken in, so
  * that it is known as one when it is. */
-static void keep_pending(struct incode_insertion *n)
-{
+static void keep_pending(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t from = n->from * INCODE_BRICK_POINTS;
     uint32_t pending = n->own_last * INCODE_BRICK_POINTS - from;
@@ -66,8 +62,7 @@ static void keep_pending(struct incode_insertion *n)
 }
 
 /* From now on points' `cell` is the first of what they own. */
-void incode_insertion_begin_list(struct incode_insertion *n)
-{
+void incode_insertion_begin_list(struct incode_insertion *n) {
     if (n->shown)
         keep_pending(n);
     forget_cells(n);
@@ -78,8 +73,7 @@ void incode_insertion_begin_list(struct incode_insertion *n)
 
 /* Lists some final tetrahedra by the vertex that owns them; the triangulation
  * is set right when they are released. */
-enum incode_insertion_step incode_insertion_list(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_list(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t end = x->cells - n->cell < INCODE_INSERTION_CELLS
                        ? x->cells
@@ -106,8 +100,7 @@ enum incode_insertion_step incode_insertion_list(struct incode_insertion *n)
 /* The vertices of a cell after v, so that all have positive orientation. */
 static void apexes_of(const struct incode_complex *x,
                       const struct incode_cell *c, uint32_t v,
-                      uint32_t apexes[3])
-{
+                      uint32_t apexes[3]) {
     static const uint8_t EVEN[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {3, 0, 1}, {2, 1, 0}};
     const uint8_t *others = EVEN[incode_cell_index(c, v)];
@@ -116,16 +109,14 @@ static void apexes_of(const struct incode_complex *x,
 }
 
 /* The next cell of such a list. */
-static uint32_t next_of(const struct incode_cell *c)
-{
+static uint32_t next_of(const struct incode_cell *c) {
     uint32_t next = c->n[0].cell;
     return next == INCODE_CELL_NONE ? INCODE_NONE : next;
 }
 
 /* Emits tetrahedra of v, as far as there is room for them. */
 static enum incode_insertion_step emit_some(struct incode_insertion *n,
-                                            struct incode_complex_point *v)
-{
+                                            struct incode_complex_point *v) {
     const struct incode_complex *x = &n->complex;
     size_t room = n->outside.emit_room(n->outside.context), count = 0;
     if (room == 0)
@@ -148,8 +139,7 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
 /* The lists of the points from v on come into the cache, all at a time: one
  * after the other, each cell waits for the one before it, a fifth of a node's
  * time on uniform points. */
-static void fetch(const struct incode_insertion *n)
-{
+static void fetch(const struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     uint32_t next[FETCHED], count = 0, end = x->points - n->v;
     incode_maker_breathe(n->maker, FETCHED * FETCHED_MOST / 8);
@@ -173,8 +163,7 @@ static void fetch(const struct incode_insertion *n)
     }
 }
 
-enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     if (n->v >= n->fetched) {
         fetch(n);
@@ -189,8 +178,8 @@ enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n)
 }
 
 /* Releases what has been emitted. */
-enum incode_insertion_step incode_insertion_release(struct incode_insertion *n)
-{
+enum incode_insertion_step
+incode_insertion_release(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t words = (n->maker->tree.bricks + 63) / 64, latest = 0;
     uint32_t free = x->free_count;
@@ -215,15 +204,13 @@ enum incode_insertion_step incode_insertion_release(struct incode_insertion *n)
     return INCODE_INSERTION_WORKED;
 }
 
-static bool is_half_full(const struct incode_insertion *n)
-{
+static bool is_half_full(const struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     return incode_complex_cells_used(x) * sizeof *x->cell > x->bytes / 2;
 }
 
 /* Commits the bricks at whose points no cell is left. */
-enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n) {
     for (; n->brick < n->from; n->brick++) {
         if (n->brick % AT_ONCE == 0)
             incode_maker_breathe(n->maker, 1);

@@ -36,13 +36,12 @@ enum {
 
 /* ---- boxes ---- */
 
-static uint32_t cells_left(const struct incode_insertion *n)
-{
+static uint32_t cells_left(const struct incode_insertion *n) {
     return incode_complex_cells_used(&n->complex) - INCODE_COMPLEX_CELLS_FIRST;
 }
 
-static void go_on(struct incode_insertion *n, enum incode_insertion_stage stage)
-{
+static void go_on(struct incode_insertion *n,
+                  enum incode_insertion_stage stage) {
     n->cell = INCODE_COMPLEX_CELLS_FIRST;
     n->brick = n->next = 0;
     n->listed = INCODE_NONE;
@@ -50,8 +49,7 @@ static void go_on(struct incode_insertion *n, enum incode_insertion_stage stage)
     n->stage = stage;
 }
 
-enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n) {
     struct incode_insertion_work *work = n->work;
     size_t bits = (n->maker->tree.bricks + 63) / 64 * sizeof(uint64_t);
     if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from))
@@ -73,23 +71,20 @@ enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n)
 }
 
 /* Now and then in a loop over cells. */
-static inline void breathe_at(const struct incode_insertion *n, uint32_t cell)
-{
+static inline void breathe_at(const struct incode_insertion *n, uint32_t cell) {
     if (cell % AT_ONCE == 0)
         incode_maker_breathe(n->maker, AT_ONCE / 4);
 }
 
 /* Where to stop after some cells. */
-static uint32_t some_cells(const struct incode_insertion *n)
-{
+static uint32_t some_cells(const struct incode_insertion *n) {
     uint32_t cells = n->complex.cells;
     incode_walker_spend(&n->maker->walker, JUDGED / INCODE_INSERTION_CELLS);
     incode_maker_breathe(n->maker, JUDGED / AT_ONCE);
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
-enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     uint32_t units = 2 + n->work->rest.count / 2; /* of 4 cells */
     for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
@@ -112,8 +107,7 @@ enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n)
 
 /* Whether it is at an own point that has been taken in. */
 static bool is_at_own(const struct incode_insertion *n,
-                      const struct incode_cell *c)
-{
+                      const struct incode_cell *c) {
     const struct incode_complex_point *point = n->complex.point;
     uint32_t first = n->own_first * INCODE_BRICK_POINTS;
     uint32_t count = n->from * INCODE_BRICK_POINTS - first;
@@ -125,8 +119,7 @@ static bool is_at_own(const struct incode_insertion *n,
 
 /* Whether a cell is to be looked at in this round. */
 static bool is_wanted(const struct incode_insertion *n,
-                      const struct incode_cell *c)
-{
+                      const struct incode_cell *c) {
     unsigned proved = incode_cell_proved(c);
     if (incode_cell_is_free(c) || proved == FINAL)
         return false;
@@ -136,8 +129,7 @@ static bool is_wanted(const struct incode_insertion *n,
 }
 
 /* What the look has told of its cells. */
-static void note(struct incode_insertion *n)
-{
+static void note(struct incode_insertion *n) {
     const struct incode_look *look = &n->work->look;
     for (uint32_t i = 0; i < look->count && n->round == 0; i++) {
         bool reached = incode_look_has_reached(look, i);
@@ -148,8 +140,7 @@ static void note(struct incode_insertion *n)
     }
 }
 
-enum incode_insertion_step incode_insertion_look(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_look(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     struct incode_look *look = &n->work->look;
     uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
@@ -179,8 +170,7 @@ enum incode_insertion_step incode_insertion_look(struct incode_insertion *n)
 /* ---- points ---- */
 
 /* The first brick from one on that is wanted; else the number of bricks. */
-static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick)
-{
+static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick) {
     uint32_t bricks = n->maker->tree.bricks;
     while (brick < bricks) {
         uint64_t left = n->touched[brick / 64] >> brick % 64;
@@ -193,8 +183,7 @@ static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick)
 
 /* Shows a point to a cell that is reached; whether it still is. */
 static bool show(struct incode_insertion *n, struct incode_cell *c,
-                 const double p[3])
-{
+                 const double p[3]) {
     incode_maker_breathe(n->maker, 1);
     if (!incode_complex_gives_way(&n->complex, &n->maker->counts.tally, c, p))
         return true;
@@ -204,8 +193,7 @@ static bool show(struct incode_insertion *n, struct incode_cell *c,
 }
 
 /* Shows it to all of them, and lists what is left if it is few. */
-static void show_all(struct incode_insertion *n, const double p[3])
-{
+static void show_all(struct incode_insertion *n, const double p[3]) {
     const struct incode_complex *x = &n->complex;
     uint32_t left = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
@@ -222,8 +210,7 @@ static void show_all(struct incode_insertion *n, const double p[3])
     incode_walker_spend(&n->maker->walker, x->cells / SHOWN);
 }
 
-static void show_listed(struct incode_insertion *n, const double p[3])
-{
+static void show_listed(struct incode_insertion *n, const double p[3]) {
     uint32_t *list = n->work->listed, left = 0;
     for (uint32_t i = 0; i < n->listed; i++) {
         struct incode_cell *c = incode_complex_cell(&n->complex, list[i]);
@@ -236,8 +223,7 @@ static void show_listed(struct incode_insertion *n, const double p[3])
 /* Shows it to all that it would make give way.  They are sought from the last
  * ones, but where those that are left are few, or its cavity is large, as those
  * of its neighbours are. */
-static void show_point(struct incode_insertion *n, const double p[3])
-{
+static void show_point(struct incode_insertion *n, const double p[3]) {
     struct incode_complex *x = &n->complex;
     struct incode_tally *tally = &n->maker->counts.tally;
     uint32_t cells[INCODE_COMPLEX_CAVITY], count = INCODE_NONE;
@@ -267,8 +253,7 @@ static void show_point(struct incode_insertion *n, const double p[3])
 /* Inserts it if it lies in the sphere of a cell at an own point; false: there
  * is no room. */
 static bool close_stars(struct incode_insertion *n, const double p[3],
-                        uint32_t id)
-{
+                        uint32_t id) {
     struct incode_complex *x = &n->complex;
     struct incode_tally *tally = &n->maker->counts.tally;
     uint32_t cells[INCODE_COMPLEX_CAVITY];
@@ -290,16 +275,14 @@ static bool close_stars(struct incode_insertion *n, const double p[3],
     return true;
 }
 
-static enum incode_insertion_step end_visit(struct incode_insertion *n)
-{
+static enum incode_insertion_step end_visit(struct incode_insertion *n) {
     n->round++;
     go_on(n, n->round == 1 ? INCODE_INSERTION_LOOK : INCODE_INSERTION_SETTLE);
     incode_look_begin(&n->work->look, true, n->own_first, n->from);
     return INCODE_INSERTION_WORKED;
 }
 
-enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n) {
     struct incode_pager *pager = &n->maker->pager;
     struct incode_walker *walker = &n->maker->walker;
     uint32_t bricks = n->maker->tree.bricks;
@@ -342,8 +325,7 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n)
 
 /* ---- what has come of it ---- */
 
-enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     if (n->cell == INCODE_COMPLEX_CELLS_FIRST)
         n->final = 0;

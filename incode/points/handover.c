@@ -10,15 +10,13 @@ enum {
 /* A vertex's `cell`, which is not needed any more. */
 enum { NOT_REACHED = 0, REACHED = 1 };
 
-static void breathe_at(const struct incode_handover *h, uint32_t i)
-{
+static void breathe_at(const struct incode_handover *h, uint32_t i) {
     if (i % AT_ONCE == 0)
         incode_maker_breathe(h->n->maker, AT_ONCE / 4);
 }
 
 void incode_handover_begin(struct incode_handover *h,
-                           struct incode_insertion *n)
-{
+                           struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     memset(h, 0, sizeof *h);
     h->n = n;
@@ -33,8 +31,7 @@ void incode_handover_begin(struct incode_handover *h,
 }
 
 /* Sends what waits; false: there is no room for it. */
-static bool send(struct incode_handover *h)
-{
+static bool send(struct incode_handover *h) {
     const struct incode_front_outside *outside = &h->n->outside;
     if (h->count > 0 && !outside->spill(outside->context, h->faces, h->count))
         return false;
@@ -45,8 +42,7 @@ static bool send(struct incode_handover *h)
 /* The open face opposite vertex k of a cell, seen so that the cell is on its
  * unknown side. */
 static void open_face(struct incode_handover *h, struct incode_front *front,
-                      const struct incode_cell *c, unsigned k)
-{
+                      const struct incode_cell *c, unsigned k) {
     static const uint8_t BEFORE[4][3] = {
         {3, 2, 1}, {2, 3, 0}, {1, 0, 3}, {0, 1, 2}};
     struct incode_complex_point *point = h->n->complex.point;
@@ -66,8 +62,7 @@ static void open_face(struct incode_handover *h, struct incode_front *front,
 }
 
 static enum incode_insertion_step send_faces(struct incode_handover *h,
-                                             struct incode_front *front)
-{
+                                             struct incode_front *front) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
         const struct incode_cell *c = incode_complex_cell(x, h->cell);
@@ -84,8 +79,7 @@ static enum incode_insertion_step send_faces(struct incode_handover *h,
 }
 
 /* The points of own bricks to come that a released tetrahedron has. */
-static enum incode_insertion_step send_ahead(struct incode_handover *h)
-{
+static enum incode_insertion_step send_ahead(struct incode_handover *h) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->vertex < x->points; i++, h->vertex++) {
         const struct incode_complex_point *v = &x->point[h->vertex];
@@ -102,8 +96,7 @@ static enum incode_insertion_step send_ahead(struct incode_handover *h)
 
 /* The points of a brick that a released tetrahedron has: those that have no
  * cell any more, or an open face. */
-static enum incode_insertion_step send_reached(struct incode_handover *h)
-{
+static enum incode_insertion_step send_reached(struct incode_handover *h) {
     const struct incode_complex *x = &h->n->complex;
     uint32_t brick = h->brick;
     uint32_t points = incode_maker_count(h->n->maker, brick);
@@ -127,8 +120,7 @@ static enum incode_insertion_step send_reached(struct incode_handover *h)
 }
 
 enum incode_insertion_step incode_handover_step(struct incode_handover *h,
-                                                struct incode_front *front)
-{
+                                                struct incode_front *front) {
     const struct incode_insertion *n = h->n;
     if (h->cell < n->complex.cells)
         return send_faces(h, front);

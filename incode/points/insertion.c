@@ -27,8 +27,7 @@ static_assert(sizeof(struct incode_insertion_work) + RESERVE <=
 
 /* ---- memory ---- */
 
-size_t incode_insertion_bytes(uint64_t points)
-{
+size_t incode_insertion_bytes(uint64_t points) {
     size_t each = sizeof(struct incode_complex_point) +
                   HALF_CELLS_A_POINT * sizeof(struct incode_cell) / 2;
     return (size_t)points * each + INCODE_INSERTION_LEAST;
@@ -36,8 +35,7 @@ size_t incode_insertion_bytes(uint64_t points)
 
 void incode_insertion_init(struct incode_insertion *n,
                            struct incode_maker *maker,
-                           const struct incode_front_outside *outside)
-{
+                           const struct incode_front_outside *outside) {
     memset(n, 0, sizeof *n);
     n->maker = maker;
     n->outside = *outside;
@@ -46,8 +44,7 @@ void incode_insertion_init(struct incode_insertion *n,
 
 /* Sets room for points apart, one in LEFT_A_POINT cells, and says how many
  * bricks are taken in at a time. */
-static uint32_t divide(struct incode_insertion *n)
-{
+static uint32_t divide(struct incode_insertion *n) {
     size_t room =
         n->complex.bytes / (sizeof(struct incode_complex_point) +
                             LEFT_A_POINT * sizeof(struct incode_cell));
@@ -62,8 +59,7 @@ static uint32_t divide(struct incode_insertion *n)
 }
 
 /* Nothing is inserted yet.  whole: all bricks at once. */
-static void begin_job(struct incode_insertion *n, bool whole)
-{
+static void begin_job(struct incode_insertion *n, bool whole) {
     uint32_t bricks = n->maker->tree.bricks;
     incode_complex_clear(&n->complex);
     if (n->inserted != NULL)
@@ -79,8 +75,7 @@ static void begin_job(struct incode_insertion *n, bool whole)
 
 void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
                             void *memory, size_t bytes, uint32_t first,
-                            uint32_t last)
-{
+                            uint32_t last) {
     uint32_t bricks = n->maker->tree.bricks, words = (bricks + 63) / 64;
     size_t bits = words * sizeof(uint64_t), before = 2 * bits;
     size_t known = bricks * sizeof *n->inserted;
@@ -112,8 +107,7 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
 }
 
 /* Bytes of cells that are there, and that there is room for. */
-static size_t used_of(const struct incode_insertion *n, size_t *room)
-{
+static size_t used_of(const struct incode_insertion *n, size_t *room) {
     const struct incode_complex *x = &n->complex;
     uint32_t points = x->points < x->points_kept ? x->points_kept : x->points;
     *room = x->bytes - points * sizeof *x->point;
@@ -121,8 +115,7 @@ static size_t used_of(const struct incode_insertion *n, size_t *room)
 }
 
 /* Bricks that there is room for, a quarter to spare. */
-static uint32_t room_for(const struct incode_insertion *n)
-{
+static uint32_t room_for(const struct incode_insertion *n) {
     size_t room, used = used_of(n, &room);
     size_t brick = INCODE_BRICK_POINTS * HALF_CELLS_A_POINT *
                    sizeof(struct incode_cell) / 2;
@@ -131,8 +124,7 @@ static uint32_t room_for(const struct incode_insertion *n)
 
 /* Whether what is free should be left to points that are inserted ahead of
  * their turn. */
-static bool is_short(const struct incode_insertion *n)
-{
+static bool is_short(const struct incode_insertion *n) {
     size_t room, used = used_of(n, &room);
     uint32_t fill = incode_insertion_owns_all(n) ? FILL : FILL_PART;
     return !n->whole && (used > room / 16 * fill || room_for(n) < 1);
@@ -141,15 +133,13 @@ static bool is_short(const struct incode_insertion *n)
 /* ---- the points ---- */
 
 /* Now and then in a loop over all points. */
-static inline void breathe_at(const struct incode_insertion *n, uint32_t v)
-{
+static inline void breathe_at(const struct incode_insertion *n, uint32_t v) {
     if (v % AT_ONCE == 0)
         incode_maker_breathe(n->maker, 2);
 }
 
 /* The points of the bricks at work that are vertices. */
-static void mark_there(struct incode_insertion *n)
-{
+static void mark_there(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     memset(n->there, 0, sizeof n->there);
     for (uint32_t v = 1; v < x->points; v++) {
@@ -161,8 +151,7 @@ static void mark_there(struct incode_insertion *n)
     }
 }
 
-void incode_insertion_take_in(struct incode_insertion *n)
-{
+void incode_insertion_take_in(struct incode_insertion *n) {
     if (!n->whole)
         mark_there(n);
     n->brick = n->from;
@@ -172,8 +161,7 @@ void incode_insertion_take_in(struct incode_insertion *n)
 
 /* The next bricks: the largest part, of those that cutting all bricks leads to,
  * that begins with the first of them and is not too large. */
-static enum incode_insertion_step choose(struct incode_insertion *n)
-{
+static enum incode_insertion_step choose(struct incode_insertion *n) {
     uint32_t first = 0, last = n->maker->tree.bricks;
     uint32_t room = room_for(n), most = n->most;
     if (!n->whole && room < most)
@@ -198,14 +186,12 @@ static enum incode_insertion_step choose(struct incode_insertion *n)
 }
 
 /* Of a set that is inserted whole, points are in the order of bricks. */
-static uint32_t staged(const struct incode_insertion *n, uint32_t i)
-{
+static uint32_t staged(const struct incode_insertion *n, uint32_t i) {
     return n->whole ? 1 + i : n->work->staged[i];
 }
 
 /* Of a set that is inserted whole, those that are. */
-static uint32_t vertices(const struct incode_insertion *n)
-{
+static uint32_t vertices(const struct incode_insertion *n) {
     uint32_t count = 0;
     for (uint32_t v = 1; v < n->complex.points; v++) {
         breathe_at(n, v);
@@ -215,8 +201,7 @@ static uint32_t vertices(const struct incode_insertion *n)
 }
 
 /* Whether a set that is inserted whole will fit, going by its first rounds. */
-static bool will_fit(const struct incode_insertion *n)
-{
+static bool will_fit(const struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     uint64_t cells = (uint64_t)incode_complex_cells_used(x) * n->staged_count;
     size_t room = x->bytes - x->points * sizeof *x->point;
@@ -225,8 +210,7 @@ static bool will_fit(const struct incode_insertion *n)
 
 /* In the midst of some bricks: these count among the rest, and what is not a
  * vertex yet is taken in again. */
-static enum incode_insertion_step make_room(struct incode_insertion *n)
-{
+static enum incode_insertion_step make_room(struct incode_insertion *n) {
     if (n->whole || (n->from == n->own_first && n->most > 1)) {
         /* More cells than is thought: brick after brick, or fewer at a time. */
         uint32_t most = n->whole ? n->most : (n->most + 3) / 4;
@@ -243,13 +227,11 @@ static enum incode_insertion_step make_room(struct incode_insertion *n)
 
 /* The brick from one on, or of every other from there, that is not among those
  * taken in. */
-static uint32_t past_own(const struct incode_insertion *n, uint32_t brick)
-{
+static uint32_t past_own(const struct incode_insertion *n, uint32_t brick) {
     return brick >= n->own_first && brick < n->to ? n->to : brick;
 }
 
-static bool is_of_four(const struct incode_insertion *n, uint32_t id)
-{
+static bool is_of_four(const struct incode_insertion *n, uint32_t id) {
     bool is = false;
     for (unsigned i = 0; i < 4; i++)
         is = is || n->complex.point[n->four[i]].id == id;
@@ -259,8 +241,7 @@ static bool is_of_four(const struct incode_insertion *n, uint32_t id)
 /* Inserts the first point of a brick to come, or of every other, so that those
  * before it are not bounded by large cells that all change again: twice as fast
  * on some surfaces, and no slower elsewhere. */
-static enum incode_insertion_step sample(struct incode_insertion *n)
-{
+static enum incode_insertion_step sample(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
     uint32_t bricks = n->maker->tree.bricks;
@@ -295,8 +276,7 @@ static enum incode_insertion_step sample(struct incode_insertion *n)
     return INCODE_INSERTION_WORKED;
 }
 
-static enum incode_insertion_step load(struct incode_insertion *n)
-{
+static enum incode_insertion_step load(struct incode_insertion *n) {
     struct incode_pager *pager = &n->maker->pager;
     (void)incode_pager_get(pager, n->brick); /* with the first credit */
     for (uint32_t i = 1; i < INCODE_INSERTION_AHEAD && n->brick + i < n->to;
@@ -327,8 +307,7 @@ static enum incode_insertion_step load(struct incode_insertion *n)
 /* The first point from `from` on, all around, that is not on the line of two or
  * the plane of three others; 0: there is none. */
 static uint32_t find_off(struct incode_insertion *n, uint32_t from,
-                         const uint32_t *v, unsigned count)
-{
+                         const uint32_t *v, unsigned count) {
     const struct incode_complex_point *p = n->complex.point;
     uint32_t all = n->complex.points - 1;
     for (uint32_t i = 0; i < all; i++) {
@@ -343,8 +322,7 @@ static uint32_t find_off(struct incode_insertion *n, uint32_t from,
 }
 
 /* Begins with the four points, or looks for more of them elsewhere. */
-static enum incode_insertion_step begin_with(struct incode_insertion *n)
-{
+static enum incode_insertion_step begin_with(struct incode_insertion *n) {
     n->near = n->four[0];
     n->stage = INCODE_INSERTION_SPAN;
     if (n->four_count < 4)
@@ -358,8 +336,7 @@ static enum incode_insertion_step begin_with(struct incode_insertion *n)
 
 /* Four points that span space, as far as these bricks have them, far apart in
  * their order. */
-static enum incode_insertion_step find_four(struct incode_insertion *n)
-{
+static enum incode_insertion_step find_four(struct incode_insertion *n) {
     uint32_t all = n->complex.points - 1, *four = n->four;
     four[0] = 1;
     four[1] = 1 + all / 2;
@@ -378,8 +355,7 @@ static enum incode_insertion_step find_four(struct incode_insertion *n)
  * a lake: the first points of others may be elsewhere.  Where they are not, the
  * set goes by faces, whose search of a first tetrahedron says whether there is
  * one at all. */
-static enum incode_insertion_step span(struct incode_insertion *n)
-{
+static enum incode_insertion_step span(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
     const struct incode_complex_point *q = x->point;
@@ -408,8 +384,7 @@ static enum incode_insertion_step span(struct incode_insertion *n)
     return begin_with(n);
 }
 
-static enum incode_insertion_step begin(struct incode_insertion *n)
-{
+static enum incode_insertion_step begin(struct incode_insertion *n) {
     n->next = 0;
     n->level = 0;
     for (uint32_t left = n->staged_count; left > SAMPLE; left >>= ROUND)
@@ -421,8 +396,7 @@ static enum incode_insertion_step begin(struct incode_insertion *n)
 /* The round in which a point is inserted: a random sample first, four times as
  * many in each round that follows, each in the order of bricks (Amenta, Choi,
  * Rote, SoCG 2003). */
-static unsigned round_of(uint32_t id)
-{
+static unsigned round_of(uint32_t id) {
     uint32_t h = id * UINT32_C(0x9e3779b1);
     h ^= h >> 15;
     h *= UINT32_C(0x85ebca6b);
@@ -431,8 +405,7 @@ static unsigned round_of(uint32_t id)
 }
 
 /* Inserts points of the round, or begins the next. */
-static enum incode_insertion_step insert(struct incode_insertion *n)
-{
+static enum incode_insertion_step insert(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_walker *walker = &n->maker->walker;
     unsigned done = 0;
@@ -469,8 +442,7 @@ static enum incode_insertion_step insert(struct incode_insertion *n)
 
 /* ---- steps ---- */
 
-static enum incode_insertion_step step(struct incode_insertion *n)
-{
+static enum incode_insertion_step step(struct incode_insertion *n) {
     switch (n->stage) {
     case INCODE_INSERTION_CHOOSE:
         return choose(n);
@@ -508,16 +480,14 @@ static enum incode_insertion_step step(struct incode_insertion *n)
     }
 }
 
-static void note_used(struct incode_insertion *n)
-{
+static void note_used(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     size_t used = sizeof *n->work + x->points * sizeof *x->point +
                   x->cells * sizeof *x->cell;
     n->used = used > n->used ? used : n->used;
 }
 
-enum incode_insertion_step incode_insertion_step(struct incode_insertion *n)
-{
+enum incode_insertion_step incode_insertion_step(struct incode_insertion *n) {
     enum incode_insertion_step r = INCODE_INSERTION_WORKED;
     for (unsigned i = 0;
          i < INCODE_INSERTION_STEPS && r == INCODE_INSERTION_WORKED; i++) {

@@ -140,8 +140,8 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
                             uint32_t last);
 
 static inline bool
-incode_insertion_has_committed(const struct incode_insertion *n, uint32_t brick)
-{
+incode_insertion_has_committed(const struct incode_insertion *n,
+                               uint32_t brick) {
     return (n->committed[brick / 64] >> brick % 64 & 1) != 0;
 }
 

@@ -11,8 +11,7 @@ enum {
 };
 
 void incode_look_init(struct incode_look *look, struct incode_maker *maker,
-                      const uint64_t *passed, uint64_t *wanted)
-{
+                      const uint64_t *passed, uint64_t *wanted) {
     double extent = 0;
     for (int d = 0; d < 3; d++) {
         double half = maker->hi[d] * 0.5 - maker->lo[d] * 0.5;
@@ -25,8 +24,7 @@ void incode_look_init(struct incode_look *look, struct incode_maker *maker,
 }
 
 void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
-                       uint32_t last)
-{
+                       uint32_t last) {
     look->every = every;
     look->pass_first = first;
     look->pass_last = last;
@@ -36,8 +34,7 @@ void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
 }
 
 void incode_look_add(struct incode_look *look, const struct incode_complex *x,
-                     uint32_t cell)
-{
+                     uint32_t cell) {
     struct incode_region r;
     const struct incode_cell *c = incode_complex_cell(x, cell);
     INCODE_ASSERT(!incode_look_is_full(look));
@@ -49,21 +46,19 @@ void incode_look_add(struct incode_look *look, const struct incode_complex *x,
     look->cell[look->count++] = cell;
 }
 
-static bool is_set(const uint64_t *bits, uint32_t i)
-{
+static bool is_set(const uint64_t *bits, uint32_t i) {
     return (bits[i / 64] >> i % 64 & 1) != 0;
 }
 
-static uint32_t count_of(uint64_t cells)
-{
+static uint32_t count_of(uint64_t cells) {
     return (uint32_t)__builtin_popcountll(cells);
 }
 
 /* Those of some cells that may reach a child. */
 static uint64_t meeting(const struct incode_look *look,
                         const struct incode_boxes *boxes, unsigned child,
-                        const double lo[3], const double hi[3], uint64_t cells)
-{
+                        const double lo[3], const double hi[3],
+                        uint64_t cells) {
     struct incode_lifted l;
     incode_maker_breathe(look->maker, 2 + count_of(cells) / 2);
     uint64_t met = incode_regions_meeting(&look->regions, cells, lo, hi);
@@ -75,8 +70,7 @@ static uint64_t meeting(const struct incode_look *look,
 
 /* Whether bricks [first, end) need no look. */
 static bool is_passed(const struct incode_look *look, uint32_t first,
-                      uint32_t end)
-{
+                      uint32_t end) {
     if (end <= look->at ||
         (first >= look->pass_first && end <= look->pass_last))
         return true;
@@ -88,8 +82,7 @@ static bool is_passed(const struct incode_look *look, uint32_t first,
  * `span` bricks each. */
 static enum incode_look_result look_below(struct incode_look *look,
                                           uint32_t level, uint32_t index,
-                                          uint64_t span, uint64_t cells)
-{
+                                          uint64_t span, uint64_t cells) {
     const struct incode_tree *tree = &look->maker->tree;
     const struct incode_frame *f =
         incode_pager_get(&look->maker->pager, tree->base[level] + index);
@@ -128,8 +121,7 @@ static enum incode_look_result look_below(struct incode_look *look,
     return INCODE_LOOK_DONE;
 }
 
-enum incode_look_result incode_look_go(struct incode_look *look)
-{
+enum incode_look_result incode_look_go(struct incode_look *look) {
     const struct incode_tree *tree = &look->maker->tree;
     uint64_t span = 1;
     if (tree->levels < 2 || look->count == 0)

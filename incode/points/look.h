@@ -54,8 +54,7 @@ void incode_look_init(struct incode_look *look, struct incode_maker *maker,
 void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
                        uint32_t last);
 
-static inline bool incode_look_is_full(const struct incode_look *look)
-{
+static inline bool incode_look_is_full(const struct incode_look *look) {
     return look->count == INCODE_LOOK_CELLS;
 }
 
@@ -67,8 +66,7 @@ enum incode_look_result incode_look_go(struct incode_look *look);
 
 /* Whether cell i of those added may reach a brick. */
 static inline bool incode_look_has_reached(const struct incode_look *look,
-                                           uint32_t i)
-{
+                                           uint32_t i) {
     return (look->reached >> i & 1) != 0;
 }
 

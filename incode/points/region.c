@@ -27,8 +27,7 @@
  * the radius.  That is below 2^-48 = 32 u of radius and |o|_1.  Squares that
  * lose digits are below 2^-1020: with 2^-450, the radius is right where |x| is
  * so small, and no gap is compared with less than 2^-900. */
-static void set_ball(struct incode_region *r)
-{
+static void set_ball(struct incode_region *r) {
     double square = 0, size = 0, error = 0;
     for (int d = 0; d < 3; d++) {
         r->centre[d] = r->o[d] + 0.5 * r->x[d];
@@ -47,8 +46,7 @@ static void set_ball(struct incode_region *r)
  * (incode/complex/sphere.h), which is nine tenths of 5/8 S; the product with S,
  * a power of two, is exact. */
 bool incode_region_set(struct incode_region *r, const struct incode_complex *x,
-                       const struct incode_cell *c)
-{
+                       const struct incode_cell *c) {
     double scale = incode_sphere_scale(c);
     r->infinite = incode_sphere_is_infinite(c);
     for (int d = 0; d < 3; d++) {
@@ -60,8 +58,7 @@ bool incode_region_set(struct incode_region *r, const struct incode_complex *x,
     return scale < 0x1p300;
 }
 
-void incode_region_set_all(struct incode_region *r)
-{
+void incode_region_set_all(struct incode_region *r) {
     memset(r, 0, sizeof *r);
     for (int d = 0; d < 3; d++)
         r->error[d] = __builtin_inf();
@@ -82,8 +79,7 @@ void incode_region_set_all(struct incode_region *r)
  * the facet's normal, unit a power of two, and what is lost 0. */
 bool incode_region_set_sharp(struct incode_region *r,
                              const struct incode_complex *x,
-                             const struct incode_cell *c, double scale)
-{
+                             const struct incode_cell *c, double scale) {
     struct incode_sphere s;
     const double *o = x->point[c->v[3]].p;
     double p[3][3];
@@ -136,8 +132,7 @@ bool incode_region_set_sharp(struct incode_region *r,
  * which covers the doubt's own rounding.  Each product may lose 2^-1075 to
  * underflow. */
 bool incode_region_is_behind(const struct incode_region *r, const double lo[3],
-                             const double hi[3])
-{
+                             const double hi[3]) {
     double most = 0, doubt = INCODE_PLANT_BOUND(BEHIND_UNDERFLOW, 0x1p-900);
     for (int d = 0; d < 3; d++) {
         double a = lo[d] - r->o[d], b = hi[d] - r->o[d];
@@ -153,8 +148,7 @@ bool incode_region_is_behind(const struct incode_region *r, const double lo[3],
 }
 
 void incode_regions_set(struct incode_regions *regions, unsigned i,
-                        const struct incode_region *r)
-{
+                        const struct incode_region *r) {
     uint64_t bit = UINT64_C(1) << i;
     for (int d = 0; d < 3; d++) {
         regions->o[d][i] = r->o[d];
@@ -169,8 +163,7 @@ void incode_regions_set(struct incode_regions *regions, unsigned i,
 
 /* Bits of those of some regions whose balls are clear of a box. */
 static uint32_t clear_of(const struct incode_regions *r, unsigned i,
-                         const double lo[3], const double hi[3])
-{
+                         const double lo[3], const double hi[3]) {
     incode_vd zero = incode_vd_all(0), square = zero;
     for (int d = 0; d < 3; d++) {
         incode_vd c = incode_vd_load(r->centre[d] + i);
@@ -186,8 +179,7 @@ static uint32_t clear_of(const struct incode_regions *r, unsigned i,
 /* The same for a plane with all of the box in front: incode_region_is_behind.
  */
 static uint32_t before(const struct incode_regions *r, unsigned i,
-                       const double lo[3], const double hi[3])
-{
+                       const double lo[3], const double hi[3]) {
     incode_vd most = incode_vd_all(0);
     incode_vd doubt =
         INCODE_PLANT_BOUND(BEFORE_UNDERFLOW, incode_vd_all(0x1p-900));
@@ -206,8 +198,7 @@ static uint32_t before(const struct incode_regions *r, unsigned i,
 }
 
 uint64_t incode_regions_meeting(const struct incode_regions *r, uint64_t some,
-                                const double lo[3], const double hi[3])
-{
+                                const double lo[3], const double hi[3]) {
     uint64_t met = 0;
     for (unsigned i = 0; i < INCODE_REGIONS; i += INCODE_VD_LANES) {
         uint32_t these = (uint32_t)(some >> i) & INCODE_VD_ALL;
@@ -246,8 +237,7 @@ struct box {
  * - |g| |rest| <= 2^-20 radius |g|_1; as much again covers the roundings of g
  * and g a_k, 7 u radius (|g| + D radius). What underflows is below 2^-1070. */
 static uint32_t clear_of_lifted(const struct incode_regions *r, unsigned i,
-                                const struct box *b)
-{
+                                const struct box *b) {
     incode_vd zero = incode_vd_all(0), g[3];
     incode_vd d = incode_vd_load(r->round + i);
     incode_vd radius = incode_vd_all(b->radius);
@@ -285,8 +275,7 @@ static uint32_t clear_of_lifted(const struct incode_regions *r, unsigned i,
 uint64_t incode_regions_meeting_lifted(const struct incode_regions *r,
                                        uint64_t some,
                                        const struct incode_boxes *boxes,
-                                       const struct incode_lifted *l)
-{
+                                       const struct incode_lifted *l) {
     double unit = boxes->unit;
     struct box b = {.lid = unit * unit * l->lid, .radius = unit * l->radius};
     uint64_t met = 0;

@@ -3,8 +3,7 @@
 #include "incode/predicates/simd.h"
 #include "region.h"
 
-static void fill_up(struct incode_rest *rest)
-{
+static void fill_up(struct incode_rest *rest) {
     for (uint32_t i = rest->count; i % 8 != 0; i++)
         for (int d = 0; d < 3; d++) {
             rest->lo[d][i] = __builtin_inf();
@@ -15,8 +14,7 @@ static void fill_up(struct incode_rest *rest)
 /* Children [first, last) of a page of the level above; false: it is
  * missing. */
 static bool add(struct incode_rest *rest, struct incode_maker *maker,
-                uint32_t level, uint32_t first, uint32_t last)
-{
+                uint32_t level, uint32_t first, uint32_t last) {
     const struct incode_tree *tree = &maker->tree;
     alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
     if (first >= last)
@@ -35,8 +33,7 @@ static bool add(struct incode_rest *rest, struct incode_maker *maker,
 }
 
 bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
-                     uint32_t before, uint32_t from)
-{
+                     uint32_t before, uint32_t from) {
     const struct incode_tree *tree = &maker->tree;
     rest->count = 0;
     for (uint32_t level = 0; level + 1 < tree->levels; level++) {
@@ -55,8 +52,7 @@ bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
 }
 
 static bool ball_reaches(const struct incode_rest *rest,
-                         const struct incode_region *r)
-{
+                         const struct incode_region *r) {
     for (uint32_t i = 0; i < rest->count; i += INCODE_VD_LANES) {
         incode_vd zero = incode_vd_all(0), square = zero;
         for (int d = 0; d < 3; d++) {
@@ -75,8 +71,7 @@ static bool ball_reaches(const struct incode_rest *rest,
 
 bool incode_rest_reaches(const struct incode_rest *rest,
                          const struct incode_complex *x,
-                         const struct incode_cell *c)
-{
+                         const struct incode_cell *c) {
     struct incode_region r;
     if (rest->count == 0)
         return false;

@@ -36,15 +36,13 @@ enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n);
 enum incode_insertion_step incode_insertion_release(struct incode_insertion *n);
 enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n);
 
-static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i)
-{
+static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i) {
     bits[i / 64] |= UINT64_C(1) << i % 64;
 }
 
 /* A point has become a vertex before its turn, or is another's. */
 static inline void incode_insertion_note(const struct incode_insertion *n,
-                                         uint32_t id)
-{
+                                         uint32_t id) {
     if (n->inserted != NULL)
         n->inserted[id / INCODE_BRICK_POINTS] |= UINT64_C(1)
                                                  << id % INCODE_BRICK_POINTS;
@@ -52,16 +50,14 @@ static inline void incode_insertion_note(const struct incode_insertion *n,
 
 /* Whether it has, as far as that is known. */
 static inline bool incode_insertion_has_noted(const struct incode_insertion *n,
-                                              uint32_t id)
-{
+                                              uint32_t id) {
     return n->inserted != NULL &&
            (n->inserted[id / INCODE_BRICK_POINTS] >> id % INCODE_BRICK_POINTS &
             1) != 0;
 }
 
 /* Whether the own bricks are all there are. */
-static inline bool incode_insertion_owns_all(const struct incode_insertion *n)
-{
+static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
     return n->own_last - n->own_first == n->maker->tree.bricks;
 }
 

@@ -14,8 +14,7 @@
 
 /* 1 + 2^-53 is halfway and rounds to the even neighbour, 1; 1 + 2^-52 + 2^-53
  * rounds up; the same below zero. */
-static bool rounds_to_even(void)
-{
+static bool rounds_to_even(void) {
     volatile double one = 1, odd = 0x1.0000000000001p0, half = 0x1p-53;
     volatile double a = one + half, b = odd + half;
     volatile double c = -one - half, d = -odd - half;
@@ -25,8 +24,7 @@ static bool rounds_to_even(void)
 
 /* The square, 1 + 2^-26 + 2^-54 (as 0x1.0000002p0 is 1 + 2^-27), rounds to 1 +
  * 2^-26; fused, the sums below keep the 2^-54. */
-static bool fuses(void)
-{
+static bool fuses(void) {
     volatile double x = 0x1.0000002p0, y = -0x1.0000004p0, z = 0x1.0000004p0;
     volatile double one = 1;
     volatile double a = x * x + y, b = y + x * x, c = x * x - z, d = z - x * x;
@@ -37,8 +35,7 @@ static bool fuses(void)
 /* A sum that is not stored first must be rounded all the same: 2^53 + 1 is
  * 2^53, 1 + 2^-52 + 2^-54 is 1 + 2^-52; the largest double squared must
  * overflow. */
-static bool keeps_excess(void)
-{
+static bool keeps_excess(void) {
     volatile double big = 0x1p53, one = 1, odd = 0x1.0000000000001p0;
     volatile double tiny = 0x1p-54, most = DBL_MAX;
     volatile double a = (big + one) - big, b = (odd + tiny) - odd;
@@ -46,8 +43,7 @@ static bool keeps_excess(void)
     return a != 0 || b != 0 || c <= DBL_MAX;
 }
 
-static bool flushes(void)
-{
+static bool flushes(void) {
     volatile double least = DBL_MIN, half = 0.5, denormal = 0x1p-1074;
     volatile double a = least * half, b = denormal + denormal;
     volatile double c = least - denormal, d = denormal * 0x1p1000;
@@ -55,8 +51,7 @@ static bool flushes(void)
            c + denormal != least || d != 0x1p-74;
 }
 
-static bool little_endian(void)
-{
+static bool little_endian(void) {
     volatile double value = 0x1.23456789abcdep-3;
     volatile uint32_t word = 0x01020304;
     double copy = value;
@@ -69,8 +64,7 @@ static bool little_endian(void)
            bytes[2] == 2 && bytes[3] == 1;
 }
 
-const char *incode_arithmetic_fault(void)
-{
+const char *incode_arithmetic_fault(void) {
     if (!little_endian())
         return "words are not little-endian; use a little-endian machine";
     if (!rounds_to_even())

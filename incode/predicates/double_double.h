@@ -21,8 +21,7 @@ struct incode_dd {
 /* Relative error at most 4 * 2^-106 (AccurateDWPlusDW in Joldes, Muller and
  * Popescu, ACM TOMS 44:15, 2017). */
 static inline struct incode_dd incode_dd_plus(struct incode_dd a,
-                                              struct incode_dd b)
-{
+                                              struct incode_dd b) {
     struct incode_dd r;
     double e, f, s = incode_two_sum(a.hi, b.hi, &e);
     double t = incode_two_sum(a.lo, b.lo, &f);
@@ -32,16 +31,14 @@ static inline struct incode_dd incode_dd_plus(struct incode_dd a,
 }
 
 static inline struct incode_dd incode_dd_minus(struct incode_dd a,
-                                               struct incode_dd b)
-{
+                                               struct incode_dd b) {
     struct incode_dd negative = {-b.hi, -b.lo};
     return incode_dd_plus(a, negative);
 }
 
 /* Relative error at most 7 * 2^-106 (DWTimesDW1, as above). */
 static inline struct incode_dd incode_dd_times(struct incode_dd a,
-                                               struct incode_dd b)
-{
+                                               struct incode_dd b) {
     struct incode_dd r;
     double e, x = incode_two_product(a.hi, b.hi, &e);
     e = incode_multiply_add(a.lo, b.hi, e);
@@ -51,8 +48,7 @@ static inline struct incode_dd incode_dd_times(struct incode_dd a,
 
 /* The high product, and what follows it but for 2^-106 of it. */
 static inline double incode_dd_product(struct incode_dd a, struct incode_dd b,
-                                       double *rest)
-{
+                                       double *rest) {
     double e, p = incode_two_product(a.hi, b.hi, &e);
     e = incode_multiply_add(a.lo, b.hi, e);
     *rest = incode_multiply_add(a.hi, b.lo, e);
@@ -65,8 +61,7 @@ static inline double incode_dd_product(struct incode_dd a, struct incode_dd b,
 static inline struct incode_dd incode_dd_cross(struct incode_dd a,
                                                struct incode_dd b,
                                                struct incode_dd c,
-                                               struct incode_dd d)
-{
+                                               struct incode_dd d) {
     struct incode_dd r;
     double e, f, g, p = incode_dd_product(a, b, &e);
     double q = incode_dd_product(c, d, &f), s = incode_two_sum(p, -q, &g);
@@ -76,8 +71,7 @@ static inline struct incode_dd incode_dd_cross(struct incode_dd a,
 
 /* (a - b) * scale, exact for a power of two that overflows nothing. */
 static inline struct incode_dd incode_dd_difference(double a, double b,
-                                                    double scale)
-{
+                                                    double scale) {
     struct incode_dd r;
     double e;
     r.hi = incode_two_sum(a, -b, &e) * scale;
@@ -91,8 +85,7 @@ struct incode_dd_vector {
 
 /* (p - v) * scale, as above. */
 static inline struct incode_dd_vector
-incode_dd_relative(const double p[3], const double v[3], double scale)
-{
+incode_dd_relative(const double p[3], const double v[3], double scale) {
     struct incode_dd_vector r;
     for (int k = 0; k < 3; k++)
         r.d[k] = incode_dd_difference(p[k], v[k], scale);
@@ -102,8 +95,7 @@ incode_dd_relative(const double p[3], const double v[3], double scale)
 /* a x b, each component as above. */
 static inline struct incode_dd_vector
 incode_dd_vector_product(const struct incode_dd a[3],
-                         const struct incode_dd b[3])
-{
+                         const struct incode_dd b[3]) {
     struct incode_dd_vector r;
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -114,8 +106,7 @@ incode_dd_vector_product(const struct incode_dd a[3],
 
 /* Error at most 33 * 2^-106 of the sum of the terms' sizes, as above. */
 static inline struct incode_dd incode_dd_dot(const struct incode_dd a[3],
-                                             const struct incode_dd b[3])
-{
+                                             const struct incode_dd b[3]) {
     struct incode_dd r;
     double e[3], f, g, p = incode_dd_product(a[0], b[0], &e[0]);
     double q = incode_dd_product(a[1], b[1], &e[1]);

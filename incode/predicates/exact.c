@@ -35,8 +35,7 @@ struct problem {
     int64_t limb[LIMBS_MAX]; /* of 32 bits, with carries not yet passed on */
 };
 
-static void term_of(struct term *t, double value)
-{
+static void term_of(struct term *t, double value) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     uint64_t m = bits & 0xfffffffffffffu;
@@ -61,8 +60,7 @@ static void term_of(struct term *t, double value)
 }
 
 /* Of a coordinate. */
-static int32_t bits_of(const struct term *t)
-{
+static int32_t bits_of(const struct term *t) {
     return 32 * t->limbs - __builtin_clz(t->m[t->limbs - 1]);
 }
 
@@ -70,8 +68,7 @@ static int32_t bits_of(const struct term *t)
  * point are doubles, they take the points' place and that point becomes 0,
  * which leaves a fifth of the monomials.  False where they are not. */
 static bool translate(double q[POINTS_MAX][3], const double *const p[],
-                      int32_t points)
-{
+                      int32_t points) {
     const double *origin = p[points - 1];
     for (int32_t i = 0; i < points; i++) {
         for (int32_t k = 0; k < 3; k++) {
@@ -86,13 +83,11 @@ static bool translate(double q[POINTS_MAX][3], const double *const p[],
 }
 
 /* Limbs that hold a sum of products of `degree` coordinates. */
-static int32_t limbs_of(const struct problem *s, int32_t degree)
-{
+static int32_t limbs_of(const struct problem *s, int32_t degree) {
     return (degree * s->span + 10) / 32 + 2;
 }
 
-static void problem_clear(struct problem *s, int32_t degree)
-{
+static void problem_clear(struct problem *s, int32_t degree) {
     s->limbs = limbs_of(s, degree);
     INCODE_ASSERT(s->limbs <= LIMBS_MAX);
     memset(s->limb, 0, (size_t)s->limbs * sizeof s->limb[0]);
@@ -101,8 +96,7 @@ static void problem_clear(struct problem *s, int32_t degree)
 /* Reads the points and clears an accumulator for sums of products of `degree`
  * coordinates. */
 static void problem_init(struct problem *s, const double *const p[],
-                         int32_t points, int32_t degree)
-{
+                         int32_t points, int32_t degree) {
     double moved[POINTS_MAX][3];
     bool translated = translate(moved, p, points);
     int32_t least = INT32_MAX, most = INT32_MIN;
@@ -127,8 +121,7 @@ static void problem_init(struct problem *s, const double *const p[],
 
 /* r = a * b, neither of which is zero. */
 static void term_product(struct term *r, const struct term *a,
-                         const struct term *b)
-{
+                         const struct term *b) {
     INCODE_ASSERT(a->limbs > 0 && b->limbs > 0);
     INCODE_ASSERT(a->limbs + b->limbs <= TERM_LIMBS);
     for (int32_t j = 0; j < b->limbs; j++) {
@@ -147,8 +140,8 @@ static void term_product(struct term *r, const struct term *a,
 }
 
 /* s += factor * t, factor being 1, -1, 2 or -2. */
-static void problem_add(struct problem *s, const struct term *t, int32_t factor)
-{
+static void problem_add(struct problem *s, const struct term *t,
+                        int32_t factor) {
     int32_t e = t->e + (factor == 2 || factor == -2);
     int32_t at = e / 32, shift = e % 32;
     INCODE_ASSERT(at + t->limbs < s->limbs);
@@ -162,8 +155,7 @@ static void problem_add(struct problem *s, const struct term *t, int32_t factor)
     s->limb[at + t->limbs] += ((int64_t)carry ^ flip) - flip;
 }
 
-static int problem_sign(const struct problem *s)
-{
+static int problem_sign(const struct problem *s) {
     int64_t carry = 0;
     uint32_t any = 0;
     for (int32_t i = 0; i < s->limbs; i++) {
@@ -177,8 +169,7 @@ static int problem_sign(const struct problem *s)
 /* s += sign * x * (z - w), x being a product of two coordinates. */
 static void add_triples(struct problem *s, const struct term *x,
                         const struct term *z, const struct term *w,
-                        int32_t sign)
-{
+                        int32_t sign) {
     struct term t;
     if (z->sign != 0) {
         term_product(&t, x, z);
@@ -193,8 +184,7 @@ static void add_triples(struct problem *s, const struct term *x,
 /* s = the determinant with rows p_i - p_h of four points h, i, j, k, which is
  * that with rows (1, p): by pairs of rows, x_a y_b - x_b y_a times z_c - z_d.
  */
-static void set_orient3d(struct problem *s, const uint8_t row[4])
-{
+static void set_orient3d(struct problem *s, const uint8_t row[4]) {
     /* Each pair, then the other two, all in their order, and the sign. */
     static const int8_t PAIR[6][5] = {{0, 1, 2, 3, -1}, {0, 2, 1, 3, 1},
                                       {0, 3, 1, 2, -1}, {1, 2, 0, 3, -1},
@@ -217,8 +207,7 @@ static void set_orient3d(struct problem *s, const uint8_t row[4])
     }
 }
 
-int incode_exact_orient3d(const double *const p[4])
-{
+int incode_exact_orient3d(const double *const p[4]) {
     struct problem s;
     static const uint8_t ALL[4] = {0, 1, 2, 3};
     problem_init(&s, p, 4, 3);
@@ -235,8 +224,7 @@ struct settled {
 };
 
 /* Passes on all carries. */
-static void settle(struct settled *to, const struct problem *s)
-{
+static void settle(struct settled *to, const struct problem *s) {
     int64_t carry = 0;
     int32_t last = s->limbs, first = 0;
     for (int32_t i = 0; i < last; i++) {
@@ -271,8 +259,7 @@ struct sums {
 
 /* sum += factor * limb[0..count). */
 static void add_times(uint32_t *sum, const uint32_t *limb, int32_t count,
-                      uint32_t factor)
-{
+                      uint32_t factor) {
     uint64_t carry = 0;
     for (; count >= 4; count -= 4, sum += 4, limb += 4) {
         for (int32_t i = 0; i < 4; i++) {
@@ -298,8 +285,7 @@ static void add_times(uint32_t *sum, const uint32_t *limb, int32_t count,
 /* sums += sign * |p|^2 * (limbs [first, last) of d), square by square. */
 static void add_lifted(struct sums *sums, struct incode_pause *pause,
                        const struct settled *d, const struct term p[3],
-                       int32_t first, int32_t last, int sign)
-{
+                       int32_t first, int32_t last, int sign) {
     uint32_t *sum = sums->limb[sign < 0];
     for (int32_t k = 0; k < 3; k++) {
         struct term square;
@@ -325,8 +311,7 @@ static void add_lifted(struct sums *sums, struct incode_pause *pause,
 }
 
 /* The sign of the difference, or 0 if it is below 2^bits. */
-static int compare(const struct sums *sums, int32_t bits)
-{
+static int compare(const struct sums *sums, int32_t bits) {
     int32_t i = sums->limbs - 1;
     while (i >= 0 && sums->limb[0][i] == sums->limb[1][i])
         i--;
@@ -343,8 +328,7 @@ static int compare(const struct sums *sums, int32_t bits)
 
 /* The sums of the top limbs of each orient3d, or of the others. */
 static void add_all(struct sums *sums, struct problem *s,
-                    struct incode_pause *pause, bool top)
-{
+                    struct incode_pause *pause, bool top) {
     /* -det with rows (x, y, z, |p|^2, 1), by its fourth column: the orient3d of
      * the four other points, times -(-1)^i |p_i|^2. */
     for (int32_t i = 0; i < 5; i++) {
@@ -369,8 +353,8 @@ static void add_all(struct sums *sums, struct problem *s,
     }
 }
 
-int incode_exact_in_sphere(const double *const p[5], struct incode_pause *pause)
-{
+int incode_exact_in_sphere(const double *const p[5],
+                           struct incode_pause *pause) {
     struct problem s;
     struct sums sums;
     problem_init(&s, p, 5, 3);
@@ -389,8 +373,7 @@ int incode_exact_in_sphere(const double *const p[5], struct incode_pause *pause)
 
 /* s += factor * x * y, factor being 1, -1, 2 or -2. */
 static void add_product(struct problem *s, int32_t factor, const struct term *x,
-                        const struct term *y)
-{
+                        const struct term *y) {
     if (x->sign == 0 || y->sign == 0)
         return;
     struct term xy;
@@ -398,8 +381,7 @@ static void add_product(struct problem *s, int32_t factor, const struct term *x,
     problem_add(s, &xy, factor);
 }
 
-int incode_exact_compare_distance(const double *const p[3])
-{
+int incode_exact_compare_distance(const double *const p[3]) {
     struct problem s;
     problem_init(&s, p, 3, 2);
     /* |a|^2 - |b|^2 - 2 p.a + 2 p.b */
@@ -412,8 +394,7 @@ int incode_exact_compare_distance(const double *const p[3])
     return problem_sign(&s);
 }
 
-bool incode_exact_collinear(const double *const p[3])
-{
+bool incode_exact_collinear(const double *const p[3]) {
     struct problem s;
     for (int32_t k = 0; k < 3; k++) {
         int32_t u = (k + 1) % 3, v = (k + 2) % 3;

@@ -14,19 +14,16 @@ _Static_assert((-1 >> 1) == -1, "shifts of negative numbers keep the sign");
 typedef double four_d __attribute__((vector_size(32)));
 typedef int64_t four_i __attribute__((vector_size(32)));
 
-static inline four_d all4(double a)
-{
+static inline four_d all4(double a) {
     return (four_d){a, a, a, a};
 }
 
-static inline four_d load3(const double p[3])
-{
+static inline four_d load3(const double p[3]) {
     return (four_d){p[0], p[1], p[2], 0};
 }
 
 /* n = v * 2^k; lanes where that is no integer are not 0. */
-static inline four_i scaled(four_i *n, four_d v, const struct incode_scale *s)
-{
+static inline four_i scaled(four_i *n, four_d v, const struct incode_scale *s) {
     four_i lost = {0};
     four_d u = v * all4(s->up1);
     if (!s->plain) {
@@ -37,14 +34,12 @@ static inline four_i scaled(four_i *n, four_d v, const struct incode_scale *s)
     return lost | (__builtin_convertvector(*n, four_d) != u);
 }
 
-static inline bool any4(four_i a)
-{
+static inline bool any4(four_i a) {
     return (a[0] | a[1] | a[2]) != 0;
 }
 
 bool incode_fixed_differences(int64_t d[][3], const double *const p[],
-                              int count, const double origin[3], double most)
-{
+                              int count, const double origin[3], double most) {
     struct incode_scale s;
     if (!incode_scale_init(&s, most))
         return false; /* where the two-sum could fail, too */
@@ -72,8 +67,7 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
 }
 
 /* For incode_tie: the four points and the origin in order. */
-static uint32_t rank(const int64_t d[4][3])
-{
+static uint32_t rank(const int64_t d[4][3]) {
     static const int64_t zero[3] = {0, 0, 0};
     uint32_t above = 0;
     for (int i = 0; i < 5; i++) {
@@ -92,8 +86,7 @@ static uint32_t rank(const int64_t d[4][3])
 
 /* Numbers in two's complement, least word first.  r = a * b in na + nb. */
 static void product(uint32_t *r, const uint32_t *a, int na, const uint32_t *b,
-                    int nb)
-{
+                    int nb) {
     memset(r, 0, (size_t)(na + nb) * sizeof r[0]);
     for (int i = 0; i < na; i++) {
         uint64_t carry = 0;
@@ -121,8 +114,7 @@ static void product(uint32_t *r, const uint32_t *a, int na, const uint32_t *b,
 }
 
 /* r += a or r -= a. */
-static void accumulate(uint32_t *r, const uint32_t *a, int n, bool subtract)
-{
+static void accumulate(uint32_t *r, const uint32_t *a, int n, bool subtract) {
     uint32_t mask = subtract ? UINT32_MAX : 0;
     uint64_t carry = subtract;
     for (int i = 0; i < n; i++) {
@@ -132,8 +124,7 @@ static void accumulate(uint32_t *r, const uint32_t *a, int n, bool subtract)
     }
 }
 
-static int words_sign(const uint32_t *a, int n)
-{
+static int words_sign(const uint32_t *a, int n) {
     uint32_t any = 0;
     for (int i = 0; i < n; i++)
         any |= a[i];
@@ -144,15 +135,13 @@ typedef uint32_t words2[2]; /* a difference, below 2^61 */
 typedef uint32_t words4[4]; /* a 2 x 2 minor or a squared distance, 2^124 */
 typedef uint32_t words6[6]; /* a 3 x 3 minor, 2^186 */
 
-static void words_of(words2 r, int64_t a)
-{
+static void words_of(words2 r, int64_t a) {
     r[0] = (uint32_t)(uint64_t)a;
     r[1] = (uint32_t)((uint64_t)a >> 32);
 }
 
 /* r += a b or r -= a b */
-static void accumulate_product(words4 r, int64_t a, int64_t b, bool subtract)
-{
+static void accumulate_product(words4 r, int64_t a, int64_t b, bool subtract) {
     words2 p, q;
     words4 t;
     words_of(p, a);
@@ -162,8 +151,7 @@ static void accumulate_product(words4 r, int64_t a, int64_t b, bool subtract)
 }
 
 static void minor3_portable(words6 r, const int64_t a[3], const int64_t b[3],
-                            const int64_t c[3])
-{
+                            const int64_t c[3]) {
     memset(r, 0, sizeof(words6));
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
@@ -178,8 +166,7 @@ static void minor3_portable(words6 r, const int64_t a[3], const int64_t b[3],
     }
 }
 
-int incode_fixed_compare_norm(const int64_t d[2][3])
-{
+int incode_fixed_compare_norm(const int64_t d[2][3]) {
     words4 difference = {0};
     for (int k = 0; k < 3; k++) {
         accumulate_product(difference, d[0][k], d[0][k], false);
@@ -188,8 +175,7 @@ int incode_fixed_compare_norm(const int64_t d[2][3])
     return words_sign(difference, 4);
 }
 
-bool incode_fixed_parallel(const int64_t d[2][3])
-{
+bool incode_fixed_parallel(const int64_t d[2][3]) {
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;
         words4 minor = {0};
@@ -201,15 +187,13 @@ bool incode_fixed_parallel(const int64_t d[2][3])
     return true;
 }
 
-int incode_fixed_orient3d_portable(const int64_t d[3][3])
-{
+int incode_fixed_orient3d_portable(const int64_t d[3][3]) {
     words6 det;
     minor3_portable(det, d[0], d[1], d[2]);
     return words_sign(det, 6);
 }
 
-int incode_fixed_in_sphere_portable(const int64_t d[4][3])
-{
+int incode_fixed_in_sphere_portable(const int64_t d[4][3]) {
     static const uint8_t rest[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     uint32_t det[10] = {0};
@@ -245,20 +229,17 @@ struct i192 {
     i128 hi;
 };
 
-static inline i128 times(int64_t a, int64_t b)
-{
+static inline i128 times(int64_t a, int64_t b) {
     return (i128)a * b;
 }
 
-static inline i128 times_unsigned(uint64_t a, int64_t b)
-{
+static inline i128 times_unsigned(uint64_t a, int64_t b) {
     u128 below = (u128)a << 64;
     return (i128)((u128)a * (uint64_t)b - (b < 0 ? below : 0));
 }
 
 static inline struct i192 sum3(i128 m, int64_t p, i128 n, int64_t q, i128 o,
-                               int64_t r)
-{
+                               int64_t r) {
     /* Below 3 * 2^125 and 3 * 2^121. */
     i128 low = times_unsigned((uint64_t)m, p) + times_unsigned((uint64_t)n, q) +
                times_unsigned((uint64_t)o, r);
@@ -268,19 +249,16 @@ static inline struct i192 sum3(i128 m, int64_t p, i128 n, int64_t q, i128 o,
     return s;
 }
 
-static inline int sign_of(struct i192 a)
-{
+static inline int sign_of(struct i192 a) {
     return a.hi < 0 ? -1 : a.hi > 0 || a.lo != 0;
 }
 
 /* The minor of columns x and y. */
-static inline i128 minor2(const int64_t a[3], const int64_t b[3])
-{
+static inline i128 minor2(const int64_t a[3], const int64_t b[3]) {
     return times(a[0], b[1]) - times(b[0], a[1]);
 }
 
-int incode_fixed_orient3d(const int64_t d[3][3])
-{
+int incode_fixed_orient3d(const int64_t d[3][3]) {
     const int64_t *a = d[0], *b = d[1], *c = d[2];
     return sign_of(
         sum3(minor2(a, b), c[2], minor2(c, a), b[2], minor2(b, c), a[2]));
@@ -293,8 +271,7 @@ struct columns {
 
 /* s += |d|^2 m */
 static inline void add_lifted(struct columns *s, const int64_t d[3],
-                              struct i192 m)
-{
+                              struct i192 m) {
     u128 lift =
         (u128)(times(d[0], d[0]) + times(d[1], d[1])) + (u128)times(d[2], d[2]);
     uint64_t l0 = (uint64_t)lift, l1 = (uint64_t)(lift >> 64);
@@ -311,8 +288,7 @@ static inline void add_lifted(struct columns *s, const int64_t d[3],
     s->c[4] += p12 >> 64;
 }
 
-static int in_sphere_long(const int64_t d[4][3])
-{
+static int in_sphere_long(const int64_t d[4][3]) {
     const int64_t *a = d[0], *b = d[1], *c = d[2], *e = d[3];
     i128 ab = minor2(a, b), bc = minor2(b, c), ce = minor2(c, e);
     i128 ca = minor2(c, a), ea = minor2(e, a), eb = minor2(e, b);
@@ -338,8 +314,7 @@ static int in_sphere_long(const int64_t d[4][3])
 }
 
 /* As rank, for |d[i][j]| < 2^31: a point is one number, x the highest digit. */
-static uint32_t rank_short(const int64_t d[4][3])
-{
+static uint32_t rank_short(const int64_t d[4][3]) {
     i128 key[5];
     uint32_t above = 0;
     for (int i = 0; i < 4; i++) {
@@ -357,8 +332,7 @@ static uint32_t rank_short(const int64_t d[4][3])
 /* For |d[i][j]| < 2^31 and |det| < 2^127: minors of two are below 2^63, of
  * three below 2^96, lifts below 2^64; products keep what they have below
  * 2^128, and the sum is right in the end. */
-static int in_sphere_short(const int64_t d[4][3])
-{
+static int in_sphere_short(const int64_t d[4][3]) {
     int64_t ab = d[0][0] * d[1][1] - d[1][0] * d[0][1];
     int64_t bc = d[1][0] * d[2][1] - d[2][0] * d[1][1];
     int64_t ce = d[2][0] * d[3][1] - d[3][0] * d[2][1];
@@ -385,8 +359,7 @@ static int in_sphere_short(const int64_t d[4][3])
     return incode_tie(rank_short(d), cofactor);
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero)
-{
+int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero) {
     uint64_t ones = 0, bits = 0;
     for (int i = 0; i < 4; i++) {
         for (int k = 0; k < 3; k++) {
@@ -408,13 +381,11 @@ int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero)
 
 #else
 
-int incode_fixed_orient3d(const int64_t d[3][3])
-{
+int incode_fixed_orient3d(const int64_t d[3][3]) {
     return incode_fixed_orient3d_portable(d);
 }
 
-int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero)
-{
+int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero) {
     (void)near_zero;
     return incode_fixed_in_sphere_portable(d);
 }

@@ -11,8 +11,7 @@
 #define IN_SPHERE_BOUND 0x1p-92
 #define UNDERFLOW_BOUND 0x1p-600
 
-static bool decide(struct incode_dd det, double bound, int *sign)
-{
+static bool decide(struct incode_dd det, double bound, int *sign) {
     *sign = det.hi > 0 ? 1 : -1;
     return __builtin_fabs(det.hi) > bound + UNDERFLOW_BOUND;
 }
@@ -20,8 +19,7 @@ static bool decide(struct incode_dd det, double bound, int *sign)
 /* d = (p[i] - origin) * 2^k; m = the largest of each column, plus a little. */
 static bool differences(struct incode_dd d[][3], double m[3],
                         const double *const p[], int count,
-                        const double *origin, double most)
-{
+                        const double *origin, double most) {
     struct incode_scale s;
     if (!incode_scale_init(&s, most))
         return false;
@@ -41,8 +39,7 @@ static bool differences(struct incode_dd d[][3], double m[3],
 
 static struct incode_dd minor3(const struct incode_dd a[3],
                                const struct incode_dd b[3],
-                               const struct incode_dd c[3])
-{
+                               const struct incode_dd c[3]) {
     struct incode_dd bc =
         incode_dd_times(incode_dd_cross(b[0], c[1], c[0], b[1]), a[2]);
     struct incode_dd ca =
@@ -52,8 +49,7 @@ static struct incode_dd minor3(const struct incode_dd a[3],
     return incode_dd_plus(incode_dd_plus(bc, ca), ab);
 }
 
-bool incode_pair_orient3d(const double *const p[4], double most, int *sign)
-{
+bool incode_pair_orient3d(const double *const p[4], double most, int *sign) {
     struct incode_dd d[3][3];
     double m[3];
     if (!differences(d, m, p + 1, 3, p[0], most))
@@ -62,8 +58,7 @@ bool incode_pair_orient3d(const double *const p[4], double most, int *sign)
                   sign);
 }
 
-bool incode_pair_in_sphere(const double *const p[5], double most, int *sign)
-{
+bool incode_pair_in_sphere(const double *const p[5], double most, int *sign) {
     struct incode_dd d[4][3];
     double m[3];
     if (!differences(d, m, p, 4, p[4], most))

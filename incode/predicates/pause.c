@@ -6,8 +6,7 @@
 
 enum { FILLED = 8192, FILLED_UNITS = 16 }; /* bytes at once, and their work */
 
-void incode_pause_look(struct incode_pause *pause)
-{
+void incode_pause_look(struct incode_pause *pause) {
     uint32_t units = INCODE_PAUSE_UNITS_MAX;
     if (pause->look != NULL)
         units = pause->look(pause->context);
@@ -16,8 +15,7 @@ void incode_pause_look(struct incode_pause *pause)
 }
 
 void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
-                       size_t bytes)
-{
+                       size_t bytes) {
     uint8_t *at = memory;
     for (size_t done; bytes > 0; at += done, bytes -= done) {
         done = bytes < FILLED ? bytes : FILLED;

@@ -44,8 +44,7 @@ void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
                        size_t bytes);
 
 /* So many units, at most INCODE_PAUSE_OVER, are about to be worked. */
-static inline void incode_breathe(struct incode_pause *pause, uint32_t units)
-{
+static inline void incode_breathe(struct incode_pause *pause, uint32_t units) {
     pause->left -= (int32_t)units;
     if (__builtin_expect(pause->left < 0, 0))
         incode_pause_look(pause);

@@ -16,24 +16,20 @@
  * most: fixed.h and pair.h, then exact.h, which counts in_sphere itself. */
 enum { ORIENT3D_UNITS = 10, IN_SPHERE_UNITS = 32, EXACT_ORIENT3D_UNITS = 64 };
 
-static double magnitude(double a)
-{
+static double magnitude(double a) {
     return __builtin_fabs(a);
 }
 
-static double larger(double a, double b)
-{
+static double larger(double a, double b) {
     return a > b ? a : b;
 }
 
-static double largest3(double a, double b, double c)
-{
+static double largest3(double a, double b, double c) {
     return larger(magnitude(a), larger(magnitude(b), magnitude(c)));
 }
 
 int incode_orient3d(struct incode_tally *tally, const double a[3],
-                    const double b[3], const double c[3], const double d[3])
-{
+                    const double b[3], const double c[3], const double d[3]) {
     double bx = b[0] - a[0], by = b[1] - a[1], bz = b[2] - a[2];
     double cx = c[0] - a[0], cy = c[1] - a[1], cz = c[2] - a[2];
     double dx = d[0] - a[0], dy = d[1] - a[1], dz = d[2] - a[2];
@@ -64,20 +60,17 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
 }
 
 /* Whether a is above b in the order of (x, y, z), without a branch. */
-static inline bool higher(const double a[3], const double b[3])
-{
+static inline bool higher(const double a[3], const double b[3]) {
     return (a[0] > b[0]) | ((a[0] >= b[0]) &
                             ((a[1] > b[1]) | ((a[1] >= b[1]) & (a[2] > b[2]))));
 }
 
-int incode_lexicographic(const double a[3], const double b[3])
-{
+int incode_lexicographic(const double a[3], const double b[3]) {
     return higher(a, b) - higher(b, a);
 }
 
 /* Five cospherical points where no stage has told on the way: see tie.h. */
-static int in_sphere_tie(struct incode_tally *tally, const double *const p[5])
-{
+static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
     uint32_t above = 0;
     int cofactor[5];
     for (int i = 0; i < 5; i++) {
@@ -95,8 +88,7 @@ static int in_sphere_tie(struct incode_tally *tally, const double *const p[5])
 
 /* p[4] is the query, `near_zero` as in fixed.h. */
 static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
-                           double most, bool near_zero)
-{
+                           double most, bool near_zero) {
     int64_t n[4][3];
     int sign;
     tally->exact_in_sphere++;
@@ -111,8 +103,7 @@ static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
 
 int incode_in_sphere(struct incode_tally *tally, const double a[3],
                      const double b[3], const double c[3], const double d[3],
-                     const double e[3])
-{
+                     const double e[3]) {
     double ax = a[0] - e[0], ay = a[1] - e[1], az = a[2] - e[2];
     double bx = b[0] - e[0], by = b[1] - e[1], bz = b[2] - e[2];
     double cx = c[0] - e[0], cy = c[1] - e[1], cz = c[2] - e[2];
@@ -147,8 +138,7 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
 
 /* Differences of two points from the third, as rounded, and the largest. */
 static double differences2(double a[3], double b[3], const double *const p[2],
-                           const double origin[3])
-{
+                           const double origin[3]) {
     double most = 0;
     for (int k = 0; k < 3; k++) {
         a[k] = p[0][k] - origin[k];
@@ -164,8 +154,7 @@ static const double rounding_bound = 8 * 0x1p-53;
 static const double least_sum = 1e-290, most_sum = 1e290;
 
 int incode_compare_distance(const double p[3], const double a[3],
-                            const double b[3])
-{
+                            const double b[3]) {
     const double *q[3] = {p, a, b};
     double u[3], v[3], most = differences2(u, v, q + 1, p);
     double s = u[0] * u[0] + u[1] * u[1] + u[2] * u[2];
@@ -182,8 +171,7 @@ int incode_compare_distance(const double p[3], const double a[3],
     return incode_exact_compare_distance(q);
 }
 
-bool incode_collinear(const double a[3], const double b[3], const double c[3])
-{
+bool incode_collinear(const double a[3], const double b[3], const double c[3]) {
     const double *q[3] = {a, b, c};
     double u[3], v[3], most = differences2(u, v, q + 1, a);
     for (int k = 0; k < 3; k++) {

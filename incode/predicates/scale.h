@@ -22,8 +22,7 @@ struct incode_scale {
     bool plain;
 };
 
-static inline double incode_power_of_two(int32_t e)
-{
+static inline double incode_power_of_two(int32_t e) {
     uint64_t bits = (uint64_t)(e + 1023) << 52;
     double value;
     memcpy(&value, &bits, sizeof value);
@@ -32,8 +31,7 @@ static inline double incode_power_of_two(int32_t e)
 
 /* Scales what is at most `most` >= 0 to less than 2^60.  False near overflow:
  * from 2^1022 on. */
-static inline bool incode_scale_init(struct incode_scale *s, double most)
-{
+static inline bool incode_scale_init(struct incode_scale *s, double most) {
     uint64_t bits;
     memcpy(&bits, &most, sizeof bits);
     int32_t e = (int32_t)(bits >> 52);

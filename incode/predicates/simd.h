@@ -63,51 +63,42 @@ enum {
 
 /* ---- from memory, and from one number ---- */
 
-INCODE_INLINE incode_vd incode_vd_load(const double *p)
-{
+INCODE_INLINE incode_vd incode_vd_load(const double *p) {
     return *(const incode_vd *)p;
 }
 
-INCODE_INLINE incode_vf incode_vf_load(const float *p)
-{
+INCODE_INLINE incode_vf incode_vf_load(const float *p) {
     return *(const incode_vf *)p;
 }
 
-INCODE_INLINE incode_vi incode_vi_load(const void *p)
-{
+INCODE_INLINE incode_vi incode_vi_load(const void *p) {
     return *(const incode_vi *)p;
 }
 
-INCODE_INLINE incode_vd incode_vd_all(double a)
-{
+INCODE_INLINE incode_vd incode_vd_all(double a) {
     return a - (incode_vd){0};
 }
 
-INCODE_INLINE incode_vf incode_vf_all(float a)
-{
+INCODE_INLINE incode_vf incode_vf_all(float a) {
     return a - (incode_vf){0};
 }
 
-INCODE_INLINE incode_vi incode_vi_all(int32_t a)
-{
+INCODE_INLINE incode_vi incode_vi_all(int32_t a) {
     return a - (incode_vi){0};
 }
 
-INCODE_INLINE incode_vl incode_vl_ones(void)
-{
+INCODE_INLINE incode_vl incode_vl_ones(void) {
     return ~(incode_vl){0};
 }
 
 /* 0, 1, 2, ... */
-INCODE_INLINE incode_vi incode_vi_count(void)
-{
+INCODE_INLINE incode_vi incode_vi_count(void) {
     static const int32_t count[16] __attribute__((aligned(64))) = {
         0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
     return incode_vi_load(count);
 }
 
-INCODE_INLINE incode_vd incode_vd_count(void)
-{
+INCODE_INLINE incode_vd incode_vd_count(void) {
     static const double count[8]
         __attribute__((aligned(64))) = {0, 1, 2, 3, 4, 5, 6, 7};
     return incode_vd_load(count);
@@ -116,8 +107,7 @@ INCODE_INLINE incode_vd incode_vd_count(void)
 /* ---- masks ---- */
 
 /* One bit a lane, from a comparison's result (0 or -1 a lane). */
-INCODE_INLINE uint32_t incode_vd_mask(incode_vl m)
-{
+INCODE_INLINE uint32_t incode_vd_mask(incode_vl m) {
 #if defined(INCODE_AVX512)
     return (uint32_t)_mm512_movepi64_mask((__m512i)m);
 #elif defined(INCODE_AVX2)
@@ -131,8 +121,7 @@ INCODE_INLINE uint32_t incode_vd_mask(incode_vl m)
 #endif
 }
 
-INCODE_INLINE uint32_t incode_vf_mask(incode_vi m)
-{
+INCODE_INLINE uint32_t incode_vf_mask(incode_vi m) {
 #if defined(INCODE_AVX512)
     return (uint32_t)_mm512_movepi32_mask((__m512i)m);
 #elif defined(INCODE_AVX2)
@@ -155,8 +144,7 @@ typedef incode_vi incode_vm;
 typedef incode_vl incode_vdm;
 #endif
 
-INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b)
-{
+INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b) {
 #ifdef INCODE_AVX512
     return _mm512_cmp_ps_mask((__m512)a, (__m512)b, _CMP_LT_OQ);
 #else
@@ -164,8 +152,7 @@ INCODE_INLINE incode_vm incode_vf_less(incode_vf a, incode_vf b)
 #endif
 }
 
-INCODE_INLINE incode_vdm incode_vd_less(incode_vd a, incode_vd b)
-{
+INCODE_INLINE incode_vdm incode_vd_less(incode_vd a, incode_vd b) {
 #ifdef INCODE_AVX512
     return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_LT_OQ);
 #else
@@ -173,8 +160,7 @@ INCODE_INLINE incode_vdm incode_vd_less(incode_vd a, incode_vd b)
 #endif
 }
 
-INCODE_INLINE uint32_t incode_vdm_bits(incode_vdm m)
-{
+INCODE_INLINE uint32_t incode_vdm_bits(incode_vdm m) {
 #ifdef INCODE_AVX512
     return m;
 #else
@@ -182,8 +168,7 @@ INCODE_INLINE uint32_t incode_vdm_bits(incode_vdm m)
 #endif
 }
 
-INCODE_INLINE uint32_t incode_vm_bits(incode_vm m)
-{
+INCODE_INLINE uint32_t incode_vm_bits(incode_vm m) {
 #ifdef INCODE_AVX512
     return m;
 #else
@@ -193,8 +178,7 @@ INCODE_INLINE uint32_t incode_vm_bits(incode_vm m)
 
 /* a - lo <= span, in whole numbers modulo 2^32. */
 INCODE_INLINE incode_vm incode_vi_within(incode_vi a, incode_vi lo,
-                                         incode_vi span)
-{
+                                         incode_vi span) {
 #ifdef INCODE_AVX512
     return _mm512_cmple_epu32_mask(_mm512_sub_epi32((__m512i)a, (__m512i)lo),
                                    (__m512i)span);
@@ -204,8 +188,8 @@ INCODE_INLINE incode_vm incode_vi_within(incode_vi a, incode_vi lo,
 }
 
 /* m ? a : b in each lane. */
-INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a, incode_vd b)
-{
+INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a,
+                                         incode_vd b) {
 #ifdef INCODE_AVX2
     return (incode_vd)_mm256_blendv_pd((__m256d)b, (__m256d)a, (__m256d)m);
 #elif defined(INCODE_PLAIN)
@@ -215,8 +199,8 @@ INCODE_INLINE incode_vd incode_vd_select(incode_vl m, incode_vd a, incode_vd b)
 #endif
 }
 
-INCODE_INLINE incode_vf incode_vf_select(incode_vi m, incode_vf a, incode_vf b)
-{
+INCODE_INLINE incode_vf incode_vf_select(incode_vi m, incode_vf a,
+                                         incode_vf b) {
 #ifdef INCODE_AVX2
     return (incode_vf)_mm256_blendv_ps((__m256)b, (__m256)a, (__m256)m);
 #elif defined(INCODE_PLAIN)
@@ -228,8 +212,7 @@ INCODE_INLINE incode_vf incode_vf_select(incode_vi m, incode_vf a, incode_vf b)
 
 /* The smaller of a and b in lanes of m, else a. */
 INCODE_INLINE incode_vf incode_vf_min_where(incode_vm m, incode_vf a,
-                                            incode_vf b)
-{
+                                            incode_vf b) {
 #ifdef INCODE_AVX512
     return (incode_vf)_mm512_mask_min_ps((__m512)a, m, (__m512)a, (__m512)b);
 #else
@@ -240,8 +223,7 @@ INCODE_INLINE incode_vf incode_vf_min_where(incode_vm m, incode_vf a,
 /* ---- arithmetic ---- */
 
 /* The larger and the smaller of two; the second where one is not a number. */
-INCODE_INLINE incode_vd incode_vd_max(incode_vd a, incode_vd b)
-{
+INCODE_INLINE incode_vd incode_vd_max(incode_vd a, incode_vd b) {
 #if defined(INCODE_AVX512)
     return (incode_vd)_mm512_max_pd((__m512d)a, (__m512d)b);
 #elif defined(INCODE_AVX2)
@@ -255,8 +237,7 @@ INCODE_INLINE incode_vd incode_vd_max(incode_vd a, incode_vd b)
 #endif
 }
 
-INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b)
-{
+INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b) {
 #if defined(INCODE_AVX512)
     return (incode_vd)_mm512_min_pd((__m512d)a, (__m512d)b);
 #elif defined(INCODE_AVX2)
@@ -270,8 +251,7 @@ INCODE_INLINE incode_vd incode_vd_min(incode_vd a, incode_vd b)
 #endif
 }
 
-INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b)
-{
+INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b) {
 #if defined(INCODE_AVX512)
     return (incode_vf)_mm512_max_ps((__m512)a, (__m512)b);
 #elif defined(INCODE_AVX2)
@@ -285,8 +265,7 @@ INCODE_INLINE incode_vf incode_vf_max(incode_vf a, incode_vf b)
 #endif
 }
 
-INCODE_INLINE incode_vf incode_vf_min(incode_vf a, incode_vf b)
-{
+INCODE_INLINE incode_vf incode_vf_min(incode_vf a, incode_vf b) {
 #if defined(INCODE_AVX512)
     return (incode_vf)_mm512_min_ps((__m512)a, (__m512)b);
 #elif defined(INCODE_AVX2)
@@ -300,8 +279,7 @@ INCODE_INLINE incode_vf incode_vf_min(incode_vf a, incode_vf b)
 #endif
 }
 
-INCODE_INLINE float incode_vf_least_of(incode_vf a)
-{
+INCODE_INLINE float incode_vf_least_of(incode_vf a) {
 #ifdef INCODE_AVX512
     return _mm512_reduce_min_ps((__m512)a);
 #else
@@ -312,8 +290,7 @@ INCODE_INLINE float incode_vf_least_of(incode_vf a)
 #endif
 }
 
-INCODE_INLINE double incode_vd_least_of(incode_vd a)
-{
+INCODE_INLINE double incode_vd_least_of(incode_vd a) {
 #ifdef INCODE_AVX512
     return _mm512_reduce_min_pd((__m512d)a);
 #else
@@ -326,8 +303,7 @@ INCODE_INLINE double incode_vd_least_of(incode_vd a)
 
 /* The least of each of as many vectors as one has lanes, in their order. */
 INCODE_INLINE incode_vd
-incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES])
-{
+incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES]) {
 #if defined(INCODE_AVX512)
     __m512d b[4], c[2];
     for (int i = 0; i < 4; i++) {
@@ -358,8 +334,7 @@ incode_vd_least_of_each(const incode_vd a[INCODE_VD_LANES])
 #endif
 }
 
-INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
-{
+INCODE_INLINE incode_vf incode_vf_abs(incode_vf a) {
 #ifdef INCODE_PLAIN
     return (incode_vf){__builtin_fabsf(a[0]), __builtin_fabsf(a[1])};
 #else
@@ -367,8 +342,7 @@ INCODE_INLINE incode_vf incode_vf_abs(incode_vf a)
 #endif
 }
 
-INCODE_INLINE incode_vd incode_vd_abs(incode_vd a)
-{
+INCODE_INLINE incode_vd incode_vd_abs(incode_vd a) {
 #ifdef INCODE_PLAIN
     return (incode_vd){__builtin_fabs(a[0])};
 #else
@@ -377,8 +351,7 @@ INCODE_INLINE incode_vd incode_vd_abs(incode_vd a)
 }
 
 /* About a / b. */
-INCODE_INLINE incode_vf incode_vf_ratio(incode_vf a, incode_vf b)
-{
+INCODE_INLINE incode_vf incode_vf_ratio(incode_vf a, incode_vf b) {
 #ifdef INCODE_AVX512
     return a * (incode_vf)_mm512_rcp14_ps((__m512)b);
 #else
@@ -387,8 +360,7 @@ INCODE_INLINE incode_vf incode_vf_ratio(incode_vf a, incode_vf b)
 }
 
 /* a * b + c: for what only proposes, or stands under an error bound. */
-INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c)
-{
+INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c) {
 #if defined(INCODE_AVX512)
     return (incode_vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
 #elif defined(INCODE_AVX2)
@@ -400,8 +372,7 @@ INCODE_INLINE incode_vf incode_vf_fma(incode_vf a, incode_vf b, incode_vf c)
 #endif
 }
 
-INCODE_INLINE incode_vd incode_vd_fma(incode_vd a, incode_vd b, incode_vd c)
-{
+INCODE_INLINE incode_vd incode_vd_fma(incode_vd a, incode_vd b, incode_vd c) {
 #if defined(INCODE_AVX512)
     return (incode_vd)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
 #elif defined(INCODE_AVX2)
@@ -416,8 +387,7 @@ INCODE_INLINE incode_vd incode_vd_fma(incode_vd a, incode_vd b, incode_vd c)
 /* a b and, in *error, what its rounding lost: exact where nothing overflows or
  * underflows (Dekker, Numerische Mathematik 18, 1971). */
 INCODE_INLINE incode_vd incode_vd_two_product(incode_vd a, incode_vd b,
-                                              incode_vd *error)
-{
+                                              incode_vd *error) {
     incode_vd p = a * b;
 #if defined(INCODE_AVX512)
     *error = (incode_vd)_mm512_fmsub_pd((__m512d)a, (__m512d)b, (__m512d)p);
@@ -435,20 +405,17 @@ INCODE_INLINE incode_vd incode_vd_two_product(incode_vd a, incode_vd b,
 }
 
 /* a - b modulo 2^32. */
-INCODE_INLINE incode_vi incode_vi_minus(incode_vi a, incode_vi b)
-{
+INCODE_INLINE incode_vi incode_vi_minus(incode_vi a, incode_vi b) {
     return (incode_vi)((incode_vu)a - (incode_vu)b);
 }
 
 /* Whole numbers as floats. */
-INCODE_INLINE incode_vf incode_vf_from(incode_vi a)
-{
+INCODE_INLINE incode_vf incode_vf_from(incode_vi a) {
     return __builtin_convertvector(a, incode_vf);
 }
 
 /* Numbers below 2^31, cut to whole ones. */
-INCODE_INLINE void incode_vd_cut(int32_t *out, incode_vd a)
-{
+INCODE_INLINE void incode_vd_cut(int32_t *out, incode_vd a) {
 #if defined(INCODE_AVX512)
     _mm256_storeu_si256((__m256i *)(void *)out,
                         _mm512_cvttpd_epi32((__m512d)a));
@@ -461,8 +428,7 @@ INCODE_INLINE void incode_vd_cut(int32_t *out, incode_vd a)
 }
 
 /* As single precision has them; beyond its range, infinite. */
-INCODE_INLINE void incode_vd_store_float(float *out, incode_vd a)
-{
+INCODE_INLINE void incode_vd_store_float(float *out, incode_vd a) {
 #if defined(INCODE_AVX512)
     _mm256_store_ps(out, _mm512_cvtpd_ps((__m512d)a));
 #elif defined(INCODE_AVX2)
@@ -478,16 +444,14 @@ INCODE_INLINE void incode_vd_store_float(float *out, incode_vd a)
 #ifdef INCODE_AVX2
 /* Where lanes of four bytes come from: bytes 0 .. 7 of which `mask`, a byte of
  * ones each, keeps some. */
-INCODE_INLINE __m256i incode_packing(uint64_t mask)
-{
+INCODE_INLINE __m256i incode_packing(uint64_t mask) {
     uint64_t kept = _pext_u64(UINT64_C(0x0706050403020100), mask);
     return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((int64_t)kept));
 }
 #endif
 
 /* The rest of what is written, a whole vector, is undefined. */
-INCODE_INLINE void incode_vi_pack(void *out, uint32_t mask, incode_vi a)
-{
+INCODE_INLINE void incode_vi_pack(void *out, uint32_t mask, incode_vi a) {
 #if defined(INCODE_AVX512)
     _mm512_storeu_si512(
         out, _mm512_maskz_compress_epi32((__mmask16)mask, (__m512i)a));
@@ -504,8 +468,7 @@ INCODE_INLINE void incode_vi_pack(void *out, uint32_t mask, incode_vi a)
 #endif
 }
 
-INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
-{
+INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a) {
 #ifdef INCODE_AVX512
     _mm512_storeu_pd(out, _mm512_maskz_compress_pd((__mmask8)mask, (__m512d)a));
 #elif defined(INCODE_AVX2)
@@ -523,8 +486,7 @@ INCODE_INLINE void incode_vd_pack(double *out, uint32_t mask, incode_vd a)
 
 /* first, first + 1, ... of the lanes of a vector of doubles. */
 INCODE_INLINE void incode_pack_count(uint32_t *out, uint32_t mask,
-                                     uint32_t first)
-{
+                                     uint32_t first) {
 #ifdef INCODE_AVX512
     __m256i lane = _mm256_add_epi32(_mm256_set1_epi32((int)first),
                                     _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));

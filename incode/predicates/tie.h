@@ -26,8 +26,7 @@
     ((uint32_t)1 << ((larger) ? 4 * (i) : 4 * (j)))
 
 /* cofactor[i]: the sign that raising the i-th point gives. */
-static inline int incode_tie(uint32_t above, const int cofactor[5])
-{
+static inline int incode_tie(uint32_t above, const int cofactor[5]) {
     /* Of 0 to 4, 4 alone has its bit 2, 3 alone both bits 1 and 0. */
     int first = cofactor[__builtin_ctz(above & 0x44444) / 4];
     int second = cofactor[__builtin_ctz(above & above >> 1 & 0x11111) / 4];

@@ -19,40 +19,35 @@
 #define INCODE_HAS_FMA 0
 #endif
 
-static inline double incode_two_sum(double a, double b, double *error)
-{
+static inline double incode_two_sum(double a, double b, double *error) {
     double x = a + b, bv = x - a, av = x - bv;
     *error = (a - av) + (b - bv);
     return x;
 }
 
 /* For |a| >= |b| or a = 0. */
-static inline double incode_fast_two_sum(double a, double b, double *error)
-{
+static inline double incode_fast_two_sum(double a, double b, double *error) {
     double x = a + b;
     *error = b - (x - a);
     return x;
 }
 
 /* a = high + what is returned, of 26 bits each. */
-static inline double incode_split(double a, double *high)
-{
+static inline double incode_split(double a, double *high) {
     double c = 0x8000001p0 * a; /* 2^27 + 1 */
     *high = c - (c - a);
     return a - *high;
 }
 
 static inline double incode_two_product_dekker(double a, double b,
-                                               double *error)
-{
+                                               double *error) {
     double ah, al = incode_split(a, &ah), bh, bl = incode_split(b, &bh);
     double x = a * b;
     *error = al * bl - (((x - ah * bh) - al * bh) - ah * bl);
     return x;
 }
 
-static inline double incode_two_product(double a, double b, double *error)
-{
+static inline double incode_two_product(double a, double b, double *error) {
 #if INCODE_HAS_FMA
     double x = a * b;
     *error = __builtin_fma(a, b, -x);
@@ -64,8 +59,7 @@ static inline double incode_two_product(double a, double b, double *error)
 
 /* About a b + c, rounded once or twice: for terms that an error bound covers.
  */
-static inline double incode_multiply_add(double a, double b, double c)
-{
+static inline double incode_multiply_add(double a, double b, double c) {
 #if INCODE_HAS_FMA
     return __builtin_fma(a, b, c);
 #else

@@ -12,13 +12,11 @@ static const struct {
                              [LOADER_TRANSFERS] = {100, 4 * 3600},
                              [LOADER_FALSE] = {6, 10}};
 
-static uint32_t sum(const struct loader_budget *budget)
-{
+static uint32_t sum(const struct loader_budget *budget) {
     return frame_crc32c(0, budget, offsetof(struct loader_budget, crc));
 }
 
-void loader_budget_open(struct loader_budget *budget)
-{
+void loader_budget_open(struct loader_budget *budget) {
     if (budget->magic != MAGIC || budget->crc != sum(budget)) {
         *budget = (struct loader_budget){.magic = MAGIC};
     }
@@ -26,8 +24,7 @@ void loader_budget_open(struct loader_budget *budget)
     budget->crc = sum(budget);
 }
 
-void loader_budget_pass(struct loader_budget *budget, uint64_t now_us)
-{
+void loader_budget_pass(struct loader_budget *budget, uint64_t now_us) {
     uint32_t now_s = (uint32_t)(now_us / 1000000);
     uint32_t passed_s = now_s - budget->passed_s;
     if (passed_s == 0) {
@@ -42,14 +39,13 @@ void loader_budget_pass(struct loader_budget *budget, uint64_t now_us)
 }
 
 bool loader_budget_has(const struct loader_budget *budget,
-                       enum loader_expense what)
-{
+                       enum loader_expense what) {
     return budget->debt_s[what] <=
            (limits[what].at_once - 1) * limits[what].period_s;
 }
 
-bool loader_budget_take(struct loader_budget *budget, enum loader_expense what)
-{
+bool loader_budget_take(struct loader_budget *budget,
+                        enum loader_expense what) {
     if (!loader_budget_has(budget, what)) {
         return false;
     }

@@ -32,8 +32,7 @@ struct loader_flash {
 /* How far apart things of so many bytes are, of which one must not take others
  * with it. */
 static inline uint32_t loader_flash_apart(const struct loader_flash *flash,
-                                          uint32_t bytes)
-{
+                                          uint32_t bytes) {
     return bytes > flash->torn_bytes ? bytes : flash->torn_bytes;
 }
 

@@ -26,8 +26,7 @@ enum {
 };
 static const uint8_t mark[] = {0x55, 0xaa};
 
-bool loader_card_open(struct loader_card *card)
-{
+bool loader_card_open(struct loader_card *card) {
     card->first = card->held = 0;
     if (!card->read(card->device, 0, card->bytes) ||
         memcmp(card->bytes + AT_MARK, mark, sizeof mark) != 0) {
@@ -46,8 +45,7 @@ bool loader_card_open(struct loader_card *card)
     return card->first != 0;
 }
 
-bool loader_card_format(struct loader_card *card)
-{
+bool loader_card_format(struct loader_card *card) {
     uint8_t *entry = card->bytes + AT_PARTITION;
     memset(card->bytes, 0, BLOCK);
     entry[AT_TYPE] = LOADER_CARD_TYPE;
@@ -61,8 +59,7 @@ bool loader_card_format(struct loader_card *card)
  */
 
 /* Into card->bytes. */
-static bool fetch(struct loader_card *card, uint32_t number)
-{
+static bool fetch(struct loader_card *card, uint32_t number) {
     if (card->first == 0 && !loader_card_open(card)) {
         return false;
     }
@@ -78,14 +75,12 @@ static bool fetch(struct loader_card *card, uint32_t number)
 }
 
 /* And back.  What the card has taken is read again, from the card. */
-static bool store(struct loader_card *card, uint32_t number)
-{
+static bool store(struct loader_card *card, uint32_t number) {
     card->held = 0;
     return card->write(card->device, card->first + number, card->bytes);
 }
 
-void loader_card_read(void *context, uint32_t at, void *bytes, size_t size)
-{
+void loader_card_read(void *context, uint32_t at, void *bytes, size_t size) {
     struct loader_card *card = context;
     uint8_t *out = bytes;
     for (size_t done = 0; done < size;) {
@@ -104,8 +99,7 @@ void loader_card_read(void *context, uint32_t at, void *bytes, size_t size)
 /* Bits that are cleared stay so: what would need them set is refused, although
  * the card could. */
 bool loader_card_program(void *context, uint32_t at, const void *bytes,
-                         size_t size)
-{
+                         size_t size) {
     struct loader_card *card = context;
     const uint8_t *in = bytes;
     uint32_t within = at % BLOCK;
@@ -121,8 +115,7 @@ bool loader_card_program(void *context, uint32_t at, const void *bytes,
     return store(card, at / BLOCK);
 }
 
-static bool erased(const uint8_t *bytes)
-{
+static bool erased(const uint8_t *bytes) {
     for (unsigned i = 0; i < BLOCK; i++) {
         if (bytes[i] != 0xff) {
             return false;
@@ -133,8 +126,7 @@ static bool erased(const uint8_t *bytes)
 
 /* A block that cannot be read may be one that was being written as power was
  * lost. */
-bool loader_card_erase(void *context, uint32_t sector)
-{
+bool loader_card_erase(void *context, uint32_t sector) {
     struct loader_card *card = context;
     if (sector >= LOADER_CARD_SECTORS ||
         (card->first == 0 && !loader_card_open(card))) {
@@ -156,14 +148,12 @@ bool loader_card_erase(void *context, uint32_t sector)
 /* --- in memory -------------------------------------------------------------
  */
 
-bool loader_card_fetch(void *memory, uint32_t block, uint8_t *bytes)
-{
+bool loader_card_fetch(void *memory, uint32_t block, uint8_t *bytes) {
     memcpy(bytes, (const uint8_t *)memory + (size_t)block * BLOCK, BLOCK);
     return true;
 }
 
-bool loader_card_store(void *memory, uint32_t block, const uint8_t *bytes)
-{
+bool loader_card_store(void *memory, uint32_t block, const uint8_t *bytes) {
     memcpy((uint8_t *)memory + (size_t)block * BLOCK, bytes, BLOCK);
     return true;
 }

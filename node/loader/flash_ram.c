@@ -2,8 +2,7 @@
 
 /* Byte by byte, and not optimized away: it may be no memory of the compiler's
  * kind, and must be written before power is lost. */
-void loader_ram_read(void *context, uint32_t at, void *bytes, size_t size)
-{
+void loader_ram_read(void *context, uint32_t at, void *bytes, size_t size) {
     const volatile uint8_t *memory = context;
     uint8_t *out = bytes;
     for (size_t i = 0; i < size; i++) {
@@ -13,8 +12,7 @@ void loader_ram_read(void *context, uint32_t at, void *bytes, size_t size)
 }
 
 bool loader_ram_program(void *context, uint32_t at, const void *bytes,
-                        size_t size)
-{
+                        size_t size) {
     volatile uint8_t *memory = context;
     const uint8_t *in = bytes;
     bool good = true;
@@ -29,8 +27,7 @@ bool loader_ram_program(void *context, uint32_t at, const void *bytes,
     return good;
 }
 
-bool loader_ram_erase(void *context, uint32_t sector)
-{
+bool loader_ram_erase(void *context, uint32_t sector) {
     volatile uint8_t *memory = context;
     if (sector >= LOADER_RAM_SECTORS) {
         return false;

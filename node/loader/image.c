@@ -27,8 +27,7 @@ static_assert(AT_VERSION + LOADER_VERSION_BYTES == LOADER_NAMED_BYTES &&
 static const uint8_t magic[AT_BYTES] = {'i', 'n', 'c', 'o', 'd', 'e', 'I', '1'};
 
 /* The signature covers what is before it; what is behind it says nothing. */
-static bool is_unsaid(const uint8_t bytes[LOADER_HEADER_BYTES])
-{
+static bool is_unsaid(const uint8_t bytes[LOADER_HEADER_BYTES]) {
     uint8_t all = 0;
     for (unsigned i = AT_ZEROS; i < AT_CRC; i++) {
         all |= bytes[i];
@@ -36,9 +35,9 @@ static bool is_unsaid(const uint8_t bytes[LOADER_HEADER_BYTES])
     return all == 0;
 }
 
-enum loader_fault loader_image_unpack(struct loader_image *image,
-                                      const uint8_t bytes[LOADER_HEADER_BYTES])
-{
+enum loader_fault
+loader_image_unpack(struct loader_image *image,
+                    const uint8_t bytes[LOADER_HEADER_BYTES]) {
     if (memcmp(bytes, magic, sizeof magic) != 0 ||
         bytes_get32(bytes + AT_CRC) != frame_crc32c(0, bytes, AT_CRC) ||
         !is_unsaid(bytes) || bytes_get32(bytes + AT_BYTES) == 0) {
@@ -57,16 +56,14 @@ enum loader_fault loader_image_unpack(struct loader_image *image,
 }
 
 /* Up to the text's end: what is behind it is of no meaning. */
-static void put_text(uint8_t *at, const char *text, size_t size)
-{
+static void put_text(uint8_t *at, const char *text, size_t size) {
     for (size_t i = 0; i < size && text[i] != '\0'; i++) {
         at[i] = (uint8_t)text[i];
     }
 }
 
 void loader_image_pack(const struct loader_image *image,
-                       uint8_t bytes[LOADER_HEADER_BYTES])
-{
+                       uint8_t bytes[LOADER_HEADER_BYTES]) {
     memset(bytes, 0, LOADER_HEADER_BYTES);
     memcpy(bytes, magic, sizeof magic);
     bytes_put32(bytes + AT_BYTES, image->bytes);
@@ -83,8 +80,7 @@ void loader_image_pack(const struct loader_image *image,
 
 enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
                                       const struct sign_suite *suite,
-                                      const uint8_t key[SIGN_PUBLIC_BYTES])
-{
+                                      const uint8_t key[SIGN_PUBLIC_BYTES]) {
     static const uint8_t nobody[SIGN_PUBLIC_BYTES];
     if (memcmp(bytes + AT_KEY, nobody, sizeof nobody) == 0) {
         return LOADER_UNSIGNED;
@@ -97,8 +93,7 @@ enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
                : LOADER_WRONG_SIGNATURE;
 }
 
-const char *loader_fault_text(enum loader_fault fault)
-{
+const char *loader_fault_text(enum loader_fault fault) {
     static const char *const texts[LOADER_FAULTS] = {
         [LOADER_NO_IMAGE] = "it is no image, or a damaged one",
         [LOADER_TOO_LARGE] = "it is too large for the board",

@@ -13,83 +13,70 @@ enum {
     ERASED_MARK = -1
 };
 
-static const struct loader_flash *flash_of(const struct loader_incoming *in)
-{
+static const struct loader_flash *flash_of(const struct loader_incoming *in) {
     return in->slots->rules->flash;
 }
 
-static struct loader_layout layout_of(const struct loader_incoming *in)
-{
+static struct loader_layout layout_of(const struct loader_incoming *in) {
     return loader_layout(flash_of(in));
 }
 
-static uint32_t slot_at(const struct loader_incoming *in)
-{
+static uint32_t slot_at(const struct loader_incoming *in) {
     const struct loader_layout layout = layout_of(in);
     return loader_slot_at(&layout, flash_of(in), in->slot);
 }
 
-static uint32_t journal_at(const struct loader_incoming *in, unsigned slot)
-{
+static uint32_t journal_at(const struct loader_incoming *in, unsigned slot) {
     const struct loader_layout layout = layout_of(in);
     return loader_journal_at(&layout, flash_of(in), slot);
 }
 
-static uint32_t mark_at(const struct loader_incoming *in, uint32_t block)
-{
+static uint32_t mark_at(const struct loader_incoming *in, uint32_t block) {
     return journal_at(in, in->slot) + loader_marks_in(flash_of(in)) +
            loader_mark_apart(flash_of(in)) * block;
 }
 
-static uint32_t bytes_of(const struct loader_incoming *in)
-{
+static uint32_t bytes_of(const struct loader_incoming *in) {
     return LOADER_HEADER_BYTES + in->image.bytes;
 }
 
-static uint32_t size_of(const struct loader_incoming *in, uint32_t block)
-{
+static uint32_t size_of(const struct loader_incoming *in, uint32_t block) {
     uint32_t left = bytes_of(in) - block * LOADER_BLOCK_BYTES;
     return left < LOADER_BLOCK_BYTES ? left : LOADER_BLOCK_BYTES;
 }
 
-static bool holds(const struct loader_incoming *in, uint32_t block)
-{
+static bool holds(const struct loader_incoming *in, uint32_t block) {
     return (in->map[block / 8] >> block % 8 & 1) != 0;
 }
 
-static void set_held(struct loader_incoming *in, uint32_t block, bool held)
-{
+static void set_held(struct loader_incoming *in, uint32_t block, bool held) {
     if (holds(in, block) != held) {
         in->map[block / 8] ^= (uint8_t)(1u << block % 8);
         in->held += held ? 1u : UINT32_MAX;
     }
 }
 
-static void refuse(struct loader_incoming *in, enum loader_fault fault)
-{
+static void refuse(struct loader_incoming *in, enum loader_fault fault) {
     in->phase = LOADER_REFUSES;
     in->fault = fault;
     in->work = LOADER_NO_WORK;
 }
 
 /* False: too many of them of late; the transfer ends. */
-static bool affords(struct loader_incoming *in, bool affordable)
-{
+static bool affords(struct loader_incoming *in, bool affordable) {
     if (!affordable) {
         refuse(in, LOADER_TOO_OFTEN);
     }
     return affordable;
 }
 
-static void go_on(struct loader_incoming *in, enum loader_work work)
-{
+static void go_on(struct loader_incoming *in, enum loader_work work) {
     in->work = work;
     in->next = 0;
 }
 
 /* False: the flash does not erase it, which ends the transfer. */
-static bool clear(struct loader_incoming *in, uint32_t at)
-{
+static bool clear(struct loader_incoming *in, uint32_t at) {
     in->erased++;
     if (!loader_flash_clear(flash_of(in), at)) {
         refuse(in, LOADER_WORN);
@@ -99,16 +86,14 @@ static bool clear(struct loader_incoming *in, uint32_t at)
 }
 
 static bool put(struct loader_incoming *in, uint32_t at, const void *bytes,
-                uint32_t size)
-{
+                uint32_t size) {
     uint32_t page = flash_of(in)->page_bytes;
     in->programmed += (size + page - 1) / page;
     return loader_flash_put(flash_of(in), at, bytes, size);
 }
 
 void loader_incoming_init(struct loader_incoming *incoming,
-                          struct loader_slots *slots)
-{
+                          struct loader_slots *slots) {
     memset(incoming, 0, sizeof *incoming);
     incoming->slots = slots;
     incoming->phase = LOADER_WAITS;
@@ -119,8 +104,7 @@ void loader_incoming_init(struct loader_incoming *incoming,
 
 void loader_incoming_begin(struct loader_incoming *incoming,
                            const uint8_t header[LOADER_HEADER_BYTES],
-                           uint32_t bytes)
-{
+                           uint32_t bytes) {
     struct loader_incoming *in = incoming;
     bool same = memcmp(in->header, header, LOADER_HEADER_BYTES) == 0;
     INCODE_ASSERT(in->work == LOADER_NO_WORK);
@@ -145,8 +129,7 @@ void loader_incoming_begin(struct loader_incoming *incoming,
     go_on(in, LOADER_PROVES);
 }
 
-static void prove(struct loader_incoming *in)
-{
+static void prove(struct loader_incoming *in) {
     const struct loader_rules *rules = in->slots->rules;
     struct loader_budget *budget = rules->budget;
     if (!affords(in,
@@ -166,8 +149,7 @@ static void prove(struct loader_incoming *in)
 }
 
 /* What is the image in use already, or has it been brought by now. */
-static bool in_use(const struct loader_incoming *in)
-{
+static bool in_use(const struct loader_incoming *in) {
     const struct loader_slots *slots = in->slots;
     unsigned slot = slots->state.slot;
     return slot < LOADER_SLOTS && slots->known[slot] &&
@@ -176,15 +158,13 @@ static bool in_use(const struct loader_incoming *in)
                   sizeof in->image.digest) == 0;
 }
 
-static bool begins_with_header(const struct loader_incoming *in, uint32_t at)
-{
+static bool begins_with_header(const struct loader_incoming *in, uint32_t at) {
     return loader_flash_holds(flash_of(in), at, in->header,
                               LOADER_HEADER_BYTES);
 }
 
 /* Where no slot is in use: the one in which it has begun to be. */
-static unsigned begun_slot(const struct loader_incoming *in)
-{
+static unsigned begun_slot(const struct loader_incoming *in) {
     unsigned slot = LOADER_SLOTS;
     while (slot-- > 0) {
         const struct loader_layout layout = layout_of(in);
@@ -200,8 +180,7 @@ static unsigned begun_slot(const struct loader_incoming *in)
 /* Erasures begin here.  Each time that a slot is made ready, a sector is erased
  * at most three times: for the first block, again if what was brought is false,
  * and once more if parts of it had been there before. */
-static void make_ready(struct loader_incoming *in, unsigned slot)
-{
+static void make_ready(struct loader_incoming *in, unsigned slot) {
     struct loader_budget *budget = in->slots->rules->budget;
     in->slot = slot;
     if (affords(in, budget == NULL ||
@@ -212,8 +191,7 @@ static void make_ready(struct loader_incoming *in, unsigned slot)
 
 /* The slot that is not in use; of two good ones, of which one is on trial, that
  * one.  The other is looked at first: it is in use from then on. */
-static void choose(struct loader_incoming *in)
-{
+static void choose(struct loader_incoming *in) {
     struct loader_slots *slots = in->slots;
     const struct loader_state *state = &slots->state;
     unsigned other = 1u - state->slot % LOADER_SLOTS;
@@ -244,8 +222,7 @@ static void choose(struct loader_incoming *in)
 
 /* One sector a step: the header's, unless it has this header already, and where
  * the journal is of something else its own. */
-static void ready(struct loader_incoming *in)
-{
+static void ready(struct loader_incoming *in) {
     const struct loader_flash *flash = flash_of(in);
     const struct loader_layout layout = layout_of(in);
     uint32_t at = journal_at(in, in->slot);
@@ -276,8 +253,7 @@ static void ready(struct loader_incoming *in)
 }
 
 /* The mark of a block is right. */
-static bool is_marked(struct loader_incoming *in, uint32_t block)
-{
+static bool is_marked(struct loader_incoming *in, uint32_t block) {
     const struct loader_flash *flash = flash_of(in);
     uint8_t mark[LOADER_MARK_BYTES];
     flash->read(flash->context, mark_at(in, block), mark, sizeof mark);
@@ -292,8 +268,7 @@ static bool is_marked(struct loader_incoming *in, uint32_t block)
     return bytes_get32(mark) == frame_crc32c(0, in->block, size_of(in, block));
 }
 
-static void count(struct loader_incoming *in)
-{
+static void count(struct loader_incoming *in) {
     for (unsigned i = 0; i < COUNT && in->next < in->blocks; i++) {
         set_held(in, in->next, is_marked(in, in->next));
         in->next++;
@@ -309,8 +284,7 @@ static void count(struct loader_incoming *in)
  */
 
 void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
-                           const uint8_t *bytes, uint32_t size, uint32_t crc)
-{
+                           const uint8_t *bytes, uint32_t size, uint32_t crc) {
     struct loader_incoming *in = incoming;
     INCODE_ASSERT(in->work == LOADER_NO_WORK);
     if (in->phase != LOADER_TAKES || number >= in->blocks ||
@@ -328,8 +302,7 @@ void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
 
 /* Blocks of a sector, [*first, *last). */
 static void blocks_of(const struct loader_incoming *in, uint32_t sector,
-                      uint32_t *first, uint32_t *last)
-{
+                      uint32_t *first, uint32_t *last) {
     uint32_t bytes = flash_of(in)->sector_bytes, begin = sector * bytes;
     *first = begin / LOADER_BLOCK_BYTES;
     *last = (begin + bytes + LOADER_BLOCK_BYTES - 1) / LOADER_BLOCK_BYTES;
@@ -338,8 +311,7 @@ static void blocks_of(const struct loader_incoming *in, uint32_t sector,
 
 /* Whether the block's part of a sector can be programmed as it is.  Where no
  * block is held, what is there is of another image. */
-static bool is_ready(const struct loader_incoming *in, uint32_t sector)
-{
+static bool is_ready(const struct loader_incoming *in, uint32_t sector) {
     const struct loader_flash *flash = flash_of(in);
     uint32_t first, last, size = flash->sector_bytes;
     uint32_t at = sector * size;
@@ -360,8 +332,7 @@ static bool is_ready(const struct loader_incoming *in, uint32_t sector)
 }
 
 /* What it held goes with it. */
-static void erase(struct loader_incoming *in, uint32_t sector)
-{
+static void erase(struct loader_incoming *in, uint32_t sector) {
     uint32_t first, last;
     blocks_of(in, sector, &first, &last);
     for (uint32_t b = first; b < last; b++) {
@@ -373,8 +344,7 @@ static void erase(struct loader_incoming *in, uint32_t sector)
 
 /* A mark that cannot be written, as a lost erasure left it, is none: the block
  * is held all the same, and comes again if power is lost. */
-static void program(struct loader_incoming *in)
-{
+static void program(struct loader_incoming *in) {
     uint32_t skip = in->number == 0 ? LOADER_HEADER_BYTES : 0;
     uint8_t mark[LOADER_MARK_BYTES];
     in->work = LOADER_NO_WORK;
@@ -394,8 +364,7 @@ static void program(struct loader_incoming *in)
 }
 
 /* A sector a step is erased, at most; then the block is programmed. */
-static void write(struct loader_incoming *in)
-{
+static void write(struct loader_incoming *in) {
     uint32_t bytes = flash_of(in)->sector_bytes;
     uint32_t begin = in->number * LOADER_BLOCK_BYTES;
     uint32_t first = begin / bytes;
@@ -413,8 +382,7 @@ static void write(struct loader_incoming *in)
 /* --- the end ---------------------------------------------------------------
  */
 
-void loader_incoming_verify(struct loader_incoming *incoming)
-{
+void loader_incoming_verify(struct loader_incoming *incoming) {
     struct loader_incoming *in = incoming;
     INCODE_ASSERT(in->work == LOADER_NO_WORK);
     if (in->phase == LOADER_WHOLE) {
@@ -424,8 +392,7 @@ void loader_incoming_verify(struct loader_incoming *incoming)
     }
 }
 
-static void check(struct loader_incoming *in)
-{
+static void check(struct loader_incoming *in) {
     bool good = false;
     if (!loader_look_slice(&in->look, in->slots, &good)) {
         go_on(in, good ? LOADER_SEALS : LOADER_DROPS);
@@ -433,8 +400,7 @@ static void check(struct loader_incoming *in)
 }
 
 /* Programmed once more where it is there already: it may have been torn. */
-static void seal(struct loader_incoming *in)
-{
+static void seal(struct loader_incoming *in) {
     struct loader_slots *slots = in->slots;
     if (!put(in, slot_at(in), in->header, LOADER_HEADER_BYTES) ||
         !loader_slots_use(slots, in->slot, true)) {
@@ -450,8 +416,7 @@ static void seal(struct loader_incoming *in)
 
 /* Header and journal: nothing of it is held any more.  Where parts of it were
  * there before, it is taken anew. */
-static void drop(struct loader_incoming *in)
-{
+static void drop(struct loader_incoming *in) {
     uint32_t at = in->next++ == 0 ? slot_at(in) : journal_at(in, in->slot);
     if (!clear(in, at) || in->next < 2) {
         return;
@@ -466,8 +431,7 @@ static void drop(struct loader_incoming *in)
     }
 }
 
-void loader_incoming_step(struct loader_incoming *incoming)
-{
+void loader_incoming_step(struct loader_incoming *incoming) {
     static void (*const works[])(struct loader_incoming * in) = {
         [LOADER_PROVES] = prove,  [LOADER_CHOOSES] = choose,
         [LOADER_READIES] = ready, [LOADER_COUNTS] = count,

@@ -79,14 +79,13 @@ void loader_incoming_verify(struct loader_incoming *incoming);
 
 /* Once it is not busy: whether the signature of its image has been verified. */
 static inline bool
-loader_incoming_proved(const struct loader_incoming *incoming)
-{
+loader_incoming_proved(const struct loader_incoming *incoming) {
     return incoming->phase >= LOADER_THERE &&
            incoming->phase <= LOADER_VERIFIED;
 }
 
-static inline bool loader_incoming_busy(const struct loader_incoming *incoming)
-{
+static inline bool
+loader_incoming_busy(const struct loader_incoming *incoming) {
     return incoming->work != LOADER_NO_WORK;
 }
 

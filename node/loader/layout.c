@@ -17,19 +17,16 @@ enum {
 static_assert(SLOT_BYTES_MAX / LOADER_BLOCK_BYTES < LOADER_BLOCKS_MAX,
               "a slot's blocks fit a map");
 
-uint32_t loader_marks_in(const struct loader_flash *flash)
-{
+uint32_t loader_marks_in(const struct loader_flash *flash) {
     return flash->page_bytes > LOADER_HEADER_BYTES ? flash->page_bytes
                                                    : LOADER_HEADER_BYTES;
 }
 
-uint32_t loader_mark_apart(const struct loader_flash *flash)
-{
+uint32_t loader_mark_apart(const struct loader_flash *flash) {
     return loader_flash_apart(flash, LOADER_MARK_BYTES);
 }
 
-struct loader_layout loader_layout(const struct loader_flash *flash)
-{
+struct loader_layout loader_layout(const struct loader_flash *flash) {
     struct loader_layout layout;
     memset(&layout, 0, sizeof layout);
     layout.first = flash->sectors >= LARGE ? LARGE_FIRST : SMALL_FIRST;
@@ -50,21 +47,18 @@ struct loader_layout loader_layout(const struct loader_flash *flash)
 }
 
 uint32_t loader_slot_at(const struct loader_layout *layout,
-                        const struct loader_flash *flash, unsigned slot)
-{
+                        const struct loader_flash *flash, unsigned slot) {
     return (layout->first + slot * layout->sectors) * flash->sector_bytes;
 }
 
 uint32_t loader_journal_at(const struct loader_layout *layout,
-                           const struct loader_flash *flash, unsigned slot)
-{
+                           const struct loader_flash *flash, unsigned slot) {
     return loader_slot_at(layout, flash, slot) +
            (layout->sectors - layout->journal) * flash->sector_bytes;
 }
 
 bool loader_flash_put(const struct loader_flash *flash, uint32_t at,
-                      const void *bytes, uint32_t size)
-{
+                      const void *bytes, uint32_t size) {
     const uint8_t *in = bytes;
     bool taken = true;
     for (uint32_t done = 0; done < size;) {
@@ -79,8 +73,7 @@ bool loader_flash_put(const struct loader_flash *flash, uint32_t at,
 
 /* bytes NULL: 0xff all; takes: bits that are set in the flash may differ. */
 static bool compare(const struct loader_flash *flash, uint32_t at,
-                    const uint8_t *bytes, uint32_t size, bool takes)
-{
+                    const uint8_t *bytes, uint32_t size, bool takes) {
     uint8_t piece[PIECE];
     for (uint32_t done = 0; done < size; done += PIECE) {
         uint32_t part = size - done < PIECE ? size - done : PIECE;
@@ -96,24 +89,20 @@ static bool compare(const struct loader_flash *flash, uint32_t at,
 }
 
 bool loader_flash_holds(const struct loader_flash *flash, uint32_t at,
-                        const void *bytes, uint32_t size)
-{
+                        const void *bytes, uint32_t size) {
     return compare(flash, at, bytes, size, false);
 }
 
 bool loader_flash_takes(const struct loader_flash *flash, uint32_t at,
-                        const void *bytes, uint32_t size)
-{
+                        const void *bytes, uint32_t size) {
     return compare(flash, at, bytes, size, true);
 }
 
 bool loader_flash_blank(const struct loader_flash *flash, uint32_t at,
-                        uint32_t size)
-{
+                        uint32_t size) {
     return compare(flash, at, NULL, size, false);
 }
 
-bool loader_flash_clear(const struct loader_flash *flash, uint32_t at)
-{
+bool loader_flash_clear(const struct loader_flash *flash, uint32_t at) {
     return flash->erase(flash->context, at / flash->sector_bytes);
 }

@@ -33,8 +33,7 @@ struct loader {
 };
 
 struct loader *loader_start(const struct node_board *board,
-                            struct loader_slots *slots, const char **why)
-{
+                            struct loader_slots *slots, const char **why) {
     uint8_t *memory = board->arena;
     size_t own = node_aligned(sizeof(struct loader));
     struct cube_config config = node_configure(
@@ -67,8 +66,7 @@ struct loader *loader_start(const struct node_board *board,
 /* --- what comes ------------------------------------------------------------
  */
 
-static void take_ping(struct loader *l, const struct cube_message *message)
-{
+static void take_ping(struct loader *l, const struct cube_message *message) {
     struct node_ping_message ping;
     if (message->size == sizeof ping) {
         memcpy(&ping, message->data, sizeof ping);
@@ -78,8 +76,7 @@ static void take_ping(struct loader *l, const struct cube_message *message)
     }
 }
 
-static void take_begin(struct loader *l, const struct cube_message *message)
-{
+static void take_begin(struct loader *l, const struct cube_message *message) {
     struct loader_begin_message begin;
     unsigned self = l->board->identity.self;
     if (message->size != sizeof begin) {
@@ -92,8 +89,7 @@ static void take_begin(struct loader *l, const struct cube_message *message)
     }
 }
 
-static void take_block(struct loader *l, const struct cube_message *message)
-{
+static void take_block(struct loader *l, const struct cube_message *message) {
     struct loader_block_message head;
     if (message->size < sizeof head) {
         return;
@@ -107,16 +103,14 @@ static void take_block(struct loader *l, const struct cube_message *message)
 }
 
 /* It restarts once what is on its way has been passed on. */
-static void leave(struct loader *l)
-{
+static void leave(struct loader *l) {
     if (l->answers.restart == 0) {
         l->answers.restart = NODE_RESTART_PLAIN;
         l->answers.restart_us = l->now_us;
     }
 }
 
-static void take_order(struct loader *l, const struct cube_message *message)
-{
+static void take_order(struct loader *l, const struct cube_message *message) {
     struct loader_do_message order;
     if (message->size != sizeof order) {
         return;
@@ -142,8 +136,8 @@ static void take_order(struct loader *l, const struct cube_message *message)
     }
 }
 
-static void serve_message(struct loader *l, const struct cube_message *message)
-{
+static void serve_message(struct loader *l,
+                          const struct cube_message *message) {
     switch (message->type) {
     case NODE_PING:
         take_ping(l, message);
@@ -171,8 +165,7 @@ static void serve_message(struct loader *l, const struct cube_message *message)
     }
 }
 
-static void take_message(struct loader *l, const struct cube_message *message)
-{
+static void take_message(struct loader *l, const struct cube_message *message) {
     if (node_answers_is_for(message)) {
         node_answers_take(&l->answers, message, l->now_us);
     } else if (message->source == CUBE_HOST) {
@@ -184,8 +177,8 @@ static void take_message(struct loader *l, const struct cube_message *message)
 
 /* What the flash is too busy for holds up its link.  Nothing is known of an
  * image that begins, until it has begun. */
-static bool may_take(const struct loader *l, const struct cube_message *message)
-{
+static bool may_take(const struct loader *l,
+                     const struct cube_message *message) {
     enum loader_work work = l->incoming.work;
     switch (message->type) {
     case NODE_IMAGE_BEGIN:
@@ -200,8 +193,7 @@ static bool may_take(const struct loader *l, const struct cube_message *message)
 }
 
 /* Reads a link up to what is not to be taken yet. */
-static unsigned read_link(struct loader *l, unsigned d)
-{
+static unsigned read_link(struct loader *l, unsigned d) {
     struct cube_message message;
     unsigned moved = 0;
     while (cube_read_from(l->cube, d, &message)) {
@@ -217,8 +209,7 @@ static unsigned read_link(struct loader *l, unsigned d)
 }
 
 /* The host begins again with all nodes; what has come of the image stays. */
-static void follow_wiring(struct loader *l)
-{
+static void follow_wiring(struct loader *l) {
     const struct cube_wiring *wiring = cube_wiring(l->cube);
     if (wiring_together(wiring, &l->followed)) {
         return;
@@ -232,13 +223,11 @@ static void follow_wiring(struct loader *l)
 /* --- what it says ----------------------------------------------------------
  */
 
-static bool say(struct loader *l, uint8_t type, const void *data, size_t size)
-{
+static bool say(struct loader *l, uint8_t type, const void *data, size_t size) {
     return node_counted_write(&l->counted, CUBE_HOST, type, data, size) == 0;
 }
 
-static bool send_pong(struct loader *l)
-{
+static bool send_pong(struct loader *l) {
     l->pong.start = l->board->identity.epoch;
     l->pong.sent = l->counted.sent;
     l->pong.links = node_looks_seen(&l->looks);
@@ -253,8 +242,7 @@ static const char no_record[] =
     "the flash takes no record of a start, and no image is started or taken: ";
 
 /* An image is no role's: the run ends, and tells its user this. */
-static bool send_fault(struct loader *l)
-{
+static bool send_fault(struct loader *l) {
     char room[NODE_FAULT_TEXT_MAX + 1];
     struct cube_text text = cube_text_in(room, sizeof room);
     cube_text_put(&text, "waits in its boot loader: ");
@@ -267,8 +255,7 @@ static bool send_fault(struct loader *l)
     return say(l, NODE_FAULT, text.data, text.size);
 }
 
-static bool send_state(struct loader *l)
-{
+static bool send_state(struct loader *l) {
     const struct loader_incoming *in = &l->incoming;
     struct loader_state_message state;
     memset(&state, 0, sizeof state);
@@ -284,8 +271,7 @@ static bool send_state(struct loader *l)
 }
 
 /* What it is itself, and what it would start. */
-static void tell_who(void *context, struct node_who *who)
-{
+static void tell_who(void *context, struct node_who *who) {
     const struct loader *l = context;
     unsigned slot = l->slots->state.slot;
     who->kind = NODE_KIND_LOADER;
@@ -302,8 +288,7 @@ static void tell_who(void *context, struct node_who *who)
     who->boot = l->slots->worn ? 0 : who->boot;
 }
 
-static size_t tell_log(void *context, char *text, size_t size)
-{
+static size_t tell_log(void *context, char *text, size_t size) {
     const struct loader *l = context;
     struct cube_text log = cube_text_in(text, size);
     if (l->slots->worn) {
@@ -314,8 +299,7 @@ static size_t tell_log(void *context, char *text, size_t size)
     return log.size;
 }
 
-static void send(struct loader *l)
-{
+static void send(struct loader *l) {
     const struct node_teller teller = {
         .context = l, .who = tell_who, .log = tell_log};
     if (l->owes_fault) {
@@ -333,16 +317,14 @@ static void send(struct loader *l)
  */
 
 /* What the host waits for to go on is said unasked. */
-static void look_at_phase(struct loader *l)
-{
+static void look_at_phase(struct loader *l) {
     enum loader_phase phase = l->incoming.phase;
     l->owes_state =
         l->owes_state || (phase != l->phase && phase >= LOADER_WHOLE);
     l->phase = phase;
 }
 
-enum node_event loader_step(struct loader *loader)
-{
+enum node_event loader_step(struct loader *loader) {
     struct loader *l = loader;
     l->now_us = l->board->now_us(l->board->context);
     unsigned moved = node_looks_poll(&l->looks, l->now_us);
@@ -364,19 +346,16 @@ enum node_event loader_step(struct loader *loader)
     return moved > 0 ? NODE_BUSY : NODE_IDLE;
 }
 
-enum node_reset loader_reset_why(const struct loader *loader)
-{
+enum node_reset loader_reset_why(const struct loader *loader) {
     return node_answers_restart(&loader->answers, loader->now_us);
 }
 
 unsigned loader_links(const struct loader *loader,
-                      struct node_link_state state[CUBE_LINKS_MAX])
-{
+                      struct node_link_state state[CUBE_LINKS_MAX]) {
     return node_answers_links(&loader->answers, state);
 }
 
-uint64_t loader_wait_us(const struct loader *loader)
-{
+uint64_t loader_wait_us(const struct loader *loader) {
     uint64_t due = cube_next_due_us(loader->cube, loader->now_us);
     return due < IDLE_MAX_US ? due : IDLE_MAX_US;
 }

@@ -3,8 +3,7 @@
 #include <string.h>
 
 void loader_look_begin(struct loader_look *look, struct loader_slots *slots,
-                       unsigned slot)
-{
+                       unsigned slot) {
     look->slot = slot;
     look->begun = false;
     slots->known[slot] = false;
@@ -13,8 +12,7 @@ void loader_look_begin(struct loader_look *look, struct loader_slots *slots,
 void loader_look_hash(struct loader_look *look,
                       const struct loader_slots *slots,
                       const uint8_t header[LOADER_HEADER_BYTES],
-                      const struct loader_image *image, unsigned slot)
-{
+                      const struct loader_image *image, unsigned slot) {
     const struct sign_suite *suite = slots->rules->suite;
     look->code = loader_slots_code(slots, slot);
     look->bytes = image->bytes;
@@ -25,16 +23,14 @@ void loader_look_hash(struct loader_look *look,
 }
 
 static bool ends_well(struct loader_look *look,
-                      const struct loader_slots *slots)
-{
+                      const struct loader_slots *slots) {
     uint8_t digest[SIGN_DIGEST_BYTES];
     slots->rules->suite->end(look->hash, digest);
     return memcmp(digest, look->digest, sizeof digest) == 0;
 }
 
 static void read_header(const struct loader_slots *slots, unsigned slot,
-                        uint8_t header[LOADER_HEADER_BYTES])
-{
+                        uint8_t header[LOADER_HEADER_BYTES]) {
     const struct loader_flash *flash = slots->rules->flash;
     flash->read(flash->context,
                 loader_slots_code(slots, slot) - LOADER_HEADER_BYTES, header,
@@ -42,8 +38,7 @@ static void read_header(const struct loader_slots *slots, unsigned slot,
 }
 
 bool loader_look_slice(struct loader_look *look,
-                       const struct loader_slots *slots, bool *good)
-{
+                       const struct loader_slots *slots, bool *good) {
     const struct sign_suite *suite = slots->rules->suite;
     const struct loader_flash *flash = slots->rules->flash;
     uint32_t left = look->bytes - look->done;
@@ -60,8 +55,7 @@ bool loader_look_slice(struct loader_look *look,
 }
 
 bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
-                      unsigned slot, const uint8_t *copy)
-{
+                      unsigned slot, const uint8_t *copy) {
     const struct sign_suite *suite = slots->rules->suite;
     uint8_t header[LOADER_HEADER_BYTES];
     read_header(slots, slot, header);
@@ -80,8 +74,7 @@ bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
 
 /* The header, the rules and the signature. */
 static enum loader_fault begin(struct loader_look *look,
-                               struct loader_slots *slots)
-{
+                               struct loader_slots *slots) {
     const struct loader_rules *rules = slots->rules;
     struct loader_image *image = &slots->image[look->slot];
     uint8_t header[LOADER_HEADER_BYTES];
@@ -96,8 +89,7 @@ static enum loader_fault begin(struct loader_look *look,
     return fault;
 }
 
-bool loader_look_step(struct loader_look *look, struct loader_slots *slots)
-{
+bool loader_look_step(struct loader_look *look, struct loader_slots *slots) {
     enum loader_fault fault = LOADER_GOOD;
     bool good = false;
     if (!look->begun) {

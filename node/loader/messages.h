@@ -84,8 +84,7 @@ struct loader_state_message {
 /* So much of it goes: of the map what says something, as answers of many come
  * over one wire. */
 static inline uint32_t
-loader_state_bytes(const struct loader_state_message *state)
-{
+loader_state_bytes(const struct loader_state_message *state) {
     uint32_t map = state->phase == LOADER_TAKES ? (state->blocks + 7) / 8 : 0;
     return (uint32_t)sizeof *state - LOADER_MAP_BYTES + map;
 }

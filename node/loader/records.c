@@ -22,8 +22,7 @@ struct sector {
 
 /* Of a record whose body is there. */
 static void seal(const struct loader_records *records, uint8_t *record,
-                 uint32_t number)
-{
+                 uint32_t number) {
     uint32_t size = records->bytes - 4;
     bytes_put32(record, records->mark);
     bytes_put32(record + 4, number);
@@ -32,8 +31,7 @@ static void seal(const struct loader_records *records, uint8_t *record,
 
 /* 0: it is none. */
 static uint32_t number_of(const struct loader_records *records,
-                          const uint8_t *record)
-{
+                          const uint8_t *record) {
     uint8_t whole[LOADER_RECORD_MAX];
     memcpy(whole, record, records->bytes);
     seal(records, whole, bytes_get32(record + 4));
@@ -41,8 +39,7 @@ static uint32_t number_of(const struct loader_records *records,
                                                       : 0;
 }
 
-static bool erased(const uint8_t *record, uint32_t bytes)
-{
+static bool erased(const uint8_t *record, uint32_t bytes) {
     for (uint32_t i = 0; i < bytes; i++) {
         if (record[i] != 0xff) {
             return false;
@@ -51,13 +48,13 @@ static bool erased(const uint8_t *record, uint32_t bytes)
     return true;
 }
 
-static uint32_t begin_of(const struct loader_records *records, unsigned sector)
-{
+static uint32_t begin_of(const struct loader_records *records,
+                         unsigned sector) {
     return (records->first + sector) * records->flash->sector_bytes;
 }
 
-static struct sector look(const struct loader_records *records, unsigned sector)
-{
+static struct sector look(const struct loader_records *records,
+                          unsigned sector) {
     const struct loader_flash *flash = records->flash;
     struct sector found = {0, 0, 0, 0};
     uint8_t record[LOADER_RECORD_MAX];
@@ -80,8 +77,8 @@ static struct sector look(const struct loader_records *records, unsigned sector)
     return found;
 }
 
-uint32_t loader_records_newest(const struct loader_records *records, void *body)
-{
+uint32_t loader_records_newest(const struct loader_records *records,
+                               void *body) {
     struct sector found[SECTORS] = {look(records, 0), look(records, 1)};
     const struct loader_flash *flash = records->flash;
     unsigned last = found[1].largest > found[0].largest;
@@ -95,8 +92,7 @@ uint32_t loader_records_newest(const struct loader_records *records, void *body)
 
 /* Whether the flash holds it afterwards. */
 static bool put(const struct loader_records *records, uint32_t at,
-                const void *body, uint32_t number)
-{
+                const void *body, uint32_t number) {
     const struct loader_flash *flash = records->flash;
     uint8_t record[LOADER_RECORD_MAX], read[LOADER_RECORD_MAX];
     memcpy(record + AT_BODY, body, records->bytes - LOADER_RECORD_OWN);
@@ -109,8 +105,7 @@ static bool put(const struct loader_records *records, uint32_t at,
 /* The sector that was not the last to be written is erased before it is, so
  * that what an interrupted erasure has left there does not matter. */
 bool loader_records_append(const struct loader_records *records,
-                           const void *body, uint32_t *number)
-{
+                           const void *body, uint32_t *number) {
     const struct loader_flash *flash = records->flash;
     INCODE_ASSERT(records->bytes <= LOADER_RECORD_MAX &&
                   flash->page_bytes % records->bytes == 0);

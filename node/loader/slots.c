@@ -19,14 +19,12 @@ enum {
 /* --- the state -------------------------------------------------------------
  */
 
-static struct loader_records state_records(const struct loader_flash *flash)
-{
+static struct loader_records state_records(const struct loader_flash *flash) {
     return (struct loader_records){flash, LOADER_STATE_SECTOR, STATE_MARK,
                                    STATE_BYTES};
 }
 
-static struct loader_state read_state(const struct loader_flash *flash)
-{
+static struct loader_state read_state(const struct loader_flash *flash) {
     const struct loader_records records = state_records(flash);
     struct loader_state state = {.slot = LOADER_SLOTS};
     uint8_t body[STATE_BYTES - LOADER_RECORD_OWN];
@@ -40,8 +38,7 @@ static struct loader_state read_state(const struct loader_flash *flash)
 }
 
 static bool write_state(const struct loader_flash *flash,
-                        const struct loader_state *state)
-{
+                        const struct loader_state *state) {
     const struct loader_records records = state_records(flash);
     uint8_t body[STATE_BYTES - LOADER_RECORD_OWN];
     uint32_t number;
@@ -54,15 +51,13 @@ static bool write_state(const struct loader_flash *flash,
 }
 
 void loader_slots_open(struct loader_slots *slots,
-                       const struct loader_rules *rules)
-{
+                       const struct loader_rules *rules) {
     memset(slots, 0, sizeof *slots);
     slots->rules = rules;
     slots->state = read_state(rules->flash);
 }
 
-bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial)
-{
+bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial) {
     struct loader_state next = slots->state;
     next.slot = (uint8_t)slot;
     next.trial = trial;
@@ -78,8 +73,7 @@ bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial)
  */
 
 /* A board has no C library. */
-static bool same_name(const char *a, const char *b)
-{
+static bool same_name(const char *a, const char *b) {
     while (*a != '\0' && *a == *b) {
         a++;
         b++;
@@ -89,8 +83,7 @@ static bool same_name(const char *a, const char *b)
 
 enum loader_fault loader_slots_suits(const struct loader_slots *slots,
                                      const uint8_t header[LOADER_HEADER_BYTES],
-                                     struct loader_image *image)
-{
+                                     struct loader_image *image) {
     const struct loader_rules *rules = slots->rules;
     const struct loader_layout layout = loader_layout(rules->flash);
     if (loader_image_unpack(image, header) != LOADER_GOOD) {
@@ -110,15 +103,13 @@ enum loader_fault loader_slots_suits(const struct loader_slots *slots,
     return image->number < slots->state.floor ? LOADER_TOO_OLD : LOADER_GOOD;
 }
 
-uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot)
-{
+uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot) {
     const struct loader_layout layout = loader_layout(slots->rules->flash);
     return loader_slot_at(&layout, slots->rules->flash, slot) +
            LOADER_HEADER_BYTES;
 }
 
-static bool is_good(struct loader_slots *slots, unsigned slot)
-{
+static bool is_good(struct loader_slots *slots, unsigned slot) {
     struct loader_look look;
     loader_look_begin(&look, slots, slot);
     while (loader_look_step(&look, slots)) {
@@ -131,15 +122,13 @@ static bool is_good(struct loader_slots *slots, unsigned slot)
  */
 
 /* To the one before, or to none.  The old one has come up once. */
-static void fall_back(struct loader_slots *slots)
-{
+static void fall_back(struct loader_slots *slots) {
     unsigned other = 1u - slots->state.slot;
     (void)loader_slots_use(slots, is_good(slots, other) ? other : LOADER_SLOTS,
                            false);
 }
 
-unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly)
-{
+unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly) {
     const struct loader_state *state = &slots->state;
     if (state->slot < LOADER_SLOTS && state->trial &&
         (state->tries >= LOADER_TRIES || (ended_badly && state->tries > 0))) {
@@ -161,8 +150,7 @@ unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly)
 
 unsigned loader_slots_start(struct loader_slots *slots,
                             const struct loader_rules *rules, bool ended_badly,
-                            uint32_t *boot)
-{
+                            uint32_t *boot) {
     loader_slots_open(slots, rules);
     slots->worn = !loader_boots_next(rules->flash, boot);
     if (slots->worn) {
@@ -172,8 +160,7 @@ unsigned loader_slots_start(struct loader_slots *slots,
     return loader_slots_choose(slots, ended_badly);
 }
 
-bool loader_slots_try(struct loader_slots *slots)
-{
+bool loader_slots_try(struct loader_slots *slots) {
     struct loader_state next = slots->state;
     next.tries++;
     if (next.trial && !write_state(slots->rules->flash, &next)) {
@@ -185,8 +172,7 @@ bool loader_slots_try(struct loader_slots *slots)
 }
 
 bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
-                              struct loader_state *up)
-{
+                              struct loader_state *up) {
     const struct loader_layout layout = loader_layout(flash);
     const struct loader_state before = read_state(flash);
     uint8_t header[LOADER_HEADER_BYTES];
@@ -206,13 +192,11 @@ bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
 }
 
 bool loader_slots_confirm(const struct loader_flash *flash,
-                          const struct loader_state *up)
-{
+                          const struct loader_state *up) {
     return write_state(flash, up);
 }
 
-bool loader_slots_lived(const struct loader_flash *flash, unsigned slot)
-{
+bool loader_slots_lived(const struct loader_flash *flash, unsigned slot) {
     struct loader_state state = read_state(flash);
     if (slot >= LOADER_SLOTS || state.slot != slot || !state.trial ||
         state.tries <= 1) {
@@ -223,8 +207,7 @@ bool loader_slots_lived(const struct loader_flash *flash, unsigned slot)
 }
 
 bool loader_slots_install(const struct loader_flash *flash,
-                          const uint8_t *image, uint32_t bytes)
-{
+                          const uint8_t *image, uint32_t bytes) {
     const struct loader_layout layout = loader_layout(flash);
     const struct loader_state state = {.slot = 0};
     if (bytes > layout.bytes) {
@@ -243,8 +226,7 @@ bool loader_slots_install(const struct loader_flash *flash,
 /* --- the serial number -----------------------------------------------------
  */
 
-static bool blank(const uint8_t *bytes, uint32_t size)
-{
+static bool blank(const uint8_t *bytes, uint32_t size) {
     for (uint32_t i = 0; i < size; i++) {
         if (bytes[i] != 0xff) {
             return false;
@@ -256,8 +238,7 @@ static bool blank(const uint8_t *bytes, uint32_t size)
 /* The first record that is whole; else where the next may be written, or the
  * sector's end. */
 static bool find_serial(const struct loader_flash *flash, uint32_t *at,
-                        uint8_t record[SERIAL_BYTES])
-{
+                        uint8_t record[SERIAL_BYTES]) {
     uint32_t begin = LOADER_SERIAL_SECTOR * flash->sector_bytes;
     uint32_t end = begin + flash->sector_bytes;
     *at = begin;
@@ -276,8 +257,7 @@ static bool find_serial(const struct loader_flash *flash, uint32_t *at,
 }
 
 bool loader_slots_serial(const struct loader_flash *flash,
-                         uint8_t serial[LOADER_SERIAL_BYTES])
-{
+                         uint8_t serial[LOADER_SERIAL_BYTES]) {
     uint8_t record[SERIAL_BYTES];
     uint32_t at;
     bool found = find_serial(flash, &at, record);
@@ -289,8 +269,7 @@ bool loader_slots_serial(const struct loader_flash *flash,
 }
 
 bool loader_slots_name(const struct loader_flash *flash,
-                       const uint8_t serial[LOADER_SERIAL_BYTES])
-{
+                       const uint8_t serial[LOADER_SERIAL_BYTES]) {
     uint8_t record[SERIAL_BYTES];
     uint32_t at, end = (LOADER_SERIAL_SECTOR + 1) * flash->sector_bytes;
     if (find_serial(flash, &at, record)) {

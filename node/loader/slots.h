@@ -71,8 +71,7 @@ struct loader_slots {
 void loader_slots_open(struct loader_slots *slots,
                        const struct loader_rules *rules);
 
-static inline void loader_slots_alive(const struct loader_slots *slots)
-{
+static inline void loader_slots_alive(const struct loader_slots *slots) {
     if (slots->rules->alive != NULL) {
         slots->rules->alive();
     }

@@ -12,15 +12,13 @@ struct builder {
     uint64_t first_us, last_us; /* when lists came */
 };
 
-static uint32_t places(const struct node_setup_message *setup)
-{
+static uint32_t places(const struct node_setup_message *setup) {
     uint32_t lists = setup->jobs_per_worker;
     return lists < 1 ? 1 : lists > INCODE_LISTS_MAX ? INCODE_LISTS_MAX : lists;
 }
 
 static size_t builder_arena_min(size_t memory,
-                                const struct node_setup_message *setup)
-{
+                                const struct node_setup_message *setup) {
     (void)memory;
     return node_aligned(sizeof(struct builder)) +
            node_lists_bytes(places(setup)) + node_tetra_builder_min(setup);
@@ -29,8 +27,7 @@ static size_t builder_arena_min(size_t memory,
 static bool builder_start(void *self, size_t bytes,
                           const struct node_setup_message *setup,
                           struct node_counted *counted,
-                          struct node_fault *fault)
-{
+                          struct node_fault *fault) {
     struct builder *b = self;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof *b);
     size_t inbox = node_lists_bytes(places(setup));
@@ -55,8 +52,7 @@ static bool builder_start(void *self, size_t bytes,
 }
 
 static void builder_message(void *self, const struct cube_message *message,
-                            uint64_t now_us)
-{
+                            uint64_t now_us) {
     struct builder *b = self;
     if (message->type == NODE_LIST) {
         b->first_us = b->first_us == 0 ? now_us : b->first_us;
@@ -70,45 +66,38 @@ static void builder_message(void *self, const struct cube_message *message,
     }
 }
 
-static unsigned builder_work(void *self, struct node_pace *pace)
-{
+static unsigned builder_work(void *self, struct node_pace *pace) {
     struct builder *b = self;
     return node_tetra_builder_work(&b->tetra, pace);
 }
 
-static unsigned builder_send(void *self)
-{
+static unsigned builder_send(void *self) {
     struct builder *b = self;
     return node_requests_send(&b->tetra.requests);
 }
 
-static uint32_t builder_done(const void *self)
-{
+static uint32_t builder_done(const void *self) {
     (void)self;
     return 0; /* there are no jobs */
 }
 
-static void builder_end(void *self, uint64_t now_us)
-{
+static void builder_end(void *self, uint64_t now_us) {
     (void)self, (void)now_us;
 }
 
-static uint32_t builder_awaited(const void *self)
-{
+static uint32_t builder_awaited(const void *self) {
     const struct builder *b = self;
     return node_tetra_builder_awaited(&b->tetra);
 }
 
-static uint32_t builder_held(const void *self)
-{
+static uint32_t builder_held(const void *self) {
     const struct builder *b = self;
     return node_tetra_builder_held(&b->tetra) + node_lists_held(&b->lists);
 }
 
 static void builder_totals(const void *self,
                            struct node_finished_message *totals,
-                           uint64_t now_us)
-{
+                           uint64_t now_us) {
     const struct builder *b = self;
     (void)now_us;
     node_tetra_builder_totals(&b->tetra, totals);
@@ -118,8 +107,7 @@ static void builder_totals(const void *self,
     totals->memory_high_water += node_aligned(sizeof *b) + b->inbox_bytes;
 }
 
-static void builder_map(const void *self, struct node_map *map)
-{
+static void builder_map(const void *self, struct node_map *map) {
     const struct builder *b = self;
     node_tetra_builder_map(&b->tetra, map);
     map->tables[0].bytes += (uint32_t)node_aligned(sizeof *b);
@@ -127,8 +115,7 @@ static void builder_map(const void *self, struct node_map *map)
     map->tables[2].count = b->lists.inbox.slot_count;
 }
 
-static void builder_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void builder_gauge(const void *self, struct incode_gauge *gauge) {
     const struct builder *b = self;
     node_tetra_builder_gauge(&b->tetra, gauge);
 }

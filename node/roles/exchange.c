@@ -24,28 +24,24 @@ struct exchange {
 /* ---- memory ---- */
 
 /* Outboxes, requests of others, and who asks for work. */
-static size_t table_bytes(uint32_t nodes)
-{
+static size_t table_bytes(uint32_t nodes) {
     return node_shares_bytes(nodes) + node_lending_bytes(nodes) +
            node_loans_bytes(nodes);
 }
 
-static size_t own_bytes(const struct node_setup_message *setup)
-{
+static size_t own_bytes(const struct node_setup_message *setup) {
     return node_aligned(sizeof(struct exchange)) + table_bytes(setup->nodes);
 }
 
 static size_t exchange_arena_min(size_t memory,
-                                 const struct node_setup_message *setup)
-{
+                                 const struct node_setup_message *setup) {
     return own_bytes(setup) + node_triangulation_min(memory, setup);
 }
 
 static bool exchange_start(void *self, size_t bytes,
                            const struct node_setup_message *setup,
                            struct node_counted *counted,
-                           struct node_fault *fault)
-{
+                           struct node_fault *fault) {
     struct exchange *e = self;
     if (bytes < own_bytes(setup)) {
         node_fault_set(fault, "the node's memory does not hold its outboxes", 0,
@@ -84,8 +80,8 @@ static bool exchange_start(void *self, size_t bytes,
 
 /* ---- messages ---- */
 
-static void take_shares(struct exchange *e, const struct cube_message *message)
-{
+static void take_shares(struct exchange *e,
+                        const struct cube_message *message) {
     struct incode_triangulator *t = e->triangulation.triangulator;
     struct node_shared share;
     for (size_t at = 0; at + sizeof share <= message->size;
@@ -104,8 +100,8 @@ static void take_shares(struct exchange *e, const struct cube_message *message)
     }
 }
 
-static void take_regions(struct exchange *e, const struct cube_message *message)
-{
+static void take_regions(struct exchange *e,
+                         const struct cube_message *message) {
     struct node_regions_message regions;
     if (!node_shares_regions(&e->shares, message->data, message->size)) {
         node_fault_set(e->fault, "regions in # bytes, after # of them",
@@ -116,8 +112,8 @@ static void take_regions(struct exchange *e, const struct cube_message *message)
     node_lending_to_all(&e->lending, regions.to_all);
 }
 
-static void take_to_all(struct exchange *e, const struct cube_message *message)
-{
+static void take_to_all(struct exchange *e,
+                        const struct cube_message *message) {
     struct node_triangulation *t = &e->triangulation;
     uint32_t page = node_lending_take_to_all(&e->lending, &t->requests.check,
                                              t->triangulator, message);
@@ -129,16 +125,14 @@ static void take_to_all(struct exchange *e, const struct cube_message *message)
 }
 
 /* What node 0 asks all nodes for. */
-static void follow(struct exchange *e, uint8_t command)
-{
+static void follow(struct exchange *e, uint8_t command) {
     if (command == NODE_WAVE_SEED) {
         incode_triangulator_seed(e->triangulation.triangulator);
     }
 }
 
 /* Tetrahedra wait until what they may spill has room on its way to the host. */
-static bool exchange_may_take(void *self, const struct cube_message *message)
-{
+static bool exchange_may_take(void *self, const struct cube_message *message) {
     struct exchange *e = self;
     uint32_t count = message->size / sizeof(struct node_shared);
     if (message->type != NODE_SHARE) {
@@ -150,8 +144,7 @@ static bool exchange_may_take(void *self, const struct cube_message *message)
 }
 
 static void exchange_message(void *self, const struct cube_message *message,
-                             uint64_t now_us)
-{
+                             uint64_t now_us) {
     struct exchange *e = self;
     switch (message->type) {
     case NODE_SHARE:
@@ -188,8 +181,7 @@ static void exchange_message(void *self, const struct cube_message *message,
 /* ---- work ---- */
 
 /* Tetrahedra that other nodes have found at stars that they borrowed. */
-static bool use_found(struct exchange *e, uint32_t units)
-{
+static bool use_found(struct exchange *e, uint32_t units) {
     struct node_outlet *outlet = &e->triangulation.outlet;
     node_outlet_found_by(outlet, node_loans_finder(&e->loans));
     bool used = node_loans_use(&e->loans, e->triangulation.triangulator, units);
@@ -198,8 +190,7 @@ static bool use_found(struct exchange *e, uint32_t units)
 }
 
 /* What came back first, as it may let others go on; what is borrowed last. */
-static bool work_on(void *context, uint32_t units, uint32_t *spent)
-{
+static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct exchange *e = context;
     struct incode_triangulator *t = e->triangulation.triangulator;
     uint64_t before = incode_triangulator_spent(t);
@@ -213,8 +204,7 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent)
     return worked;
 }
 
-static unsigned exchange_work(void *self, struct node_pace *pace)
-{
+static unsigned exchange_work(void *self, struct node_pace *pace) {
     struct exchange *e = self;
     e->waves.now_us = pace->begun_us;
     /* Not before all others can receive. */
@@ -226,14 +216,12 @@ static unsigned exchange_work(void *self, struct node_pace *pace)
     return worked;
 }
 
-static bool is_quiet(const struct exchange *e)
-{
+static bool is_quiet(const struct exchange *e) {
     return e->shares.used == 0 && !e->holds &&
            incode_triangulator_is_quiet(e->triangulation.triangulator);
 }
 
-static unsigned exchange_send(void *self)
-{
+static unsigned exchange_send(void *self) {
     struct exchange *e = self;
     const struct node_triangulation *t = &e->triangulation;
     uint8_t command;
@@ -258,8 +246,7 @@ static unsigned exchange_send(void *self)
     return sent;
 }
 
-static uint32_t exchange_awaited(const void *self)
-{
+static uint32_t exchange_awaited(const void *self) {
     const struct exchange *e = self;
     const struct node_triangulation *t = &e->triangulation;
     bool waits = t->jobs.working && (!e->waves.begun || is_quiet(e));
@@ -268,8 +255,7 @@ static uint32_t exchange_awaited(const void *self)
 }
 
 /* The node that is to send a page, or what it has found at a star. */
-static uint32_t exchange_owing(const void *self)
-{
+static uint32_t exchange_owing(const void *self) {
     const struct exchange *e = self;
     uint32_t page = incode_triangulator_awaited(e->triangulation.triangulator);
     uint16_t keeper = page == INCODE_NONE
@@ -278,29 +264,25 @@ static uint32_t exchange_owing(const void *self)
     return keeper == NODE_LENDING_COMES ? CUBE_HOST : keeper;
 }
 
-static uint32_t exchange_held(const void *self)
-{
+static uint32_t exchange_held(const void *self) {
     const struct exchange *e = self;
     return node_triangulation_held(&e->triangulation) + e->shares.used +
            e->lending.queued;
 }
 
-static uint32_t exchange_done(const void *self)
-{
+static uint32_t exchange_done(const void *self) {
     const struct exchange *e = self;
     return e->shares.used == 0 ? node_triangulation_done(&e->triangulation) : 0;
 }
 
-static void exchange_end(void *self, uint64_t now_us)
-{
+static void exchange_end(void *self, uint64_t now_us) {
     struct exchange *e = self;
     node_triangulation_end(&e->triangulation, now_us);
 }
 
 static void exchange_totals(const void *self,
                             struct node_finished_message *totals,
-                            uint64_t now_us)
-{
+                            uint64_t now_us) {
     const struct exchange *e = self;
     node_triangulation_totals(&e->triangulation, totals, now_us);
     totals->bytes_in += e->loans.bytes_in;
@@ -311,8 +293,7 @@ static void exchange_totals(const void *self,
     totals->statistics.stars_borrowed = e->loans.stars;
 }
 
-static void exchange_map(const void *self, struct node_map *map)
-{
+static void exchange_map(const void *self, struct node_map *map) {
     const struct exchange *e = self;
     size_t shares = node_shares_bytes(e->nodes);
     size_t lending = node_lending_bytes(e->nodes);
@@ -325,8 +306,7 @@ static void exchange_map(const void *self, struct node_map *map)
     map->tables[2].bytes -= (uint32_t)(shares + lending + loans);
 }
 
-static void exchange_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void exchange_gauge(const void *self, struct incode_gauge *gauge) {
     const struct exchange *e = self;
     incode_triangulator_gauge(e->triangulation.triangulator, gauge);
 }

@@ -7,15 +7,13 @@
 
 enum { LENT = 8 /* lists a step, at most */ };
 
-size_t node_face_manager_min(size_t memory)
-{
+size_t node_face_manager_min(size_t memory) {
     return node_outlet_bytes(memory) + incode_manager_min();
 }
 
 /* What the setup asks of a front alone. */
 static bool is_sound(const struct node_setup_message *setup,
-                     struct node_fault *fault)
-{
+                     struct node_fault *fault) {
     const char *why = incode_setup_fault(&setup->setup);
     if (why == NULL && setup->setup.face_rule != INCODE_FACE_OWN) {
         why = "invalid setup: the face rule `paper` asks a face manager for "
@@ -38,8 +36,7 @@ bool node_face_manager_start(struct node_face_manager *f, void *memory,
                              const struct node_setup_message *setup,
                              const struct node_carrier *carrier,
                              struct node_counted *counted,
-                             struct node_fault *fault)
-{
+                             struct node_fault *fault) {
     size_t boxes = node_outlet_bytes(bytes);
     if (!is_sound(setup, fault)) {
         return false;
@@ -64,8 +61,7 @@ bool node_face_manager_start(struct node_face_manager *f, void *memory,
 }
 
 static void take_job(struct node_face_manager *f,
-                     const struct cube_message *message, uint64_t now_us)
-{
+                     const struct cube_message *message, uint64_t now_us) {
     struct incode_job job;
     if (node_jobs_take(&f->jobs, message, now_us, &job)) {
         node_outlet_begin(&f->outlet, f->jobs.epoch);
@@ -74,8 +70,7 @@ static void take_job(struct node_face_manager *f,
 }
 
 static void take_unspill(struct node_face_manager *f,
-                         const struct cube_message *message)
-{
+                         const struct cube_message *message) {
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (node_outlet_take_unspill(&f->outlet, message->data, message->size,
@@ -88,8 +83,7 @@ static void take_unspill(struct node_face_manager *f,
 
 bool node_face_manager_message(struct node_face_manager *f,
                                const struct cube_message *message,
-                               uint64_t now_us)
-{
+                               uint64_t now_us) {
     if (message->type == NODE_JOB) {
         take_job(f, message, now_us);
         return true;
@@ -108,8 +102,7 @@ bool node_face_manager_message(struct node_face_manager *f,
 
 /* ---- work ---- */
 
-static bool take_answers(struct node_face_manager *f)
-{
+static bool take_answers(struct node_face_manager *f) {
     struct incode_answers answers;
     size_t size;
     const void *data;
@@ -138,8 +131,7 @@ static bool take_answers(struct node_face_manager *f)
     return true;
 }
 
-static bool lend(struct node_face_manager *f)
-{
+static bool lend(struct node_face_manager *f) {
     struct incode_list list;
     unsigned lent = 0;
     while (lent < LENT && f->carrier.has_room(f->carrier.context) &&
@@ -151,8 +143,7 @@ static bool lend(struct node_face_manager *f)
     return lent > 0;
 }
 
-static bool work_on(void *context, uint32_t units, uint32_t *spent)
-{
+static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct node_face_manager *f = context;
     uint64_t before = f->manager.spent;
     if (!f->jobs.working || f->drained || node_fault_is_set(f->fault) ||
@@ -171,8 +162,7 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent)
 }
 
 unsigned node_face_manager_work(struct node_face_manager *f,
-                                struct node_pace *pace)
-{
+                                struct node_pace *pace) {
     unsigned worked = node_pace_work(pace, work_on, f);
     if (f->drained) {
         node_outlet_close(&f->outlet);
@@ -180,21 +170,18 @@ unsigned node_face_manager_work(struct node_face_manager *f,
     return worked;
 }
 
-uint32_t node_face_manager_held(const struct node_face_manager *f)
-{
+uint32_t node_face_manager_held(const struct node_face_manager *f) {
     return node_outlet_held(&f->outlet) + f->manager.lists +
            !incode_manager_is_free(&f->manager);
 }
 
-uint32_t node_face_manager_done(const struct node_face_manager *f)
-{
+uint32_t node_face_manager_done(const struct node_face_manager *f) {
     return f->jobs.working && f->drained && node_face_manager_held(f) == 0
                ? f->jobs.epoch
                : 0;
 }
 
-void node_face_manager_end(struct node_face_manager *f, uint64_t now_us)
-{
+void node_face_manager_end(struct node_face_manager *f, uint64_t now_us) {
     INCODE_ASSERT(node_face_manager_done(f) != 0);
     node_jobs_end(&f->jobs, now_us);
     f->drained = false;
@@ -202,8 +189,7 @@ void node_face_manager_end(struct node_face_manager *f, uint64_t now_us)
 
 void node_face_manager_totals(const struct node_face_manager *f,
                               struct node_finished_message *totals,
-                              uint64_t now_us)
-{
+                              uint64_t now_us) {
     totals->wall_us = node_jobs_wall_us(&f->jobs, now_us);
     totals->bytes_in = f->bytes_in;
     totals->bytes_out = f->outlet.bytes_out;
@@ -213,15 +199,13 @@ void node_face_manager_totals(const struct node_face_manager *f,
 }
 
 void node_face_manager_gauge(const struct node_face_manager *f,
-                             struct incode_gauge *gauge)
-{
+                             struct incode_gauge *gauge) {
     gauge->faces = f->manager.front.afl.capacity;
     gauge->open = f->manager.front.afl.count;
 }
 
 void node_face_manager_map(const struct node_face_manager *f,
-                           struct node_map *map)
-{
+                           struct node_map *map) {
     const struct incode_afl *afl = &f->manager.front.afl;
     const uint32_t touched =
         afl->touched_capacity *

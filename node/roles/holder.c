@@ -31,16 +31,15 @@ struct holder {
 };
 
 static size_t holder_arena_min(size_t memory,
-                               const struct node_setup_message *setup)
-{
+                               const struct node_setup_message *setup) {
     (void)memory, (void)setup;
     return node_aligned(sizeof(struct holder)) + sizeof(struct frame);
 }
 
 static bool holder_start(void *self, size_t bytes,
                          const struct node_setup_message *setup,
-                         struct node_counted *counted, struct node_fault *fault)
-{
+                         struct node_counted *counted,
+                         struct node_fault *fault) {
     struct holder *h = self;
     size_t own = node_aligned(sizeof *h);
     if (bytes < holder_arena_min(bytes, setup)) {
@@ -75,13 +74,11 @@ static bool holder_start(void *self, size_t bytes,
     return true;
 }
 
-static struct frame *frame_of(const struct holder *h, uint32_t page)
-{
+static struct frame *frame_of(const struct holder *h, uint32_t page) {
     return &h->frames[node_keeper_place(page, h->holders) % h->frame_count];
 }
 
-static void take_request(struct holder *h, const struct cube_message *message)
-{
+static void take_request(struct holder *h, const struct cube_message *message) {
     const uint32_t bytes = sizeof h->page[0];
     if (message->size % bytes != 0) {
         node_fault_set(h->fault, "request in # bytes, expected # a page",
@@ -109,8 +106,7 @@ static void take_request(struct holder *h, const struct cube_message *message)
 }
 
 /* A page that arrived altered is requested again: nodes still wait for it. */
-static void take_page(struct holder *h, const struct cube_message *message)
-{
+static void take_page(struct holder *h, const struct cube_message *message) {
     struct node_page page;
     bool right = node_page_check_take(&h->check, message, &page);
     if (page.number == INCODE_NONE) {
@@ -139,8 +135,7 @@ static void take_page(struct holder *h, const struct cube_message *message)
 }
 
 static void holder_message(void *self, const struct cube_message *message,
-                           uint64_t now_us)
-{
+                           uint64_t now_us) {
     struct holder *h = self;
     (void)now_us;
     h->bytes_in += message->size;
@@ -157,14 +152,12 @@ static void holder_message(void *self, const struct cube_message *message,
     }
 }
 
-static bool holds(const struct frame *frame, uint32_t page)
-{
+static bool holds(const struct frame *frame, uint32_t page) {
     return frame->message.head.page == page && frame->size > 0;
 }
 
 /* To each who waits for a page that is there, as links have room. */
-static unsigned send_pages(struct holder *h)
-{
+static unsigned send_pages(struct holder *h) {
     unsigned sent = 0;
     for (uint32_t i = 0; i < h->queued;) {
         struct frame *frame = frame_of(h, h->page[i]);
@@ -189,8 +182,7 @@ static unsigned send_pages(struct holder *h)
 /* Takes a frame for a page and notes it as wanted.  A page that has just come
  * goes to who waits for it first: otherwise two pages of one frame could
  * displace each other for ever. */
-static bool claim(struct holder *h, struct frame *frame, uint32_t page)
-{
+static bool claim(struct holder *h, struct frame *frame, uint32_t page) {
     if (frame->loading || frame->fresh) {
         return false;
     }
@@ -204,8 +196,7 @@ static bool claim(struct holder *h, struct frame *frame, uint32_t page)
 
 /* Asks for pages that are not there.  What a frame held is given up only when
  * the request is sure to leave. */
-static unsigned ask_host(struct holder *h)
-{
+static unsigned ask_host(struct holder *h) {
     uint32_t wanted[NODE_PAGES_A_REQUEST], count = 0;
     if (cube_room(h->counted->cube, CUBE_HOST) == 0) {
         return 0;
@@ -225,46 +216,40 @@ static unsigned ask_host(struct holder *h)
     return 1;
 }
 
-static unsigned holder_send(void *self)
-{
+static unsigned holder_send(void *self) {
     struct holder *h = self;
     unsigned sent = send_pages(h) + ask_host(h);
     return sent + node_page_check_send(&h->check);
 }
 
-static unsigned holder_work(void *self, struct node_pace *pace)
-{
+static unsigned holder_work(void *self, struct node_pace *pace) {
     (void)self, (void)pace;
     return 0;
 }
 
-static uint32_t holder_done(const void *self)
-{
+static uint32_t holder_done(const void *self) {
     (void)self;
     return 0; /* there are no jobs */
 }
 
-static void holder_end(void *self, uint64_t now_us)
-{
+static void holder_end(void *self, uint64_t now_us) {
     (void)self, (void)now_us;
 }
 
 /* It waits for the host alone, which knows of that. */
-static uint32_t holder_awaited(const void *self)
-{
+static uint32_t holder_awaited(const void *self) {
     (void)self;
     return INCODE_NONE;
 }
 
-static uint32_t holder_held(const void *self)
-{
+static uint32_t holder_held(const void *self) {
     const struct holder *h = self;
     return h->queued + h->check.owed;
 }
 
 static void holder_totals(const void *self,
-                          struct node_finished_message *totals, uint64_t now_us)
-{
+                          struct node_finished_message *totals,
+                          uint64_t now_us) {
     const struct holder *h = self;
     (void)now_us;
     totals->pages_held = h->hits;
@@ -275,8 +260,7 @@ static void holder_totals(const void *self,
         node_aligned(sizeof *h) + h->frames_used * sizeof h->frames[0];
 }
 
-static void holder_map(const void *self, struct node_map *map)
-{
+static void holder_map(const void *self, struct node_map *map) {
     const struct holder *h = self;
     map->pages = h->frame_count;
     map->tables[0].bytes = (uint32_t)node_aligned(sizeof *h);
@@ -285,8 +269,7 @@ static void holder_map(const void *self, struct node_map *map)
     map->tables[1].count = h->frame_count;
 }
 
-static void holder_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void holder_gauge(const void *self, struct incode_gauge *gauge) {
     const struct holder *h = self;
     gauge->pages = h->frame_count;
     gauge->held = h->frames_used;

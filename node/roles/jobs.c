@@ -3,8 +3,7 @@
 #include <string.h>
 
 void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,
-                    struct node_fault *fault)
-{
+                    struct node_fault *fault) {
     memset(jobs, 0, sizeof *jobs);
     jobs->bricks = bricks;
     jobs->fault = fault;
@@ -12,8 +11,7 @@ void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,
 
 /* Its bricks are the setup's, its box is one of numbers, if it has points. */
 static bool job_is_sound(const struct node_jobs *jobs,
-                         const struct node_job_message *job)
-{
+                         const struct node_job_message *job) {
     const struct incode_job *j = &job->job;
     if (j->first > j->last || j->last > jobs->bricks) {
         node_fault_set(jobs->fault, "invalid job: bricks #..#", j->first,
@@ -43,8 +41,7 @@ static bool job_is_sound(const struct node_jobs *jobs,
 }
 
 bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
-                    uint64_t now_us, struct incode_job *job)
-{
+                    uint64_t now_us, struct incode_job *job) {
     struct node_job_message given;
     if (message->size != sizeof given) {
         node_fault_set(jobs->fault, "job in # bytes, expected #", message->size,
@@ -67,13 +64,11 @@ bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
     return true;
 }
 
-void node_jobs_end(struct node_jobs *jobs, uint64_t now_us)
-{
+void node_jobs_end(struct node_jobs *jobs, uint64_t now_us) {
     jobs->wall_us += now_us - jobs->start_us;
     jobs->working = false;
 }
 
-uint64_t node_jobs_wall_us(const struct node_jobs *jobs, uint64_t now_us)
-{
+uint64_t node_jobs_wall_us(const struct node_jobs *jobs, uint64_t now_us) {
     return jobs->wall_us + (jobs->working ? now_us - jobs->start_us : 0);
 }

@@ -5,26 +5,22 @@
 #include "incode/predicates/check.h"
 #include "node/arena.h"
 
-static uint32_t queue_max(uint32_t nodes)
-{
+static uint32_t queue_max(uint32_t nodes) {
     return (nodes - 1) * NODE_PAGES_LENT_MAX;
 }
 
-static size_t queue_bytes(uint32_t nodes)
-{
+static size_t queue_bytes(uint32_t nodes) {
     return node_aligned(queue_max(nodes) * sizeof(struct node_lent));
 }
 
-size_t node_lending_bytes(uint32_t nodes)
-{
+size_t node_lending_bytes(uint32_t nodes) {
     return queue_bytes(nodes) + node_aligned(nodes);
 }
 
 void node_lending_init(struct node_lending *lending, void *memory,
                        const struct node_setup_message *setup,
                        const struct node_shares *shares,
-                       struct node_counted *counted, struct node_fault *fault)
-{
+                       struct node_counted *counted, struct node_fault *fault) {
     struct node_lending *l = lending;
     const struct incode_setup *points = &setup->setup;
     memset(l, 0, sizeof *l);
@@ -40,8 +36,7 @@ void node_lending_init(struct node_lending *lending, void *memory,
     memset(l->asked, 0, setup->nodes);
 }
 
-void node_lending_to_all(struct node_lending *lending, uint32_t first)
-{
+void node_lending_to_all(struct node_lending *lending, uint32_t first) {
     if (first > lending->tree.pages) {
         node_fault_set(lending->fault, "page # to all, of # pages", first,
                        lending->tree.pages);
@@ -53,8 +48,7 @@ void node_lending_to_all(struct node_lending *lending, uint32_t first)
 /* ---- whose a page is ---- */
 
 /* The uniform grid's lists are the host's. */
-static uint16_t owner_of(const struct node_lending *l, uint32_t page)
-{
+static uint16_t owner_of(const struct node_lending *l, uint32_t page) {
     uint32_t level = incode_tree_level(&l->tree, page);
     if (level == l->tree.levels) {
         return CUBE_HOST;
@@ -66,8 +60,8 @@ static uint16_t owner_of(const struct node_lending *l, uint32_t page)
     return node_shares_owner(l->shares, (uint32_t)brick);
 }
 
-uint16_t node_lending_keeper(const struct node_lending *lending, uint32_t page)
-{
+uint16_t node_lending_keeper(const struct node_lending *lending,
+                             uint32_t page) {
     if (page >= lending->to_all && page < lending->next) {
         return NODE_LENDING_COMES;
     }
@@ -75,23 +69,21 @@ uint16_t node_lending_keeper(const struct node_lending *lending, uint32_t page)
     return owner == lending->counted->self ? CUBE_HOST : owner;
 }
 
-uint32_t node_lending_room(const struct node_lending *lending, uint16_t keeper)
-{
+uint32_t node_lending_room(const struct node_lending *lending,
+                           uint16_t keeper) {
     return keeper == CUBE_HOST
                ? NODE_PAGES_IN_FLIGHT_MAX
                : (uint32_t)NODE_PAGES_LENT_MAX - lending->asked[keeper];
 }
 
 void node_lending_asked(struct node_lending *lending, uint16_t keeper,
-                        uint32_t pages)
-{
+                        uint32_t pages) {
     if (keeper != CUBE_HOST) {
         lending->asked[keeper] = (uint8_t)(lending->asked[keeper] + pages);
     }
 }
 
-void node_lending_came(struct node_lending *lending, uint32_t page)
-{
+void node_lending_came(struct node_lending *lending, uint32_t page) {
     uint16_t keeper = page < lending->tree.pages ? owner_of(lending, page)
                                                  : lending->counted->self;
     if (keeper != CUBE_HOST && keeper != lending->counted->self &&
@@ -103,8 +95,7 @@ void node_lending_came(struct node_lending *lending, uint32_t page)
 /* ---- what others ask for ---- */
 
 void node_lending_take(struct node_lending *lending,
-                       const struct cube_message *message)
-{
+                       const struct cube_message *message) {
     struct node_lending *l = lending;
     uint32_t page;
     if (message->size % sizeof page != 0 || message->source == CUBE_HOST) {
@@ -133,8 +124,7 @@ void node_lending_take(struct node_lending *lending,
 uint32_t node_lending_take_to_all(struct node_lending *lending,
                                   struct node_page_check *check,
                                   struct incode_triangulator *triangulator,
-                                  const struct cube_message *message)
-{
+                                  const struct cube_message *message) {
     struct node_lending *l = lending;
     struct node_page page;
     bool right = node_page_check_take(check, message, &page);
@@ -165,14 +155,12 @@ uint32_t node_lending_take_to_all(struct node_lending *lending,
 
 /* ---- and how they get it ---- */
 
-static void take_off(struct node_lending *l, uint32_t i)
-{
+static void take_off(struct node_lending *l, uint32_t i) {
     l->queue[i] = l->queue[--l->queued];
 }
 
 static bool lend(struct node_lending *l, struct incode_triangulator *t,
-                 const struct node_lent *lent)
-{
+                 const struct node_lent *lent) {
     struct node_page_message body;
     uint16_t to = (uint16_t)lent->node;
     if (cube_room(l->counted->cube, to) == 0) {
@@ -190,8 +178,7 @@ static bool lend(struct node_lending *l, struct incode_triangulator *t,
 }
 
 /* To the host, who sends the page instead. */
-static bool pass(struct node_lending *l, const struct node_lent *lent)
-{
+static bool pass(struct node_lending *l, const struct node_lent *lent) {
     const uint32_t words[2] = {lent->node, lent->page};
     if (node_counted_write(l->counted, CUBE_HOST, NODE_PAGE_PASSED, words,
                            sizeof words) != 0) {
@@ -203,8 +190,7 @@ static bool pass(struct node_lending *l, const struct node_lent *lent)
 }
 
 unsigned node_lending_send(struct node_lending *lending,
-                           struct incode_triangulator *triangulator)
-{
+                           struct incode_triangulator *triangulator) {
     struct node_lending *l = lending;
     unsigned sent = 0;
     for (uint32_t i = 0; i < l->queued;) {

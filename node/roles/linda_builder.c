@@ -14,16 +14,14 @@ struct linda_builder {
 };
 
 static size_t linda_builder_arena_min(size_t memory,
-                                      const struct node_setup_message *setup)
-{
+                                      const struct node_setup_message *setup) {
     (void)memory;
     return node_aligned(sizeof(struct linda_builder)) +
            node_share_bytes(setup) + node_tetra_builder_min(setup);
 }
 
 /* Until it has taken the end: all answers have left by then. */
-static bool build(void *self, struct tuple *tuple)
-{
+static bool build(void *self, struct tuple *tuple) {
     struct linda_builder *b = self;
     b->runs = !b->share.ended;
     if (b->runs) {
@@ -38,8 +36,7 @@ static bool build(void *self, struct tuple *tuple)
 static bool linda_builder_start(void *self, size_t bytes,
                                 const struct node_setup_message *setup,
                                 struct node_counted *counted,
-                                struct node_fault *fault)
-{
+                                struct node_fault *fault) {
     struct linda_builder *b = self;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof *b);
     size_t share = node_share_bytes(setup);
@@ -64,8 +61,7 @@ static bool linda_builder_start(void *self, size_t bytes,
 
 static void linda_builder_message(void *self,
                                   const struct cube_message *message,
-                                  uint64_t now_us)
-{
+                                  uint64_t now_us) {
     struct linda_builder *b = self;
     if (message->type == NODE_TUPLES) {
         b->first_us = b->first_us == 0 ? now_us : b->first_us;
@@ -79,45 +75,38 @@ static void linda_builder_message(void *self,
     }
 }
 
-static unsigned linda_builder_work(void *self, struct node_pace *pace)
-{
+static unsigned linda_builder_work(void *self, struct node_pace *pace) {
     struct linda_builder *b = self;
     return b->runs ? node_tetra_builder_work(&b->tetra, pace) : 0;
 }
 
-static unsigned linda_builder_send(void *self)
-{
+static unsigned linda_builder_send(void *self) {
     struct linda_builder *b = self;
     return node_requests_send(&b->tetra.requests) + tuples_step(b->share.space);
 }
 
-static uint32_t linda_builder_done(const void *self)
-{
+static uint32_t linda_builder_done(const void *self) {
     (void)self;
     return 0; /* there are no jobs */
 }
 
-static void linda_builder_end(void *self, uint64_t now_us)
-{
+static void linda_builder_end(void *self, uint64_t now_us) {
     (void)self, (void)now_us;
 }
 
-static uint32_t linda_builder_awaited(const void *self)
-{
+static uint32_t linda_builder_awaited(const void *self) {
     const struct linda_builder *b = self;
     return node_tetra_builder_awaited(&b->tetra);
 }
 
-static uint32_t linda_builder_held(const void *self)
-{
+static uint32_t linda_builder_held(const void *self) {
     const struct linda_builder *b = self;
     return node_tetra_builder_held(&b->tetra) + tuples_held(b->share.space);
 }
 
 static void linda_builder_totals(const void *self,
                                  struct node_finished_message *totals,
-                                 uint64_t now_us)
-{
+                                 uint64_t now_us) {
     const struct linda_builder *b = self;
     (void)now_us;
     node_tetra_builder_totals(&b->tetra, totals);
@@ -127,16 +116,14 @@ static void linda_builder_totals(const void *self,
     totals->memory_high_water += node_aligned(sizeof *b) + b->share_bytes;
 }
 
-static void linda_builder_map(const void *self, struct node_map *map)
-{
+static void linda_builder_map(const void *self, struct node_map *map) {
     const struct linda_builder *b = self;
     node_tetra_builder_map(&b->tetra, map);
     map->tables[0].bytes += (uint32_t)node_aligned(sizeof *b);
     map->tables[2].bytes = (uint32_t)b->share_bytes;
 }
 
-static void linda_builder_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void linda_builder_gauge(const void *self, struct incode_gauge *gauge) {
     const struct linda_builder *b = self;
     node_tetra_builder_gauge(&b->tetra, gauge);
 }

@@ -17,15 +17,13 @@ struct linda_manager {
 };
 
 static size_t linda_manager_arena_min(size_t memory,
-                                      const struct node_setup_message *setup)
-{
+                                      const struct node_setup_message *setup) {
     return node_aligned(sizeof(struct linda_manager)) +
            node_share_bytes(setup) + node_face_manager_min(memory);
 }
 
 /* Nobody calls it: eval goes to other places where there are any. */
-static bool no_process(void *context, struct tuple *tuple)
-{
+static bool no_process(void *context, struct tuple *tuple) {
     (void)context, (void)tuple;
     return true;
 }
@@ -33,8 +31,7 @@ static bool no_process(void *context, struct tuple *tuple)
 static bool linda_manager_start(void *self, size_t bytes,
                                 const struct node_setup_message *setup,
                                 struct node_counted *counted,
-                                struct node_fault *fault)
-{
+                                struct node_fault *fault) {
     struct linda_manager *m = self;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof *m);
     size_t share = node_share_bytes(setup);
@@ -67,8 +64,7 @@ static bool linda_manager_start(void *self, size_t bytes,
 
 static void linda_manager_message(void *self,
                                   const struct cube_message *message,
-                                  uint64_t now_us)
-{
+                                  uint64_t now_us) {
     struct linda_manager *m = self;
     if (message->type == NODE_TUPLES) {
         node_share_take(&m->share, message);
@@ -78,8 +74,7 @@ static void linda_manager_message(void *self,
     }
 }
 
-static unsigned linda_manager_work(void *self, struct node_pace *pace)
-{
+static unsigned linda_manager_work(void *self, struct node_pace *pace) {
     struct linda_manager *m = self;
     bool moved =
         m->faces.jobs.working && node_share_eval_all(&m->share, &m->begun, 1);
@@ -96,49 +91,42 @@ static unsigned linda_manager_work(void *self, struct node_pace *pace)
     return worked + moved;
 }
 
-static unsigned linda_manager_send(void *self)
-{
+static unsigned linda_manager_send(void *self) {
     struct linda_manager *m = self;
     return node_outlet_send(&m->faces.outlet) + tuples_step(m->share.space);
 }
 
-static uint32_t linda_manager_held(const void *self)
-{
+static uint32_t linda_manager_held(const void *self) {
     const struct linda_manager *m = self;
     return node_face_manager_held(&m->faces) + tuples_held(m->share.space);
 }
 
-static uint32_t linda_manager_done(const void *self)
-{
+static uint32_t linda_manager_done(const void *self) {
     const struct linda_manager *m = self;
     return m->back == m->workers && tuples_held(m->share.space) == 0
                ? node_face_manager_done(&m->faces)
                : 0;
 }
 
-static void linda_manager_end(void *self, uint64_t now_us)
-{
+static void linda_manager_end(void *self, uint64_t now_us) {
     struct linda_manager *m = self;
     node_face_manager_end(&m->faces, now_us);
     m->begun = m->told = m->back = 0;
 }
 
-static uint32_t linda_manager_awaited(const void *self)
-{
+static uint32_t linda_manager_awaited(const void *self) {
     (void)self;
     return INCODE_NONE; /* it has no pages */
 }
 
-static uint32_t linda_manager_owing(const void *self)
-{
+static uint32_t linda_manager_owing(const void *self) {
     const struct linda_manager *m = self;
     return node_share_owing(&m->share);
 }
 
 static void linda_manager_totals(const void *self,
                                  struct node_finished_message *totals,
-                                 uint64_t now_us)
-{
+                                 uint64_t now_us) {
     const struct linda_manager *m = self;
     node_face_manager_totals(&m->faces, totals, now_us);
     totals->bytes_in += m->share.bytes_in;
@@ -146,16 +134,14 @@ static void linda_manager_totals(const void *self,
     totals->memory_high_water += node_aligned(sizeof *m) + m->share_bytes;
 }
 
-static void linda_manager_map(const void *self, struct node_map *map)
-{
+static void linda_manager_map(const void *self, struct node_map *map) {
     const struct linda_manager *m = self;
     node_face_manager_map(&m->faces, map);
     map->tables[0].bytes += (uint32_t)node_aligned(sizeof *m);
     map->tables[3].bytes = (uint32_t)m->share_bytes;
 }
 
-static void linda_manager_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void linda_manager_gauge(const void *self, struct incode_gauge *gauge) {
     const struct linda_manager *m = self;
     node_face_manager_gauge(&m->faces, gauge);
 }

@@ -26,20 +26,17 @@ struct linda_worker {
     void *worker; /* whose state follows */
 };
 
-static size_t own_bytes(const struct node_setup_message *setup)
-{
+static size_t own_bytes(const struct node_setup_message *setup) {
     return node_aligned(sizeof(struct linda_worker)) + node_share_bytes(setup);
 }
 
 static size_t linda_worker_arena_min(size_t memory,
-                                     const struct node_setup_message *setup)
-{
+                                     const struct node_setup_message *setup) {
     return own_bytes(setup) + node_worker_role.arena_min(memory, setup);
 }
 
 /* For as long as the generation lasts. */
-static bool go_on(void *self, struct tuple *tuple)
-{
+static bool go_on(void *self, struct tuple *tuple) {
     struct linda_worker *w = self;
     (void)tuple;
     w->runs = true;
@@ -49,8 +46,7 @@ static bool go_on(void *self, struct tuple *tuple)
 static bool linda_worker_start(void *self, size_t bytes,
                                const struct node_setup_message *setup,
                                struct node_counted *counted,
-                               struct node_fault *fault)
-{
+                               struct node_fault *fault) {
     struct linda_worker *w = self;
     uint8_t *memory = self;
     size_t own = own_bytes(setup);
@@ -74,8 +70,8 @@ static bool linda_worker_start(void *self, size_t bytes,
                                   fault);
 }
 
-static void take_out(struct linda_worker *w, const struct cube_message *message)
-{
+static void take_out(struct linda_worker *w,
+                     const struct cube_message *message) {
     if (!w->keeps || message->size != sizeof w->put[0] ||
         w->put_count == NODE_OUT_MAX) {
         node_fault_set(w->fault, "a region of # bytes, and # are put already",
@@ -87,8 +83,7 @@ static void take_out(struct linda_worker *w, const struct cube_message *message)
 }
 
 static void linda_worker_message(void *self, const struct cube_message *message,
-                                 uint64_t now_us)
-{
+                                 uint64_t now_us) {
     struct linda_worker *w = self;
     if (message->type == NODE_TUPLES) {
         node_share_take(&w->share, message);
@@ -99,8 +94,7 @@ static void linda_worker_message(void *self, const struct cube_message *message,
     }
 }
 
-static bool put_regions(struct linda_worker *w)
-{
+static bool put_regions(struct linda_worker *w) {
     bool moved = false;
     while (w->put_count > 0 && tuples_room(w->share.space) > KEPT) {
         moved = node_share_out_bytes(&w->share, NODE_SHARE_REGION,
@@ -110,8 +104,7 @@ static bool put_regions(struct linda_worker *w)
 }
 
 /* Takes a region, and says so in the space. */
-static bool take_region(struct linda_worker *w)
-{
+static bool take_region(struct linda_worker *w) {
     struct incode_job job;
     if (w->busy || tuples_room(w->share.space) < 2 ||
         !node_share_in_bytes(&w->share, NODE_SHARE_REGION, &w->region, &job,
@@ -127,8 +120,7 @@ static bool take_region(struct linda_worker *w)
 }
 
 /* Tells the host of one who has taken a region. */
-static bool tell(struct linda_worker *w)
-{
+static bool tell(struct linda_worker *w) {
     struct node_taken_message message;
     if (cube_room(w->counted->cube, CUBE_HOST) == 0 ||
         !node_share_in_bytes(&w->share, NODE_SHARE_TAKEN, &w->taken,
@@ -141,8 +133,7 @@ static bool tell(struct linda_worker *w)
                               sizeof message) == 0;
 }
 
-static unsigned linda_worker_work(void *self, struct node_pace *pace)
-{
+static unsigned linda_worker_work(void *self, struct node_pace *pace) {
     struct linda_worker *w = self;
     unsigned moved = 0;
     if (w->runs && w->keeps) {
@@ -156,47 +147,40 @@ static unsigned linda_worker_work(void *self, struct node_pace *pace)
     return moved + node_worker_role.work(w->worker, pace);
 }
 
-static unsigned linda_worker_send(void *self)
-{
+static unsigned linda_worker_send(void *self) {
     struct linda_worker *w = self;
     return node_worker_role.send(w->worker) + tuples_step(w->share.space);
 }
 
-static uint32_t linda_worker_done(const void *self)
-{
+static uint32_t linda_worker_done(const void *self) {
     const struct linda_worker *w = self;
     return node_worker_role.done(w->worker);
 }
 
-static void linda_worker_end(void *self, uint64_t now_us)
-{
+static void linda_worker_end(void *self, uint64_t now_us) {
     struct linda_worker *w = self;
     node_worker_role.end(w->worker, now_us);
     w->busy = false;
 }
 
-static uint32_t linda_worker_awaited(const void *self)
-{
+static uint32_t linda_worker_awaited(const void *self) {
     const struct linda_worker *w = self;
     return node_worker_role.awaited(w->worker);
 }
 
-static uint32_t linda_worker_owing(const void *self)
-{
+static uint32_t linda_worker_owing(const void *self) {
     const struct linda_worker *w = self;
     return w->keeps ? node_share_owing(&w->share) : CUBE_HOST;
 }
 
-static uint32_t linda_worker_held(const void *self)
-{
+static uint32_t linda_worker_held(const void *self) {
     const struct linda_worker *w = self;
     return node_worker_role.held(w->worker);
 }
 
 static void linda_worker_totals(const void *self,
                                 struct node_finished_message *totals,
-                                uint64_t now_us)
-{
+                                uint64_t now_us) {
     const struct linda_worker *w = self;
     node_worker_role.totals(w->worker, totals, now_us);
     totals->bytes_in += w->share.bytes_in;
@@ -206,16 +190,14 @@ static void linda_worker_totals(const void *self,
 
 enum { SHARE_TABLE = 5 };
 
-static void linda_worker_map(const void *self, struct node_map *map)
-{
+static void linda_worker_map(const void *self, struct node_map *map) {
     const struct linda_worker *w = self;
     node_worker_role.map(w->worker, map);
     map->tables[SHARE_TABLE].bytes =
         (uint32_t)(node_aligned(sizeof *w) + w->share_bytes);
 }
 
-static void linda_worker_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void linda_worker_gauge(const void *self, struct incode_gauge *gauge) {
     const struct linda_worker *w = self;
     node_worker_role.gauge(w->worker, gauge);
 }

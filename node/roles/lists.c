@@ -6,15 +6,13 @@
 #include "incode/predicates/check.h"
 #include "node/arena.h"
 
-size_t node_lists_bytes(uint32_t places)
-{
+size_t node_lists_bytes(uint32_t places) {
     return node_aligned(NODE_OUTBOX_BYTES(places));
 }
 
 void node_lists_init(struct node_lists *lists, void *memory, uint32_t places,
                      uint8_t sends, uint32_t each_max,
-                     struct node_counted *counted, struct node_fault *fault)
-{
+                     struct node_counted *counted, struct node_fault *fault) {
     INCODE_ASSERT(places >= 1 && each_max >= 1 && each_max <= UINT8_MAX);
     memset(lists, 0, sizeof *lists);
     lists->counted = counted;
@@ -24,8 +22,7 @@ void node_lists_init(struct node_lists *lists, void *memory, uint32_t places,
     node_outbox_init(&lists->inbox, memory, places);
 }
 
-void node_lists_add(struct node_lists *lists, uint16_t peer)
-{
+void node_lists_add(struct node_lists *lists, uint16_t peer) {
     INCODE_ASSERT(lists->peers < NODE_BUILDERS_MAX);
     lists->peer[lists->peers++] = peer;
 }
@@ -34,8 +31,7 @@ void node_lists_add(struct node_lists *lists, uint16_t peer)
 
 /* The builder with the fewest lists whose link has room; NODE_BUILDERS_MAX:
  * none may have one more. */
-static uint32_t idlest(const struct node_lists *l)
-{
+static uint32_t idlest(const struct node_lists *l) {
     uint32_t best = NODE_BUILDERS_MAX, least = l->each_max;
     if (l->out + l->inbox.used >= l->inbox.slot_count) {
         return best;
@@ -51,8 +47,7 @@ static uint32_t idlest(const struct node_lists *l)
     return best;
 }
 
-static bool has_room(void *context)
-{
+static bool has_room(void *context) {
     struct node_lists *l = context;
     if (l->sends == NODE_ANSWERS) {
         return cube_room(l->counted->cube, l->peer[0]) > 0;
@@ -60,8 +55,7 @@ static bool has_room(void *context)
     return idlest(l) < NODE_BUILDERS_MAX;
 }
 
-static void send(void *context, const void *data, size_t size)
-{
+static void send(void *context, const void *data, size_t size) {
     struct node_lists *l = context;
     uint32_t i = l->sends == NODE_ANSWERS ? 0 : idlest(l);
     INCODE_ASSERT(i < l->peers);
@@ -74,8 +68,7 @@ static void send(void *context, const void *data, size_t size)
     }
 }
 
-static const void *first(void *context, size_t *size)
-{
+static const void *first(void *context, size_t *size) {
     const struct node_lists *l = context;
     const struct node_outbox_slot *slot = node_outbox_first(&l->inbox);
     if (slot == NULL) {
@@ -85,21 +78,18 @@ static const void *first(void *context, size_t *size)
     return slot->data;
 }
 
-static void drop(void *context)
-{
+static void drop(void *context) {
     struct node_lists *l = context;
     node_outbox_drop(&l->inbox);
 }
 
-struct node_carrier node_lists_carrier(struct node_lists *lists)
-{
+struct node_carrier node_lists_carrier(struct node_lists *lists) {
     return (struct node_carrier){lists, has_room, send, first, drop};
 }
 
 /* ---- what comes ---- */
 
-static uint32_t find(const struct node_lists *l, uint16_t peer)
-{
+static uint32_t find(const struct node_lists *l, uint16_t peer) {
     uint32_t i = 0;
     while (i < l->peers && l->peer[i] != peer) {
         i++;
@@ -109,8 +99,7 @@ static uint32_t find(const struct node_lists *l, uint16_t peer)
 
 /* Its size is what its number of faces or answers takes. */
 static bool is_whole(const struct node_lists *l,
-                     const struct cube_message *message)
-{
+                     const struct cube_message *message) {
     uint32_t head[2];
     if (message->size < sizeof head) {
         return false;
@@ -123,8 +112,7 @@ static bool is_whole(const struct node_lists *l,
 }
 
 void node_lists_take(struct node_lists *lists,
-                     const struct cube_message *message)
-{
+                     const struct cube_message *message) {
     struct node_lists *l = lists;
     uint32_t i = find(l, message->source);
     if (i == l->peers) {
@@ -160,8 +148,7 @@ void node_lists_take(struct node_lists *lists,
     node_outbox_close(&l->inbox, message->type, message->size);
 }
 
-uint16_t node_lists_owing(const struct node_lists *lists)
-{
+uint16_t node_lists_owing(const struct node_lists *lists) {
     for (uint32_t i = 0; i < lists->peers; i++) {
         if (lists->owed[i] > 0) {
             return lists->peer[i];
@@ -170,7 +157,6 @@ uint16_t node_lists_owing(const struct node_lists *lists)
     return CUBE_HOST;
 }
 
-uint32_t node_lists_held(const struct node_lists *lists)
-{
+uint32_t node_lists_held(const struct node_lists *lists) {
     return lists->inbox.used;
 }

@@ -7,24 +7,20 @@
 
 /* ---- sets of nodes ---- */
 
-static size_t words_of(uint32_t nodes)
-{
+static size_t words_of(uint32_t nodes) {
     return ((size_t)nodes + 63) / 64;
 }
 
-static bool has(const uint64_t *set, uint32_t node)
-{
+static bool has(const uint64_t *set, uint32_t node) {
     return (set[node / 64] >> node % 64 & 1) != 0;
 }
 
-static void add(uint64_t *set, uint32_t *count, uint32_t node)
-{
+static void add(uint64_t *set, uint32_t *count, uint32_t node) {
     *count += !has(set, node);
     set[node / 64] |= UINT64_C(1) << node % 64;
 }
 
-static void drop(uint64_t *set, uint32_t *count, uint32_t node)
-{
+static void drop(uint64_t *set, uint32_t *count, uint32_t node) {
     *count -= has(set, node);
     set[node / 64] &= ~(UINT64_C(1) << node % 64);
 }
@@ -33,8 +29,7 @@ static void drop(uint64_t *set, uint32_t *count, uint32_t node)
  * by their number beside this one's, so that no two nodes have the same order.
  * There must be one. */
 static uint16_t nearest(const struct node_loans *l, const uint64_t *set,
-                        bool in)
-{
+                        bool in) {
     uint32_t self = l->counted->self;
     for (uint32_t k = 1; k < l->nodes; k *= 2) {
         if (has(set, self ^ k) == in) {
@@ -51,15 +46,13 @@ static uint16_t nearest(const struct node_loans *l, const uint64_t *set,
 
 /* ---- memory ---- */
 
-size_t node_loans_bytes(uint32_t nodes)
-{
+size_t node_loans_bytes(uint32_t nodes) {
     return node_aligned(3 * words_of(nodes) * sizeof(uint64_t));
 }
 
 void node_loans_init(struct node_loans *loans, void *memory,
                      const struct node_setup_message *setup,
-                     struct node_counted *counted, struct node_fault *fault)
-{
+                     struct node_counted *counted, struct node_fault *fault) {
     size_t words = words_of(setup->nodes);
     memset(loans, 0, sizeof *loans);
     memset(memory, 0, node_loans_bytes(setup->nodes));
@@ -75,8 +68,7 @@ void node_loans_init(struct node_loans *loans, void *memory,
 /* ---- places ---- */
 
 static struct node_loan_out *out_in(struct node_loans *l,
-                                    enum node_loan_state state)
-{
+                                    enum node_loan_state state) {
     for (unsigned i = 0; i < NODE_LOANS_OUT; i++) {
         if (l->out[i].state == state) {
             return &l->out[i];
@@ -85,8 +77,7 @@ static struct node_loan_out *out_in(struct node_loans *l,
     return NULL;
 }
 
-static struct node_loan_in *free_place(struct node_loans *l)
-{
+static struct node_loan_in *free_place(struct node_loans *l) {
     for (unsigned i = 0; i < NODE_LOANS_IN; i++) {
         if (!l->in[i].open) {
             return &l->in[i];
@@ -95,8 +86,7 @@ static struct node_loan_in *free_place(struct node_loans *l)
     return NULL;
 }
 
-static struct node_loan_in *oldest(struct node_loans *l)
-{
+static struct node_loan_in *oldest(struct node_loans *l) {
     struct node_loan_in *oldest = NULL;
     for (unsigned i = 0; i < NODE_LOANS_IN; i++) {
         struct node_loan_in *in = &l->in[i];
@@ -108,16 +98,14 @@ static struct node_loan_in *oldest(struct node_loans *l)
 }
 
 /* Whether it should ask: it has nothing to do, and nothing comes back. */
-static bool may_ask(struct node_loans *l, const struct incode_triangulator *t)
-{
+static bool may_ask(struct node_loans *l, const struct incode_triangulator *t) {
     return incode_triangulator_may_borrow(t) &&
            out_in(l, NODE_LOAN_IS_MADE) == NULL &&
            out_in(l, NODE_LOAN_IS_OUT) == NULL &&
            out_in(l, NODE_LOAN_IS_BACK) == NULL;
 }
 
-uint16_t node_loans_owing(const struct node_loans *loans)
-{
+uint16_t node_loans_owing(const struct node_loans *loans) {
     for (unsigned i = 0; i < NODE_LOANS_OUT; i++) {
         if (loans->out[i].state == NODE_LOAN_IS_OUT) {
             return loans->out[i].to;
@@ -130,8 +118,7 @@ uint16_t node_loans_owing(const struct node_loans *loans)
 
 static bool read_loan(const struct node_loans *l,
                       const struct cube_message *message,
-                      struct incode_loan *loan)
-{
+                      struct incode_loan *loan) {
     size_t head = offsetof(struct incode_loan, v);
     loan->count = 0;
     if (message->size >= head && message->size <= sizeof *loan) {
@@ -142,8 +129,7 @@ static bool read_loan(const struct node_loans *l,
            incode_loan_is_sound(loan, l->bricks);
 }
 
-static bool has_loan_of(const struct node_loans *l, uint16_t from)
-{
+static bool has_loan_of(const struct node_loans *l, uint16_t from) {
     bool open = has(l->back, from);
     for (unsigned i = 0; i < NODE_LOANS_IN; i++) {
         open = open || (l->in[i].open && l->in[i].from == from);
@@ -152,8 +138,8 @@ static bool has_loan_of(const struct node_loans *l, uint16_t from)
 }
 
 /* A loan comes after an ask, once. */
-static bool take_loan(struct node_loans *l, const struct cube_message *message)
-{
+static bool take_loan(struct node_loans *l,
+                      const struct cube_message *message) {
     struct incode_loan loan;
     struct node_loan_in *in = free_place(l);
     if (!has(l->asked, message->source) || has_loan_of(l, message->source) ||
@@ -171,8 +157,8 @@ static bool take_loan(struct node_loans *l, const struct cube_message *message)
     return true;
 }
 
-static bool take_found(struct node_loans *l, const struct cube_message *message)
-{
+static bool take_found(struct node_loans *l,
+                       const struct cube_message *message) {
     struct node_found_message found;
     size_t head = offsetof(struct node_found_message, found.v);
     struct node_loan_out *out = NULL;
@@ -201,8 +187,7 @@ static bool take_found(struct node_loans *l, const struct cube_message *message)
 }
 
 void node_loans_take(struct node_loans *loans,
-                     const struct cube_message *message)
-{
+                     const struct cube_message *message) {
     struct node_loans *l = loans;
     bool sound =
         message->source < l->nodes && message->source != l->counted->self;
@@ -225,16 +210,14 @@ void node_loans_take(struct node_loans *loans,
 
 /* Whether a step did something; one that broke is a fault. */
 static bool judge(struct node_loans *l, const struct incode_triangulator *t,
-                  enum incode_step step)
-{
+                  enum incode_step step) {
     if (step == INCODE_BROKEN) {
         node_fault_set(l->fault, incode_triangulator_fault(t), 0, 0);
     }
     return step == INCODE_WORKED || step == INCODE_FINISHED;
 }
 
-uint16_t node_loans_finder(const struct node_loans *loans)
-{
+uint16_t node_loans_finder(const struct node_loans *loans) {
     for (unsigned i = 0; i < NODE_LOANS_OUT; i++) {
         if (loans->out[i].state == NODE_LOAN_IS_BACK) {
             return loans->out[i].to;
@@ -244,8 +227,7 @@ uint16_t node_loans_finder(const struct node_loans *loans)
 }
 
 bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
-                    uint32_t units)
-{
+                    uint32_t units) {
     struct node_loan_out *out = out_in(loans, NODE_LOAN_IS_BACK);
     if (out == NULL) {
         return false;
@@ -259,8 +241,7 @@ bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
 }
 
 bool node_loans_help(struct node_loans *loans, struct incode_triangulator *t,
-                     uint32_t units)
-{
+                     uint32_t units) {
     struct node_loan_in *in = oldest(loans);
     if (in == NULL) {
         return false;
@@ -278,15 +259,13 @@ bool node_loans_help(struct node_loans *loans, struct incode_triangulator *t,
 /* ---- what leaves ---- */
 
 static bool write(struct node_loans *l, uint16_t to, uint8_t type,
-                  const void *data, size_t size)
-{
+                  const void *data, size_t size) {
     bool sent = node_counted_write(l->counted, to, type, data, size) == 0;
     l->bytes_out += sent ? size : 0;
     return sent;
 }
 
-static unsigned lend(struct node_loans *l, struct incode_triangulator *t)
-{
+static unsigned lend(struct node_loans *l, struct incode_triangulator *t) {
     struct node_loan_out *out = out_in(l, NODE_LOAN_IS_MADE);
     if (out == NULL && l->askers_count > 0 &&
         (out = out_in(l, NODE_LOAN_IS_FREE)) != NULL) {
@@ -306,8 +285,7 @@ static unsigned lend(struct node_loans *l, struct incode_triangulator *t)
 }
 
 /* To whom a loan goes back as it was. */
-static unsigned give_back(struct node_loans *l)
-{
+static unsigned give_back(struct node_loans *l) {
     const struct node_found_message none = {.again = 0};
     unsigned sent = 0;
     while (l->back_count > 0) {
@@ -322,8 +300,7 @@ static unsigned give_back(struct node_loans *l)
     return sent;
 }
 
-static unsigned answer(struct node_loans *l, struct incode_triangulator *t)
-{
+static unsigned answer(struct node_loans *l, struct incode_triangulator *t) {
     struct node_loan_in *in = l->at_work;
     if (in == NULL || !l->borrower.done) {
         return 0;
@@ -344,8 +321,7 @@ static unsigned answer(struct node_loans *l, struct incode_triangulator *t)
     return 1;
 }
 
-static unsigned ask(struct node_loans *l, struct incode_triangulator *t)
-{
+static unsigned ask(struct node_loans *l, struct incode_triangulator *t) {
     if (l->asked_count + 1 >= l->nodes || free_place(l) == NULL ||
         !may_ask(l, t)) {
         return 0;
@@ -359,7 +335,6 @@ static unsigned ask(struct node_loans *l, struct incode_triangulator *t)
 }
 
 unsigned node_loans_send(struct node_loans *loans,
-                         struct incode_triangulator *t)
-{
+                         struct incode_triangulator *t) {
     return lend(loans, t) + answer(loans, t) + give_back(loans) + ask(loans, t);
 }

@@ -15,8 +15,7 @@ struct manager {
     size_t inbox_bytes;
 };
 
-static unsigned count_builders(const struct node_setup_message *setup)
-{
+static unsigned count_builders(const struct node_setup_message *setup) {
     unsigned count = 0;
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
         count += node_is_builder(setup, i);
@@ -25,8 +24,7 @@ static unsigned count_builders(const struct node_setup_message *setup)
 }
 
 /* A place for each list that builders may have, within the part. */
-static uint32_t places(size_t bytes, const struct node_setup_message *setup)
-{
+static uint32_t places(size_t bytes, const struct node_setup_message *setup) {
     uint32_t wanted = count_builders(setup) * setup->jobs_per_worker;
     size_t most = bytes / INBOX_PART / NODE_OUTBOX_BYTES(1);
     uint32_t some = wanted < most ? wanted : (uint32_t)most;
@@ -34,8 +32,7 @@ static uint32_t places(size_t bytes, const struct node_setup_message *setup)
 }
 
 static size_t manager_arena_min(size_t memory,
-                                const struct node_setup_message *setup)
-{
+                                const struct node_setup_message *setup) {
     return node_aligned(sizeof(struct manager)) +
            node_lists_bytes(places(memory, setup)) +
            node_face_manager_min(memory);
@@ -43,8 +40,7 @@ static size_t manager_arena_min(size_t memory,
 
 /* Its builders are other nodes of the cube. */
 static bool builders_fit(const struct node_setup_message *setup, unsigned self,
-                         struct node_fault *fault)
-{
+                         struct node_fault *fault) {
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
         if (node_is_builder(setup, i) && (i >= setup->nodes || i == self)) {
             node_fault_set(fault,
@@ -71,8 +67,7 @@ static bool builders_fit(const struct node_setup_message *setup, unsigned self,
 static bool manager_start(void *self, size_t bytes,
                           const struct node_setup_message *setup,
                           struct node_counted *counted,
-                          struct node_fault *fault)
-{
+                          struct node_fault *fault) {
     struct manager *m = self;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof *m);
     if (!builders_fit(setup, counted->self, fault)) {
@@ -100,8 +95,7 @@ static bool manager_start(void *self, size_t bytes,
 }
 
 static void manager_message(void *self, const struct cube_message *message,
-                            uint64_t now_us)
-{
+                            uint64_t now_us) {
     struct manager *m = self;
     if (message->type == NODE_ANSWERS) {
         node_lists_take(&m->lists, message);
@@ -111,52 +105,44 @@ static void manager_message(void *self, const struct cube_message *message,
     }
 }
 
-static unsigned manager_work(void *self, struct node_pace *pace)
-{
+static unsigned manager_work(void *self, struct node_pace *pace) {
     struct manager *m = self;
     return node_face_manager_work(&m->faces, pace);
 }
 
-static unsigned manager_send(void *self)
-{
+static unsigned manager_send(void *self) {
     struct manager *m = self;
     return node_outlet_send(&m->faces.outlet);
 }
 
-static uint32_t manager_done(const void *self)
-{
+static uint32_t manager_done(const void *self) {
     const struct manager *m = self;
     return node_face_manager_done(&m->faces);
 }
 
-static void manager_end(void *self, uint64_t now_us)
-{
+static void manager_end(void *self, uint64_t now_us) {
     struct manager *m = self;
     node_face_manager_end(&m->faces, now_us);
 }
 
-static uint32_t manager_awaited(const void *self)
-{
+static uint32_t manager_awaited(const void *self) {
     (void)self;
     return INCODE_NONE; /* it has no pages */
 }
 
-static uint32_t manager_owing(const void *self)
-{
+static uint32_t manager_owing(const void *self) {
     const struct manager *m = self;
     return node_lists_owing(&m->lists);
 }
 
-static uint32_t manager_held(const void *self)
-{
+static uint32_t manager_held(const void *self) {
     const struct manager *m = self;
     return node_face_manager_held(&m->faces) + node_lists_held(&m->lists);
 }
 
 static void manager_totals(const void *self,
                            struct node_finished_message *totals,
-                           uint64_t now_us)
-{
+                           uint64_t now_us) {
     const struct manager *m = self;
     node_face_manager_totals(&m->faces, totals, now_us);
     totals->bytes_in += m->lists.bytes_in;
@@ -164,8 +150,7 @@ static void manager_totals(const void *self,
     totals->memory_high_water += node_aligned(sizeof *m) + m->inbox_bytes;
 }
 
-static void manager_map(const void *self, struct node_map *map)
-{
+static void manager_map(const void *self, struct node_map *map) {
     const struct manager *m = self;
     node_face_manager_map(&m->faces, map);
     map->tables[0].bytes += (uint32_t)node_aligned(sizeof *m);
@@ -173,8 +158,7 @@ static void manager_map(const void *self, struct node_map *map)
     map->tables[3].count = m->lists.inbox.slot_count;
 }
 
-static void manager_gauge(const void *self, struct incode_gauge *gauge)
-{
+static void manager_gauge(const void *self, struct incode_gauge *gauge) {
     const struct manager *m = self;
     node_face_manager_gauge(&m->faces, gauge);
 }

@@ -26,32 +26,27 @@ enum {
 /* ---- memory ---- */
 
 /* One slot for each 64 KiB of memory, within bounds. */
-static uint32_t slots(size_t bytes, uint32_t min, uint32_t max)
-{
+static uint32_t slots(size_t bytes, uint32_t min, uint32_t max) {
     size_t count = bytes / 65536;
     return count < min ? min : count > max ? max : (uint32_t)count;
 }
 
-static uint32_t result_slots(size_t bytes)
-{
+static uint32_t result_slots(size_t bytes) {
     return slots(bytes, RESULT_SLOTS_MIN, RESULT_SLOTS_MAX);
 }
 
-static uint32_t spill_slots(size_t bytes)
-{
+static uint32_t spill_slots(size_t bytes) {
     return slots(bytes, SPILL_SLOTS_MIN, SPILL_SLOTS_MAX);
 }
 
-size_t node_outlet_bytes(size_t bytes)
-{
+size_t node_outlet_bytes(size_t bytes) {
     return node_aligned(
         NODE_OUTBOX_BYTES(result_slots(bytes) + spill_slots(bytes)));
 }
 
 void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
                       const struct node_setup_message *setup,
-                      struct node_counted *counted, struct node_fault *fault)
-{
+                      struct node_counted *counted, struct node_fault *fault) {
     uint32_t results = result_slots(bytes);
     memset(outlet, 0, sizeof *outlet);
     outlet->counted = counted;
@@ -64,20 +59,17 @@ void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
                      spill_slots(bytes));
 }
 
-void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch)
-{
+void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch) {
     outlet->epoch = epoch;
 }
 
-void node_outlet_found_by(struct node_outlet *outlet, uint16_t node)
-{
+void node_outlet_found_by(struct node_outlet *outlet, uint16_t node) {
     outlet->finder = node;
 }
 
 /* ---- what a front gives ---- */
 
-static size_t outside_emit_room(void *context)
-{
+static size_t outside_emit_room(void *context) {
     const struct node_outlet *o = context;
     uint32_t batches = node_outbox_free(&o->results);
     return batches <= BATCHES_RESERVED
@@ -85,8 +77,7 @@ static size_t outside_emit_room(void *context)
                : (size_t)(batches - BATCHES_RESERVED) * BATCH_TETRAHEDRA;
 }
 
-static void open_batch(struct node_outlet *o)
-{
+static void open_batch(struct node_outlet *o) {
     uint8_t *data = node_outbox_open(&o->results);
     struct node_result_header header = {o->epoch, 0};
     memcpy(data, &header, sizeof header);
@@ -95,8 +86,7 @@ static void open_batch(struct node_outlet *o)
     o->open = true;
 }
 
-static void close_batch(struct node_outlet *o)
-{
+static void close_batch(struct node_outlet *o) {
     if (o->open) {
         node_outbox_close(&o->results, NODE_RESULT,
                           HEADER_BYTES + o->writer.size);
@@ -105,8 +95,7 @@ static void close_batch(struct node_outlet *o)
 }
 
 /* The outbox is full although the triangulator was told how much it takes. */
-static bool overrun(struct node_outlet *o)
-{
+static bool overrun(struct node_outlet *o) {
     if (!o->open && node_outbox_free(&o->results) == 0) {
         node_fault_set(o->fault, "more results than # messages hold",
                        o->results.slot_count, 0);
@@ -115,8 +104,7 @@ static bool overrun(struct node_outlet *o)
 }
 
 static void outside_emit(void *context, uint32_t vertex,
-                         const uint32_t (*apexes)[3], size_t count)
-{
+                         const uint32_t (*apexes)[3], size_t count) {
     struct node_outlet *o = context;
     while (count > 0 && !overrun(o)) {
         if (!o->open) {
@@ -134,8 +122,7 @@ static void outside_emit(void *context, uint32_t vertex,
     }
 }
 
-static void outside_commit(void *context, uint32_t brick)
-{
+static void outside_commit(void *context, uint32_t brick) {
     struct node_outlet *o = context;
     while (!overrun(o)) {
         if (!o->open) {
@@ -148,8 +135,7 @@ static void outside_commit(void *context, uint32_t brick)
     }
 }
 
-static void close_spill(struct node_outlet *o)
-{
+static void close_spill(struct node_outlet *o) {
     if (o->spill_count > 0) {
         struct node_spill_header header = {o->epoch, 0, o->spill_count, 0, 0};
         memcpy(node_outbox_open(&o->spills), &header, sizeof header);
@@ -161,8 +147,7 @@ static void close_spill(struct node_outlet *o)
 }
 
 /* Faces that the outbox takes now, the open message's included. */
-static size_t spill_room(const struct node_outlet *o)
-{
+static size_t spill_room(const struct node_outlet *o) {
     return (size_t)node_outbox_free(&o->spills) * NODE_FACES_A_MESSAGE -
            o->spill_count;
 }
@@ -170,8 +155,7 @@ static size_t spill_room(const struct node_outlet *o)
 /* Faces come in small numbers: they wait in one message until it is full or
  * the link has nothing else to do. */
 static bool outside_spill(void *context, const struct incode_face *faces,
-                          size_t count)
-{
+                          size_t count) {
     struct node_outlet *o = context;
     if (spill_room(o) < count) {
         (void)node_outlet_send(o);
@@ -191,8 +175,7 @@ static bool outside_spill(void *context, const struct incode_face *faces,
     return true;
 }
 
-static bool outside_unspill(void *context, uint32_t brick)
-{
+static bool outside_unspill(void *context, uint32_t brick) {
     struct node_outlet *o = context;
     if (node_outbox_free(&o->spills) < 2) {
         return false;
@@ -204,20 +187,17 @@ static bool outside_unspill(void *context, uint32_t brick)
     return true;
 }
 
-struct incode_front_outside node_outlet_outside(struct node_outlet *outlet)
-{
+struct incode_front_outside node_outlet_outside(struct node_outlet *outlet) {
     return (struct incode_front_outside){outlet,        outside_emit_room,
                                          outside_emit,  outside_commit,
                                          outside_spill, outside_unspill};
 }
 
-bool node_outlet_has_room(const struct node_outlet *outlet)
-{
+bool node_outlet_has_room(const struct node_outlet *outlet) {
     return node_outbox_free(&outlet->results) > BATCHES_RESERVED;
 }
 
-void node_outlet_close(struct node_outlet *outlet)
-{
+void node_outlet_close(struct node_outlet *outlet) {
     close_batch(outlet);
 }
 
@@ -225,8 +205,7 @@ void node_outlet_close(struct node_outlet *outlet)
 
 bool node_outlet_take_unspill(struct node_outlet *o, const uint8_t *data,
                               size_t size, struct node_spill_header *header,
-                              struct incode_face faces[NODE_FACES_A_MESSAGE])
-{
+                              struct incode_face faces[NODE_FACES_A_MESSAGE]) {
     if (size < sizeof *header) {
         node_fault_set(o->fault, "spilled faces in # bytes, header takes #",
                        (uint32_t)size, sizeof *header);
@@ -246,16 +225,14 @@ bool node_outlet_take_unspill(struct node_outlet *o, const uint8_t *data,
     return true;
 }
 
-void node_outlet_refuse_unspill(struct node_outlet *outlet, uint32_t brick)
-{
+void node_outlet_refuse_unspill(struct node_outlet *outlet, uint32_t brick) {
     node_fault_set(outlet->fault,
                    "spilled faces of brick # not requested, or none of it",
                    brick, 0);
 }
 
 void node_outlet_take_credit(struct node_outlet *o, const uint8_t *data,
-                             size_t size)
-{
+                             size_t size) {
     if (size != sizeof o->credit) {
         node_fault_set(o->fault, "credit in # bytes, expected #",
                        (uint32_t)size, sizeof o->credit);
@@ -273,8 +250,7 @@ void node_outlet_take_credit(struct node_outlet *o, const uint8_t *data,
 /* ---- on the link ---- */
 
 /* Sends the first message of an outbox; false where the link has no room. */
-static bool send_first(struct node_outlet *o, struct node_outbox *box)
-{
+static bool send_first(struct node_outlet *o, struct node_outbox *box) {
     struct node_outbox_slot *slot = node_outbox_first(box);
     if (slot == NULL) {
         return false;
@@ -294,16 +270,14 @@ static bool send_first(struct node_outlet *o, struct node_outbox *box)
     return true;
 }
 
-bool node_outlet_few(const struct node_outlet *outlet)
-{
+bool node_outlet_few(const struct node_outlet *outlet) {
     const struct node_outlet *o = outlet;
     bool last = o->results.used > 0 && !o->open; /* none may come behind it */
     return !last && o->results.used < o->results.slot_count / FEW_OF_SLOTS &&
            o->spills.used == 0 && o->spill_count == 0;
 }
 
-unsigned node_outlet_send(struct node_outlet *outlet)
-{
+unsigned node_outlet_send(struct node_outlet *outlet) {
     struct node_outlet *o = outlet;
     unsigned sent = 0;
     if (o->spills.used == 0) {
@@ -319,8 +293,7 @@ unsigned node_outlet_send(struct node_outlet *outlet)
     return sent;
 }
 
-uint32_t node_outlet_held(const struct node_outlet *outlet)
-{
+uint32_t node_outlet_held(const struct node_outlet *outlet) {
     return outlet->open + outlet->results.used + outlet->spills.used +
            outlet->spill_count;
 }

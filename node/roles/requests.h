@@ -69,8 +69,7 @@ void node_requests_again(struct node_requests *requests, uint32_t page,
 
 /* Whether few pages are wanted: then sending may wait for more, while there is
  * other work.  A report is sent at once. */
-static inline bool node_requests_few(const struct node_requests *requests)
-{
+static inline bool node_requests_few(const struct node_requests *requests) {
     return requests->wanted_count < NODE_REQUESTS_FEW && !requests->check.owed;
 }
 

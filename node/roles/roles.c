@@ -20,7 +20,6 @@ static const struct node_role *const roles[] = {
     [NODE_EXCHANGE] = &node_exchange_role,
 };
 
-const struct node_role *node_role_named(uint32_t number)
-{
+const struct node_role *node_role_named(uint32_t number) {
     return number < sizeof roles / sizeof roles[0] ? roles[number] : NULL;
 }

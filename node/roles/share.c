@@ -16,15 +16,13 @@ static_assert(HEAD + sizeof(struct incode_answers) <= TUPLES_TUPLE_MAX,
 
 /* ---- the places ---- */
 
-static bool is_place(const struct node_setup_message *setup, unsigned node)
-{
+static bool is_place(const struct node_setup_message *setup, unsigned node) {
     return node == setup->manager || node_is_builder(setup, node);
 }
 
 /* How many there are, and which: where node_of is not NULL. */
 static uint16_t find_places(const struct node_setup_message *setup,
-                            uint16_t *node_of)
-{
+                            uint16_t *node_of) {
     uint16_t places = 0;
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
         if (is_place(setup, i)) {
@@ -38,8 +36,7 @@ static uint16_t find_places(const struct node_setup_message *setup,
 }
 
 /* The place of a node, or `places`. */
-static uint16_t place_of(const struct node_share *s, uint16_t node)
-{
+static uint16_t place_of(const struct node_share *s, uint16_t node) {
     uint16_t first = 0, last = s->places;
     while (first < last) {
         uint16_t middle = (uint16_t)((first + last) / 2);
@@ -55,8 +52,7 @@ static uint16_t place_of(const struct node_share *s, uint16_t node)
 /* ---- the space ---- */
 
 static int write_message(void *context, uint16_t place, const void *data,
-                         size_t size)
-{
+                         size_t size) {
     struct node_share *s = context;
     int status = node_counted_write(s->counted, s->node_of[place], NODE_TUPLES,
                                     data, size);
@@ -64,8 +60,7 @@ static int write_message(void *context, uint16_t place, const void *data,
     return status;
 }
 
-static bool run(void *context, struct tuple *tuple)
-{
+static bool run(void *context, struct tuple *tuple) {
     struct node_share *s = context;
     return s->process(s->role, tuple);
 }
@@ -73,8 +68,7 @@ static bool run(void *context, struct tuple *tuple)
 static tuples_function *const functions[] = {[NODE_SHARE_FUNCTION] = run};
 
 /* Bytes that the largest tuple takes in a store. */
-static uint32_t record_bytes(const struct tuples_config *config)
-{
+static uint32_t record_bytes(const struct tuples_config *config) {
     return TUPLES_RECORD_BYTES + (config->tuple_bytes + 3u) / 4 * 4;
 }
 
@@ -82,8 +76,7 @@ static uint32_t record_bytes(const struct tuples_config *config)
  * as the manager has it. */
 static struct tuples_config configure(const struct node_setup_message *setup,
                                       uint16_t places, bool store,
-                                      uint32_t *jobs)
-{
+                                      uint32_t *jobs) {
     struct tuples_config config;
     memset(&config, 0, sizeof config);
     uint32_t most = setup->faces_per_job < INCODE_LIST_COUNTED
@@ -110,15 +103,13 @@ static struct tuples_config configure(const struct node_setup_message *setup,
     return config;
 }
 
-static bool is_sound(const struct node_setup_message *setup)
-{
+static bool is_sound(const struct node_setup_message *setup) {
     return setup->faces_per_job >= 1 &&
            setup->faces_per_job <= INCODE_LIST_MAX &&
            setup->jobs_per_worker >= 1 && setup->manager <= NODE_BUILDERS_MAX;
 }
 
-size_t node_share_bytes(const struct node_setup_message *setup)
-{
+size_t node_share_bytes(const struct node_setup_message *setup) {
     uint32_t jobs;
     if (!is_sound(setup)) {
         return 0;
@@ -130,8 +121,7 @@ size_t node_share_bytes(const struct node_setup_message *setup)
 
 /* The first numbers that have their tuples live at that place; one in `places`
  * does. */
-static void choose_numbers(struct node_share *s, uint16_t place)
-{
+static void choose_numbers(struct node_share *s, uint16_t place) {
     uint32_t number = 0;
     for (unsigned k = 0; k < NODE_SHARE_KINDS; k++) {
         struct tuple tuple = {.count = 2, .keyed = true};
@@ -147,8 +137,7 @@ static void choose_numbers(struct node_share *s, uint16_t place)
 bool node_share_init(struct node_share *share, void *memory,
                      const struct node_setup_message *setup,
                      tuples_function *process, void *role,
-                     struct node_counted *counted, struct node_fault *fault)
-{
+                     struct node_counted *counted, struct node_fault *fault) {
     struct node_share *s = share;
     memset(s, 0, sizeof *s);
     s->counted = counted;
@@ -179,8 +168,7 @@ bool node_share_init(struct node_share *share, void *memory,
 }
 
 void node_share_take(struct node_share *share,
-                     const struct cube_message *message)
-{
+                     const struct cube_message *message) {
     struct node_share *s = share;
     uint16_t place = place_of(s, message->source);
     s->bytes_in += message->size;
@@ -197,8 +185,7 @@ void node_share_take(struct node_share *share,
 
 static struct tuple tuple_of(const struct node_share *s,
                              enum node_share_kind kind,
-                             struct tuple_field second)
-{
+                             struct tuple_field second) {
     struct tuple tuple = {.count = 2, .keyed = true};
     tuple.field[0] = TUPLE_UINT32(s->number[kind]);
     tuple.field[1] = second;
@@ -206,14 +193,13 @@ static struct tuple tuple_of(const struct node_share *s,
 }
 
 /* Whether one more of what is due once for each other place may begin. */
-static bool may_begin(const struct node_share *s, uint32_t count, unsigned kept)
-{
+static bool may_begin(const struct node_share *s, uint32_t count,
+                      unsigned kept) {
     return count + 1 < s->places && tuples_room(s->space) > kept;
 }
 
 bool node_share_eval_all(struct node_share *share, uint32_t *count,
-                         unsigned kept)
-{
+                         unsigned kept) {
     struct tuple tuple = tuple_of(share, NODE_SHARE_WORKER, TUPLE_UINT32(0));
     bool moved = false;
     for (; may_begin(share, *count, kept); ++*count) {
@@ -225,8 +211,7 @@ bool node_share_eval_all(struct node_share *share, uint32_t *count,
 }
 
 bool node_share_end_all(struct node_share *share, uint32_t *count,
-                        unsigned kept)
-{
+                        unsigned kept) {
     bool moved = false;
     while (may_begin(share, *count, kept)) {
         moved = node_share_out_bytes(share, NODE_SHARE_JOB, NULL, 0);
@@ -237,8 +222,7 @@ bool node_share_end_all(struct node_share *share, uint32_t *count,
 
 /* Whether the tuple has come that is asked for, or is from now on. */
 static bool has_come(struct node_share *s, int *operation,
-                     const struct tuple *pattern, struct tuple *tuple)
-{
+                     const struct tuple *pattern, struct tuple *tuple) {
     if (*operation < 0) {
         *operation = tuples_in(s->space, pattern);
     }
@@ -246,14 +230,12 @@ static bool has_come(struct node_share *s, int *operation,
            tuples_poll(s->space, *operation, tuple) == TUPLES_DONE;
 }
 
-static void close(struct node_share *s, int *operation)
-{
+static void close(struct node_share *s, int *operation) {
     tuples_close(s->space, *operation);
     *operation = -1;
 }
 
-bool node_share_in_worker(struct node_share *share, int *operation)
-{
+bool node_share_in_worker(struct node_share *share, int *operation) {
     struct tuple tuple, pattern = tuple_of(share, NODE_SHARE_WORKER,
                                            TUPLE_FORMAL(TUPLE_TYPE_UINT32));
     bool came = has_come(share, operation, &pattern, &tuple);
@@ -264,8 +246,7 @@ bool node_share_in_worker(struct node_share *share, int *operation)
 }
 
 bool node_share_in_bytes(struct node_share *share, enum node_share_kind kind,
-                         int *operation, void *into, size_t size)
-{
+                         int *operation, void *into, size_t size) {
     struct tuple tuple,
         pattern = tuple_of(share, kind, TUPLE_FORMAL(TUPLE_TYPE_BYTES));
     if (!has_come(share, operation, &pattern, &tuple)) {
@@ -283,8 +264,7 @@ bool node_share_in_bytes(struct node_share *share, enum node_share_kind kind,
 }
 
 bool node_share_out_bytes(struct node_share *share, enum node_share_kind kind,
-                          const void *data, size_t size)
-{
+                          const void *data, size_t size) {
     struct tuple tuple = tuple_of(share, kind, TUPLE_BYTES(data, size));
     int put = tuples_out(share->space, &tuple);
     if (put >= 0) {
@@ -295,8 +275,7 @@ bool node_share_out_bytes(struct node_share *share, enum node_share_kind kind,
 
 /* Whoever has a share answers at once, where its own program goes on; one who
  * has taken a list may wait for that other, or for pages. */
-uint16_t node_share_owing(const struct node_share *share)
-{
+uint16_t node_share_owing(const struct node_share *share) {
     uint16_t owing = CUBE_HOST;
     for (uint16_t i = 0; i < share->places; i++) {
         struct tuples_account account = tuples_account(share->space, i);
@@ -316,16 +295,14 @@ uint16_t node_share_owing(const struct node_share *share)
 /* ---- the carrier ---- */
 
 /* Operations are kept for what it takes. */
-static bool has_room(void *context)
-{
+static bool has_room(void *context) {
     const struct node_share *s = context;
     return tuples_room(s->space) > s->takes_max &&
            (s->puts != NODE_SHARE_JOB || s->out < s->out_max);
 }
 
 /* There is room in the space: nobody needs to wait for it. */
-static void send(void *context, const void *data, size_t size)
-{
+static void send(void *context, const void *data, size_t size) {
     struct node_share *s = context;
     bool put = node_share_out_bytes(s, s->puts, data, size);
     INCODE_ASSERT(put);
@@ -333,8 +310,7 @@ static void send(void *context, const void *data, size_t size)
 }
 
 /* Of what has come, the tuple of taking[next] is that which is looked at. */
-static void drop(void *context)
-{
+static void drop(void *context) {
     struct node_share *s = context;
     tuples_close(s->space, s->taking[s->next]);
     s->taking[s->next] = -1;
@@ -343,8 +319,7 @@ static void drop(void *context)
     s->out -= s->puts == NODE_SHARE_JOB;
 }
 
-static void ask(struct node_share *s)
-{
+static void ask(struct node_share *s) {
     struct tuple pattern =
         tuple_of(s, s->takes, TUPLE_FORMAL(TUPLE_TYPE_BYTES));
     for (uint32_t i = 0; i < s->takes_max; i++) {
@@ -354,8 +329,7 @@ static void ask(struct node_share *s)
     }
 }
 
-static const void *first(void *context, size_t *size)
-{
+static const void *first(void *context, size_t *size) {
     struct node_share *s = context;
     struct tuple tuple;
     uint32_t looked = 0;
@@ -379,8 +353,7 @@ static const void *first(void *context, size_t *size)
     return tuple.field[1].as.bytes;
 }
 
-void node_share_stop(struct node_share *share)
-{
+void node_share_stop(struct node_share *share) {
     for (uint32_t i = 0; i < share->takes_max; i++) {
         if (share->taking[i] >= 0) {
             tuples_close(share->space, share->taking[i]);
@@ -392,8 +365,7 @@ void node_share_stop(struct node_share *share)
 struct node_carrier node_share_carrier(struct node_share *share,
                                        enum node_share_kind puts,
                                        enum node_share_kind takes,
-                                       uint32_t takes_max)
-{
+                                       uint32_t takes_max) {
     INCODE_ASSERT(takes_max >= 1 && takes_max <= NODE_SHARE_TAKES_MAX);
     share->puts = puts;
     share->takes = takes;

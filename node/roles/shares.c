@@ -8,21 +8,18 @@
 
 enum { OTHERS_MAX = 3 /* owners of the other vertices of a tetrahedron */ };
 
-static size_t table_bytes(uint32_t nodes)
-{
+static size_t table_bytes(uint32_t nodes) {
     return node_aligned(((size_t)nodes + 1) * sizeof(uint32_t));
 }
 
-size_t node_shares_bytes(uint32_t nodes)
-{
+size_t node_shares_bytes(uint32_t nodes) {
     return table_bytes(nodes) +
            node_aligned(NODE_SHARE_BATCHES * sizeof(struct node_share_batch));
 }
 
 void node_shares_init(struct node_shares *shares, void *memory,
                       const struct node_setup_message *setup,
-                      struct node_counted *counted)
-{
+                      struct node_counted *counted) {
     memset(shares, 0, sizeof *shares);
     shares->counted = counted;
     shares->nodes = setup->nodes;
@@ -38,8 +35,7 @@ void node_shares_init(struct node_shares *shares, void *memory,
 /* ---- regions ---- */
 
 bool node_shares_regions(struct node_shares *shares, const uint8_t *data,
-                         size_t size)
-{
+                         size_t size) {
     struct node_regions_message regions;
     if (size < sizeof regions) {
         return false;
@@ -62,15 +58,13 @@ bool node_shares_regions(struct node_shares *shares, const uint8_t *data,
     return true;
 }
 
-bool node_shares_ready(const struct node_shares *shares)
-{
+bool node_shares_ready(const struct node_shares *shares) {
     return shares->known == shares->nodes + 1;
 }
 
 /* The last region that begins at the brick or before, as those that are empty
  * begin where the next one does. */
-uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick)
-{
+uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick) {
     uint32_t low = 0, high = shares->nodes;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
@@ -88,8 +82,7 @@ uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick)
 /* n tetrahedra of up to three others each begin 3 n batches at most; and, as
  * a batch is begun when the one before it to the same node is full, no more
  * than 3 n / 32, rounded up for each node. */
-static size_t shares_room(void *context)
-{
+static size_t shares_room(void *context) {
     enum { EACH = NODE_SHARES_A_BATCH };
     const struct node_shares *s = context;
     size_t free = NODE_SHARE_BATCHES - s->used, others = s->nodes - 1;
@@ -105,8 +98,7 @@ static size_t shares_room(void *context)
     return room;
 }
 
-static void tell(struct node_shares *s, uint16_t to, const uint32_t v[4])
-{
+static void tell(struct node_shares *s, uint16_t to, const uint32_t v[4]) {
     struct node_share_batch *batch = NULL;
     for (uint32_t i = 0; i < NODE_SHARE_BATCHES; i++) {
         struct node_share_batch *b = &s->batch[i];
@@ -127,8 +119,7 @@ static void tell(struct node_shares *s, uint16_t to, const uint32_t v[4])
     s->sent++;
 }
 
-static void shares_share(void *context, const uint32_t v[4])
-{
+static void shares_share(void *context, const uint32_t v[4]) {
     struct node_shares *s = context;
     uint16_t to[4];
     unsigned told = 0;
@@ -145,13 +136,11 @@ static void shares_share(void *context, const uint32_t v[4])
     }
 }
 
-struct incode_front_peers node_shares_peers(struct node_shares *shares)
-{
+struct incode_front_peers node_shares_peers(struct node_shares *shares) {
     return (struct incode_front_peers){shares, shares_room, shares_share};
 }
 
-unsigned node_shares_send(struct node_shares *shares)
-{
+unsigned node_shares_send(struct node_shares *shares) {
     unsigned sent = 0;
     for (uint32_t i = 0; i < NODE_SHARE_BATCHES && shares->used > 0; i++) {
         struct node_share_batch *b =

@@ -5,16 +5,14 @@
 #include "incode/predicates/check.h"
 #include "node/keepers.h"
 
-size_t node_tetra_builder_min(const struct node_setup_message *setup)
-{
+size_t node_tetra_builder_min(const struct node_setup_message *setup) {
     uint32_t lists = setup->jobs_per_worker;
     lists = lists < 1 ? 1 : lists > INCODE_LISTS_MAX ? INCODE_LISTS_MAX : lists;
     return incode_builder_min(lists);
 }
 
 static bool is_sound(const struct node_setup_message *setup,
-                     struct node_fault *fault)
-{
+                     struct node_fault *fault) {
     const char *why = incode_setup_fault(&setup->setup);
     if (why != NULL) {
         node_fault_set(fault, why, 0, 0);
@@ -35,8 +33,7 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
                               const struct node_setup_message *setup,
                               const struct node_carrier *carrier,
                               struct node_counted *counted,
-                              struct node_fault *fault)
-{
+                              struct node_fault *fault) {
     if (!is_sound(setup, fault) ||
         !node_keepers_fit(setup, counted->self, false, fault)) {
         return false;
@@ -58,8 +55,7 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
 }
 
 bool node_tetra_builder_message(struct node_tetra_builder *t,
-                                const struct cube_message *message)
-{
+                                const struct cube_message *message) {
     struct incode_maker *maker = &t->builder.maker;
     struct node_page page;
     if (message->type != NODE_PAGE) {
@@ -79,8 +75,7 @@ bool node_tetra_builder_message(struct node_tetra_builder *t,
 
 /* ---- work ---- */
 
-static bool take_list(struct node_tetra_builder *t)
-{
+static bool take_list(struct node_tetra_builder *t) {
     struct incode_list list;
     size_t size;
     const void *data;
@@ -100,8 +95,7 @@ static bool take_list(struct node_tetra_builder *t)
     return incode_builder_take(&t->builder, &list);
 }
 
-static bool send_answers(struct node_tetra_builder *t)
-{
+static bool send_answers(struct node_tetra_builder *t) {
     const struct incode_answers *answers = incode_builder_answers(&t->builder);
     if (answers == NULL || !t->carrier.has_room(t->carrier.context)) {
         return false;
@@ -112,8 +106,7 @@ static bool send_answers(struct node_tetra_builder *t)
     return true;
 }
 
-static bool work_on(void *context, uint32_t units, uint32_t *spent)
-{
+static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct node_tetra_builder *t = context;
     uint64_t before = t->builder.spent;
     if (node_fault_is_set(t->fault)) {
@@ -130,24 +123,20 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent)
 }
 
 unsigned node_tetra_builder_work(struct node_tetra_builder *t,
-                                 struct node_pace *pace)
-{
+                                 struct node_pace *pace) {
     return node_pace_work(pace, work_on, t);
 }
 
-uint32_t node_tetra_builder_held(const struct node_tetra_builder *t)
-{
+uint32_t node_tetra_builder_held(const struct node_tetra_builder *t) {
     return incode_builder_held(&t->builder);
 }
 
-uint32_t node_tetra_builder_awaited(const struct node_tetra_builder *t)
-{
+uint32_t node_tetra_builder_awaited(const struct node_tetra_builder *t) {
     return incode_pager_awaited(&t->builder.maker.pager);
 }
 
 void node_tetra_builder_totals(const struct node_tetra_builder *t,
-                               struct node_finished_message *totals)
-{
+                               struct node_finished_message *totals) {
     totals->bytes_in = t->bytes_in;
     totals->bytes_out = t->requests.bytes_out;
     incode_builder_statistics(&t->builder, &totals->statistics);
@@ -155,15 +144,13 @@ void node_tetra_builder_totals(const struct node_tetra_builder *t,
 }
 
 void node_tetra_builder_gauge(const struct node_tetra_builder *t,
-                              struct incode_gauge *gauge)
-{
+                              struct incode_gauge *gauge) {
     gauge->pages = t->builder.maker.pager.frame_count;
     gauge->held = t->builder.maker.pager.frames_used;
 }
 
 void node_tetra_builder_map(const struct node_tetra_builder *t,
-                            struct node_map *map)
-{
+                            struct node_map *map) {
     const struct incode_pager *pager = &t->builder.maker.pager;
     size_t frames = incode_pager_bytes(pager->frame_count);
     map->tables[0].bytes = (uint32_t)(t->builder.bytes - frames);

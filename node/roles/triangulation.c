@@ -9,8 +9,7 @@
 enum { HOLD_US = NODE_PACE_US }; /* that messages wait for others, at most */
 
 size_t node_triangulation_min(size_t memory,
-                              const struct node_setup_message *setup)
-{
+                              const struct node_setup_message *setup) {
     return node_outlet_bytes(memory) + incode_arena_min(&setup->setup);
 }
 
@@ -20,8 +19,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
                               const struct incode_front_peers *peers,
                               struct node_lending *lending,
                               struct node_counted *counted,
-                              struct node_fault *fault)
-{
+                              struct node_fault *fault) {
     uint8_t *memory = arena;
     size_t before = own + node_outlet_bytes(bytes);
     const char *why = NULL;
@@ -54,8 +52,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
 }
 
 static void take_job(struct node_triangulation *t,
-                     const struct cube_message *message, uint64_t now_us)
-{
+                     const struct cube_message *message, uint64_t now_us) {
     struct incode_job job;
     if (!node_jobs_take(&t->jobs, message, now_us, &job)) {
         return;
@@ -69,8 +66,7 @@ static void take_job(struct node_triangulation *t,
 }
 
 static void take_page(struct node_triangulation *t,
-                      const struct cube_message *message)
-{
+                      const struct cube_message *message) {
     struct node_page page;
     if (node_requests_take(&t->requests, message, &page)) {
         int status = incode_triangulator_page(t->triangulator, page.number,
@@ -86,8 +82,7 @@ static void take_page(struct node_triangulation *t,
 }
 
 static void take_unspill(struct node_triangulation *t, const uint8_t *data,
-                         size_t size)
-{
+                         size_t size) {
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (node_outlet_take_unspill(&t->outlet, data, size, &header, faces) &&
@@ -99,8 +94,7 @@ static void take_unspill(struct node_triangulation *t, const uint8_t *data,
 
 bool node_triangulation_message(struct node_triangulation *t,
                                 const struct cube_message *message,
-                                uint64_t now_us)
-{
+                                uint64_t now_us) {
     switch (message->type) {
     case NODE_JOB:
         take_job(t, message, now_us);
@@ -121,8 +115,7 @@ bool node_triangulation_message(struct node_triangulation *t,
     return true;
 }
 
-bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent)
-{
+bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent) {
     struct node_triangulation *t = context;
     if (!t->jobs.working || t->drained || node_fault_is_set(t->fault) ||
         (!t->exchanges && !node_outlet_has_room(&t->outlet))) {
@@ -140,16 +133,14 @@ bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent)
     return step == INCODE_WORKED || step == INCODE_FINISHED;
 }
 
-void node_triangulation_close(struct node_triangulation *t)
-{
+void node_triangulation_close(struct node_triangulation *t) {
     if (t->drained) {
         node_outlet_close(&t->outlet);
     }
 }
 
 unsigned node_triangulation_work(struct node_triangulation *t,
-                                 struct node_pace *pace)
-{
+                                 struct node_pace *pace) {
     unsigned worked = node_pace_work(pace, node_triangulation_step, t);
     node_triangulation_close(t);
     t->worked = worked > 0;
@@ -159,8 +150,7 @@ unsigned node_triangulation_work(struct node_triangulation *t,
 
 /* Whether what there is to be sent is little, and not all: while the role works
  * on, it waits for more, as each message by itself wakes the host. */
-static bool may_wait(struct node_triangulation *t)
-{
+static bool may_wait(struct node_triangulation *t) {
     if (!t->worked || !node_requests_few(&t->requests) ||
         !node_outlet_few(&t->outlet)) {
         return false;
@@ -172,8 +162,7 @@ static bool may_wait(struct node_triangulation *t)
     return t->now_us - t->held_us < HOLD_US;
 }
 
-unsigned node_triangulation_send(struct node_triangulation *t)
-{
+unsigned node_triangulation_send(struct node_triangulation *t) {
     if (may_wait(t)) {
         return 0;
     }
@@ -181,20 +170,17 @@ unsigned node_triangulation_send(struct node_triangulation *t)
     return node_requests_send(&t->requests) + node_outlet_send(&t->outlet);
 }
 
-uint32_t node_triangulation_held(const struct node_triangulation *t)
-{
+uint32_t node_triangulation_held(const struct node_triangulation *t) {
     return node_outlet_held(&t->outlet) + node_requests_held(&t->requests);
 }
 
-uint32_t node_triangulation_done(const struct node_triangulation *t)
-{
+uint32_t node_triangulation_done(const struct node_triangulation *t) {
     return t->jobs.working && t->drained && node_triangulation_held(t) == 0
                ? t->jobs.epoch
                : 0;
 }
 
-void node_triangulation_end(struct node_triangulation *t, uint64_t now_us)
-{
+void node_triangulation_end(struct node_triangulation *t, uint64_t now_us) {
     INCODE_ASSERT(node_triangulation_done(t) != 0);
     node_jobs_end(&t->jobs, now_us);
     t->drained = false;
@@ -202,8 +188,7 @@ void node_triangulation_end(struct node_triangulation *t, uint64_t now_us)
 
 void node_triangulation_totals(const struct node_triangulation *t,
                                struct node_finished_message *totals,
-                               uint64_t now_us)
-{
+                               uint64_t now_us) {
     totals->wall_us = node_jobs_wall_us(&t->jobs, now_us);
     totals->bytes_in = t->bytes_in;
     totals->bytes_out = t->requests.bytes_out + t->outlet.bytes_out;
@@ -213,8 +198,7 @@ void node_triangulation_totals(const struct node_triangulation *t,
 }
 
 void node_triangulation_map(const struct node_triangulation *t,
-                            struct node_map *map, unsigned table)
-{
+                            struct node_map *map, unsigned table) {
     const struct incode_map *m = incode_triangulator_map(t->triangulator);
     const size_t bytes[NODE_TRIANGULATION_TABLES][2] = {
         {t->before, 0},

@@ -24,8 +24,7 @@ enum { NODE_TRIANGULATION_TABLES = 5 };
 #define NODE_TRIANGULATION_NAMES                                               \
     {"results and spilled faces on their way out", NULL},                      \
         {"triangulator, its local points and tasks", NULL},                    \
-        {"active face list", "faces"}, {"open bricks", "entries"},             \
-    {                                                                          \
+        {"active face list", "faces"}, {"open bricks", "entries"}, {           \
         "page frames", "pages of 1568 bytes"                                   \
     }
 

@@ -4,8 +4,7 @@
 
 void node_waves_init(struct node_waves *waves,
                      const struct node_setup_message *setup,
-                     struct node_counted *counted, struct node_fault *fault)
-{
+                     struct node_counted *counted, struct node_fault *fault) {
     memset(waves, 0, sizeof *waves);
     waves->counted = counted;
     waves->fault = fault;
@@ -16,8 +15,7 @@ void node_waves_init(struct node_waves *waves,
     }
 }
 
-static void begin(struct node_waves *w, uint32_t number, uint8_t command)
-{
+static void begin(struct node_waves *w, uint32_t number, uint8_t command) {
     w->number = number;
     w->command = command;
     w->open = true;
@@ -27,13 +25,12 @@ static void begin(struct node_waves *w, uint32_t number, uint8_t command)
     w->sum.number = number;
 }
 
-void node_waves_begin(struct node_waves *waves)
-{
+void node_waves_begin(struct node_waves *waves) {
     begin(waves, 1, NODE_WAVE_READY);
 }
 
-static bool take_wave(struct node_waves *w, const struct cube_message *message)
-{
+static bool take_wave(struct node_waves *w,
+                      const struct cube_message *message) {
     struct node_wave_message wave;
     unsigned parent = w->counted->self & (w->counted->self - 1u);
     if (message->size != sizeof wave || message->source != parent ||
@@ -53,8 +50,7 @@ static bool take_wave(struct node_waves *w, const struct cube_message *message)
 }
 
 static void take_answer(struct node_waves *w,
-                        const struct cube_message *message)
-{
+                        const struct cube_message *message) {
     struct node_wave_answer_message answer = {.number = 0};
     uint32_t bit = message->source ^ w->counted->self;
     if (message->size == sizeof answer) {
@@ -73,8 +69,7 @@ static void take_answer(struct node_waves *w,
 }
 
 bool node_waves_take(struct node_waves *waves,
-                     const struct cube_message *message)
-{
+                     const struct cube_message *message) {
     if (message->type == NODE_WAVE) {
         return take_wave(waves, message);
     }
@@ -84,8 +79,7 @@ bool node_waves_take(struct node_waves *waves,
 
 /* At node 0: whether what was sent does not come, however long it is waited
  * for. */
-static bool is_missing(struct node_waves *w, bool unchanged)
-{
+static bool is_missing(struct node_waves *w, bool unchanged) {
     if (!unchanged || w->sum.sent == w->sum.received) {
         w->unchanged = 0;
         w->unchanged_us = w->now_us;
@@ -97,8 +91,7 @@ static bool is_missing(struct node_waves *w, bool unchanged)
 }
 
 /* At node 0: all have answered.  What is next? */
-static uint8_t conclude(struct node_waves *w)
-{
+static uint8_t conclude(struct node_waves *w) {
     const struct node_wave_answer_message *now = &w->sum;
     bool unchanged =
         now->sent == w->before.sent && now->received == w->before.received;
@@ -133,8 +126,7 @@ static uint8_t conclude(struct node_waves *w)
     return next;
 }
 
-static unsigned tell_children(struct node_waves *w)
-{
+static unsigned tell_children(struct node_waves *w) {
     const struct node_wave_message wave = {w->number, w->command};
     unsigned sent = 0;
     for (unsigned d = 0; w->to_tell >> d != 0; d++) {
@@ -150,8 +142,8 @@ static unsigned tell_children(struct node_waves *w)
 }
 
 unsigned node_waves_send(struct node_waves *waves,
-                         const struct node_waves_state *state, uint8_t *command)
-{
+                         const struct node_waves_state *state,
+                         uint8_t *command) {
     struct node_waves *w = waves;
     unsigned sent = tell_children(w);
     bool may_answer =

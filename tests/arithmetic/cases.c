@@ -20,27 +20,23 @@ static const char *const difference_names[4][3] = {{"ax", "ay", "az"},
                                                    {"cx", "cy", "cz"},
                                                    {"dx", "dy", "dz"}};
 
-static void record_sign(struct record *record, const char *name, int sign)
-{
+static void record_sign(struct record *record, const char *name, int sign) {
     record_word(record, name, (uint64_t)(int64_t)sign);
 }
 
 static void record_tally(struct record *record,
-                         const struct incode_tally *tally)
-{
+                         const struct incode_tally *tally) {
     record_word(record, "orient3d that the filter left", tally->exact_orient3d);
     record_word(record, "in_sphere that the filter left",
                 tally->exact_in_sphere);
 }
 
-static double larger(double a, double b)
-{
+static double larger(double a, double b) {
     return a > b ? a : b;
 }
 
 /* The largest difference in each coordinate. */
-static void largest(const double d[][3], int count, double most[3])
-{
+static void largest(const double d[][3], int count, double most[3]) {
     for (int k = 0; k < 3; k++) {
         most[k] = 0;
         for (int i = 0; i < count; i++)
@@ -52,8 +48,7 @@ static void largest(const double d[][3], int count, double most[3])
  * difference_names[first]. */
 static void differences(struct record *record, double d[][3],
                         const double (*p)[3], int count, const double *origin,
-                        int first)
-{
+                        int first) {
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++)
             d[i][k] = step_minus(record, difference_names[first + i][k],
@@ -63,8 +58,7 @@ static void differences(struct record *record, double d[][3],
 
 /* The filter's determinant and its bound, from the points but for the first,
  * which is a. */
-static void filter_orient3d(struct record *record, const double p[5][3])
-{
+static void filter_orient3d(struct record *record, const double p[5][3]) {
     double d[3][3], most[3];
     differences(record, d, p + 1, 3, p[0], 1);
     const double *b = d[0], *c = d[1];
@@ -80,8 +74,7 @@ static void filter_orient3d(struct record *record, const double p[5][3])
 }
 
 /* The query is e. */
-static void filter_in_sphere(struct record *record, const double p[5][3])
-{
+static void filter_in_sphere(struct record *record, const double p[5][3]) {
     static const char *const minor_names[6] = {
         "ab = ax by - bx ay", "ac = ax cy - cx ay", "ad = ax dy - dx ay",
         "bc = bx cy - cx by", "bd = bx dy - dx by", "cd = cx dy - dx cy"};
@@ -119,8 +112,7 @@ static void filter_in_sphere(struct record *record, const double p[5][3])
     step_times(record, "mx my mz m m", product, area);
 }
 
-static bool distinct(const double p[5][3])
-{
+static bool distinct(const double p[5][3]) {
     for (int i = 0; i < 5; i++) {
         for (int j = 0; j < i; j++) {
             if (incode_lexicographic(p[i], p[j]) == 0)
@@ -134,8 +126,7 @@ static bool distinct(const double p[5][3])
  * the first four are positively oriented: false where there are none among so
  * many. */
 static bool draw_case(struct draw *draw, enum draw_family family, bool positive,
-                      double p[5][3])
-{
+                      double p[5][3]) {
     enum { TRIES_MAX = 20 };
     struct incode_tally tally = {0};
     for (int tries = 0; tries < TRIES_MAX; tries++) {
@@ -155,8 +146,7 @@ static bool draw_case(struct draw *draw, enum draw_family family, bool positive,
     return false;
 }
 
-static void record_points(struct record *record, const double p[5][3])
-{
+static void record_points(struct record *record, const double p[5][3]) {
     for (int i = 0; i < 5; i++) {
         for (int k = 0; k < 3; k++)
             record_double(record, point_names[i][k], p[i][k]);
@@ -164,8 +154,7 @@ static void record_points(struct record *record, const double p[5][3])
 }
 
 /* Most cases are such that the filters can tell; a quarter is hard. */
-static enum draw_family filter_family(uint32_t number)
-{
+static enum draw_family filter_family(uint32_t number) {
     uint32_t at = number / 2 % 32;
     if (at < 24)
         return at < 20 ? DRAW_UNIFORM : DRAW_SPREAD;
@@ -174,8 +163,7 @@ static enum draw_family filter_family(uint32_t number)
 }
 
 static void filter_case(struct draw *draw, uint32_t number,
-                        struct record *record)
-{
+                        struct record *record) {
     struct incode_tally tally = {0};
     double p[5][3];
     bool sphere = number % 2 != 0;
@@ -198,8 +186,7 @@ static void filter_case(struct draw *draw, uint32_t number,
 }
 
 /* The largest |p[i][k] - origin[k]|. */
-static double reach(const double *const p[], int count, const double *origin)
-{
+static double reach(const double *const p[], int count, const double *origin) {
     double most = 0;
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++)
@@ -211,8 +198,7 @@ static double reach(const double *const p[], int count, const double *origin)
 /* Whether the points are integers of one scale, and which. */
 static bool record_integers(struct record *record, int64_t n[4][3],
                             const double *const p[], int count,
-                            const double *origin, double most)
-{
+                            const double *origin, double most) {
     bool there = incode_fixed_differences(n, p, count, origin, most);
     record_word(record, "integers of one scale", there);
     for (int i = 0; i < count && there; i++) {
@@ -222,8 +208,7 @@ static bool record_integers(struct record *record, int64_t n[4][3],
     return there;
 }
 
-static void stages_orient3d(struct record *record, const double *const p[5])
-{
+static void stages_orient3d(struct record *record, const double *const p[5]) {
     int64_t n[4][3];
     double most = reach(p + 1, 3, p[0]);
     int exact = incode_exact_orient3d(p), sign;
@@ -240,8 +225,7 @@ static void stages_orient3d(struct record *record, const double *const p[5])
                 incode_fixed_orient3d_portable((const int64_t(*)[3])n));
 }
 
-static void stages_in_sphere(struct record *record, const double *const p[5])
-{
+static void stages_in_sphere(struct record *record, const double *const p[5]) {
     int64_t n[4][3];
     double most = reach(p, 4, p[4]);
     struct incode_pause pause = {0};
@@ -259,8 +243,7 @@ static void stages_in_sphere(struct record *record, const double *const p[5])
 
 /* All families in turn; a quarter also where four points lie in a plane. */
 static void exact_case(struct draw *draw, uint32_t number,
-                       struct record *record)
-{
+                       struct record *record) {
     struct incode_tally tally = {0};
     double p[5][3];
     bool sphere = number / DRAW_FAMILIES % 4 != 0;
@@ -284,8 +267,7 @@ static void exact_case(struct draw *draw, uint32_t number,
     record_tally(record, &tally);
 }
 
-void cases_case(uint32_t block, uint32_t number, struct record *record)
-{
+void cases_case(uint32_t block, uint32_t number, struct record *record) {
     struct draw draw = draw_begin((uint64_t)block * CASES_PER_BLOCK + number);
     if (block < CASES_FILTERS)
         single_case(&draw, number, record);
@@ -295,8 +277,7 @@ void cases_case(uint32_t block, uint32_t number, struct record *record)
         exact_case(&draw, number, record);
 }
 
-uint64_t cases_block(uint32_t block)
-{
+uint64_t cases_block(uint32_t block) {
     uint64_t digest = record_begin().digest;
     for (uint32_t number = 0; number < CASES_PER_BLOCK; number++) {
         struct record record = record_begin();
@@ -306,8 +287,7 @@ uint64_t cases_block(uint32_t block)
     return digest;
 }
 
-const char *cases_kind(uint32_t block)
-{
+const char *cases_kind(uint32_t block) {
     if (block < CASES_FILTERS)
         return "single operations";
     return block < CASES_EXACT ? "filters" : "exact predicates";

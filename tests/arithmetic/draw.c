@@ -9,8 +9,7 @@ enum { EXPONENT_ONE = 1023, EXPONENT_MOST = 2046 };
 #define SIGN (UINT64_C(1) << 63)
 
 /* A counter stirred until each of its bits changes half of all bits. */
-struct draw draw_begin(uint64_t number)
-{
+struct draw draw_begin(uint64_t number) {
     uint64_t s = (number + 1) * UINT64_C(0xd1342543de82ef95);
     s ^= s >> 32;
     s *= UINT64_C(0xaf251af3b0f025b5);
@@ -19,8 +18,7 @@ struct draw draw_begin(uint64_t number)
 }
 
 /* Marsaglia's xorshift, its low bits mended by a multiplication. */
-uint64_t draw_bits(struct draw *draw)
-{
+uint64_t draw_bits(struct draw *draw) {
     uint64_t s = draw->state;
     s ^= s << 13;
     s ^= s >> 7;
@@ -30,27 +28,23 @@ uint64_t draw_bits(struct draw *draw)
     return s ^ s >> 32;
 }
 
-uint32_t draw_below(struct draw *draw, uint32_t n)
-{
+uint32_t draw_below(struct draw *draw, uint32_t n) {
     return (uint32_t)((draw_bits(draw) >> 32) * n >> 32);
 }
 
-static double double_of(uint64_t bits)
-{
+static double double_of(uint64_t bits) {
     double value;
     memcpy(&value, &bits, sizeof value);
     return value;
 }
 
-static uint64_t bits_of(double value)
-{
+static uint64_t bits_of(double value) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
 
-double draw_between(struct draw *draw, int least, int most)
-{
+double draw_between(struct draw *draw, int least, int most) {
     uint64_t bits = draw_bits(draw);
     uint32_t span = (uint32_t)(most - least + 1);
     uint64_t e = (uint32_t)(least + EXPONENT_ONE) + draw_below(draw, span);
@@ -58,8 +52,7 @@ double draw_between(struct draw *draw, int least, int most)
 }
 
 /* n 2^e, cut to 53 bits, for a result that is no denormal. */
-static double number(int64_t n, int e)
-{
+static double number(int64_t n, int e) {
     uint64_t m = n < 0 ? 0 - (uint64_t)n : (uint64_t)n;
     if (m == 0)
         return 0;
@@ -71,16 +64,14 @@ static double number(int64_t n, int e)
 }
 
 /* Between -1 and 1, evenly but for what is below 2^-12. */
-static double unit(struct draw *draw)
-{
+static double unit(struct draw *draw) {
     uint64_t bits = draw_bits(draw), e = EXPONENT_ONE - 1;
     e -= (uint32_t)__builtin_ctzll(bits >> 52 | UINT64_C(1) << 11);
     return double_of((bits & (SIGN | MANTISSA)) | e << 52);
 }
 
 /* Half of the time one or two units in the last place off. */
-static double shaken(struct draw *draw, double x)
-{
+static double shaken(struct draw *draw, double x) {
     static const int by[8] = {0, 0, 0, 0, 1, -1, 2, -2};
     uint64_t bits = bits_of(x);
     int off = by[draw_below(draw, 8)];
@@ -89,14 +80,12 @@ static double shaken(struct draw *draw, double x)
 }
 
 /* -2^(bits-1) .. 2^(bits-1) - 1. */
-static int64_t integer(struct draw *draw, int bits)
-{
+static int64_t integer(struct draw *draw, int bits) {
     return (int64_t)draw_bits(draw) >> (64 - bits);
 }
 
 /* The fourth and fifth of them in the plane of the others. */
-static void plane(struct draw *draw, double p[5][3])
-{
+static void plane(struct draw *draw, double p[5][3]) {
     int64_t n[5][3];
     int bits = 20 + (int)draw_below(draw, 36);
     for (int k = 0; k < 3; k++) {
@@ -115,8 +104,7 @@ static void plane(struct draw *draw, double p[5][3])
 
 /* A vector and the same with other signs, in another order, are equally long.
  */
-static void sphere(struct draw *draw, double p[5][3], bool shake)
-{
+static void sphere(struct draw *draw, double p[5][3], bool shake) {
     int bits =
         shake ? 20 + (int)draw_below(draw, 36) : 2 + (int)draw_below(draw, 24);
     int64_t v[3], center[3];
@@ -138,8 +126,7 @@ static void sphere(struct draw *draw, double p[5][3], bool shake)
 }
 
 /* Corners of a box; now and then a point off them. */
-static void box(struct draw *draw, double p[5][3])
-{
+static void box(struct draw *draw, double p[5][3]) {
     int64_t corner[2][3];
     uint32_t at = draw_below(draw, 8), step = 1 + 2 * draw_below(draw, 4);
     for (int k = 0; k < 3; k++) {
@@ -157,8 +144,7 @@ static void box(struct draw *draw, double p[5][3])
 }
 
 /* x 2^e, where it is neither 0 nor leaves the range. */
-static double moved(double x, int e)
-{
+static double moved(double x, int e) {
     uint64_t bits = bits_of(x);
     int to = (int)(bits >> 52 & 0x7ff) + e;
     if ((bits & ~SIGN) == 0 || to < 1 || to > EXPONENT_MOST)
@@ -168,8 +154,7 @@ static double moved(double x, int e)
 
 /* Where products of two, three or five differences leave the range of doubles,
  * and where the filters say that they might. */
-static void edge(struct draw *draw, double p[5][3])
-{
+static void edge(struct draw *draw, double p[5][3]) {
     static const int16_t ends[8] = {204, 340, 511, -214, -358, -537, 202, -322};
     enum draw_family of = draw_below(draw, DRAW_EDGE - 2);
     int e = ends[draw_below(draw, 8)] + (int)draw_below(draw, 17) - 8;
@@ -178,8 +163,7 @@ static void edge(struct draw *draw, double p[5][3])
         p[i / 3][i % 3] = moved(p[i / 3][i % 3], e);
 }
 
-static double coordinate(struct draw *draw, enum draw_family family)
-{
+static double coordinate(struct draw *draw, enum draw_family family) {
     uint64_t bits;
     switch (family) {
     case DRAW_SPREAD:
@@ -206,8 +190,7 @@ static double coordinate(struct draw *draw, enum draw_family family)
     }
 }
 
-void draw_points(struct draw *draw, enum draw_family family, double p[5][3])
-{
+void draw_points(struct draw *draw, enum draw_family family, double p[5][3]) {
     switch (family) {
     case DRAW_PLANE:
         plane(draw, p);

@@ -3,15 +3,13 @@
 
 #include "talk.h"
 
-static void put(void *context, const char *line)
-{
+static void put(void *context, const char *line) {
     (void)context;
     puts(line);
     fflush(stdout);
 }
 
-int main(void)
-{
+int main(void) {
     char asked[200];
     while (fgets(asked, sizeof asked, stdin) != NULL)
         talk_answer(asked, put, NULL);

@@ -24,20 +24,17 @@ struct record {
     void *context;
 };
 
-static inline struct record record_begin(void)
-{
+static inline struct record record_begin(void) {
     return (struct record){UINT64_C(0x243f6a8885a308d3), NULL, NULL};
 }
 
-static inline uint64_t record_fold(uint64_t digest, uint64_t bits)
-{
+static inline uint64_t record_fold(uint64_t digest, uint64_t bits) {
     digest = (digest ^ bits) * UINT64_C(0x9e3779b97f4a7c15);
     return digest ^ digest >> 32;
 }
 
 static inline uint64_t record_word(struct record *record, const char *name,
-                                   uint64_t bits)
-{
+                                   uint64_t bits) {
     record->digest = record_fold(record->digest, bits);
     if (record->tell != NULL)
         record->tell(record->context, name, bits);
@@ -45,23 +42,20 @@ static inline uint64_t record_word(struct record *record, const char *name,
 }
 
 /* What is not a number has no sign that processors would agree on. */
-static inline uint64_t record_bits(double value)
-{
+static inline uint64_t record_bits(double value) {
     uint64_t bits;
     memcpy(&bits, &value, sizeof bits);
     return bits << 1 > UINT64_C(0x7ff) << 53 ? UINT64_C(0x7ff8) << 48 : bits;
 }
 
 static inline double record_double(struct record *record, const char *name,
-                                   double value)
-{
+                                   double value) {
     record_word(record, name, record_bits(value));
     return value;
 }
 
 static inline float record_float(struct record *record, const char *name,
-                                 float value)
-{
+                                 float value) {
     uint32_t bits;
     memcpy(&bits, &value, sizeof bits);
     bits = bits << 1 > 0x7f800000u << 1 ? 0x7fc00000u : bits;

@@ -2,8 +2,7 @@
 
 #include "incode/predicates/two_product.h"
 
-static void doubles(struct record *r, double a, double b)
-{
+static void doubles(struct record *r, double a, double b) {
     record_double(r, "a", a);
     record_double(r, "b", b);
     record_double(r, "a + b", a + b);
@@ -15,15 +14,13 @@ static void doubles(struct record *r, double a, double b)
 }
 
 /* Each of six, with a number that is none too, as the filters may meet. */
-static uint64_t compared(double a, double b)
-{
+static uint64_t compared(double a, double b) {
     return (uint64_t)(a < b) | (uint64_t)(a <= b) << 1 |
            (uint64_t)(a == b) << 2 | (uint64_t)(a >= b) << 3 |
            (uint64_t)(a > b) << 4 | (uint64_t)(a != b) << 5;
 }
 
-static void comparisons(struct record *r, double a, double b)
-{
+static void comparisons(struct record *r, double a, double b) {
     double zero = a - a, none = a / zero - a / zero;
     record_word(r, "a compared with b", compared(a, b));
     record_word(r, "a compared with a", compared(a, a));
@@ -33,8 +30,7 @@ static void comparisons(struct record *r, double a, double b)
     record_word(r, "a / 0 compared with b", compared(a / zero, b));
 }
 
-static void floats(struct record *r, double a, double b)
-{
+static void floats(struct record *r, double a, double b) {
     float f = record_float(r, "f = a as a float", (float)a);
     float g = record_float(r, "g = b as a float", (float)b);
     record_float(r, "f + g", f + g);
@@ -48,8 +44,7 @@ static void floats(struct record *r, double a, double b)
 }
 
 /* Cut towards zero, within the range of the integers. */
-static void to_integers(struct draw *draw, struct record *r)
-{
+static void to_integers(struct draw *draw, struct record *r) {
     double x = record_double(r, "x", draw_between(draw, -4, 61));
     double y = record_double(r, "y", draw_between(draw, -4, 29));
     record_word(r, "x as 64 bits", (uint64_t)(int64_t)x);
@@ -63,8 +58,7 @@ static void to_integers(struct draw *draw, struct record *r)
     record_word(r, "z as 64 bits", (uint64_t)(int64_t)z);
 }
 
-static void from_integers(struct draw *draw, struct record *r)
-{
+static void from_integers(struct draw *draw, struct record *r) {
     uint64_t n = draw_bits(draw) >> draw_below(draw, 64);
     uint32_t m = (uint32_t)draw_bits(draw) >> draw_below(draw, 32);
     int64_t i = (draw_bits(draw) & 1) != 0 ? -(int64_t)(n >> 1) : (int64_t)n;
@@ -83,8 +77,7 @@ static void from_integers(struct draw *draw, struct record *r)
 
 /* Where nothing leaves the range: then a processor that has a fused product and
  * one that splits its factors have the same bits. */
-static void without_error(struct draw *draw, struct record *r)
-{
+static void without_error(struct draw *draw, struct record *r) {
     double a = record_double(r, "a", draw_between(draw, -200, 200));
     double b = record_double(r, "b", draw_between(draw, -200, 200));
     double c = record_double(r, "c", a * draw_between(draw, -60, 60));
@@ -97,8 +90,7 @@ static void without_error(struct draw *draw, struct record *r)
     record_double(r, "what is left of a + c", error);
 }
 
-void single_case(struct draw *draw, uint32_t number, struct record *r)
-{
+void single_case(struct draw *draw, uint32_t number, struct record *r) {
     double p[5][3], a, b;
     switch (number % 4) {
     case 0: /* any at all */

@@ -14,14 +14,12 @@ struct talk {
     size_t length;
 };
 
-static void add(struct talk *talk, const char *text)
-{
+static void add(struct talk *talk, const char *text) {
     for (; *text != 0 && talk->length < LINE_MAX; text++)
         talk->line[talk->length++] = *text;
 }
 
-static void add_number(struct talk *talk, uint32_t number)
-{
+static void add_number(struct talk *talk, uint32_t number) {
     char digits[11];
     size_t at = sizeof digits - 1;
     digits[at] = 0;
@@ -32,8 +30,7 @@ static void add_number(struct talk *talk, uint32_t number)
     add(talk, digits + at);
 }
 
-static void add_bits(struct talk *talk, uint64_t bits)
-{
+static void add_bits(struct talk *talk, uint64_t bits) {
     char digits[17] = {0};
     for (int i = 15; i >= 0; i--, bits >>= 4)
         digits[i] = "0123456789abcdef"[bits & 15];
@@ -41,16 +38,14 @@ static void add_bits(struct talk *talk, uint64_t bits)
     add(talk, digits);
 }
 
-static void end_line(struct talk *talk)
-{
+static void end_line(struct talk *talk) {
     talk->line[talk->length] = 0;
     talk->length = 0;
     talk->put(talk->context, talk->line);
 }
 
 static void blocks(struct talk *talk, uint32_t first, uint32_t last,
-                   uint32_t step)
-{
+                   uint32_t step) {
     for (uint32_t b = first; b <= last && b < CASES_BLOCKS; b += step) {
         add(talk, "block");
         add_number(talk, b);
@@ -61,8 +56,7 @@ static void blocks(struct talk *talk, uint32_t first, uint32_t last,
     }
 }
 
-static void cases(struct talk *talk, uint32_t block)
-{
+static void cases(struct talk *talk, uint32_t block) {
     for (uint32_t number = 0; number < CASES_PER_BLOCK; number++) {
         struct record record = record_begin();
         cases_case(block, number, &record);
@@ -74,8 +68,7 @@ static void cases(struct talk *talk, uint32_t block)
     }
 }
 
-static void tell_step(void *context, const char *name, uint64_t bits)
-{
+static void tell_step(void *context, const char *name, uint64_t bits) {
     struct talk *talk = context;
     add(talk, "step");
     add_bits(talk, bits);
@@ -84,8 +77,7 @@ static void tell_step(void *context, const char *name, uint64_t bits)
     end_line(talk);
 }
 
-static void steps(struct talk *talk, uint32_t block, uint32_t number)
-{
+static void steps(struct talk *talk, uint32_t block, uint32_t number) {
     struct record record = record_begin();
     record.tell = tell_step;
     record.context = talk;
@@ -93,8 +85,7 @@ static void steps(struct talk *talk, uint32_t block, uint32_t number)
 }
 
 /* Whether the line begins with the word; then *at is behind it. */
-static bool word(const char **at, const char *expected)
-{
+static bool word(const char **at, const char *expected) {
     const char *c = *at;
     for (; *expected != 0; c++, expected++) {
         if (*c != *expected)
@@ -105,8 +96,7 @@ static bool word(const char **at, const char *expected)
 }
 
 /* A number of up to nine digits, 0 where there is none. */
-static uint32_t number(const char **at)
-{
+static uint32_t number(const char **at) {
     uint32_t n = 0;
     while (**at == ' ')
         ++*at;
@@ -116,8 +106,7 @@ static uint32_t number(const char **at)
 }
 
 void talk_answer(const char *asked,
-                 void (*put)(void *context, const char *line), void *context)
-{
+                 void (*put)(void *context, const char *line), void *context) {
     struct talk talk = {.put = put, .context = context};
     const char *at = asked;
     if (word(&at, "blocks")) {

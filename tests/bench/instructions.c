@@ -40,15 +40,13 @@ enum { COUNTS_MAX = 1 << 20 };
 static struct count *counts;
 static unsigned used;
 
-static void once_more(unsigned processor, void *data)
-{
+static void once_more(unsigned processor, void *data) {
     struct count *count = data;
     (void)processor;
     count->times++;
 }
 
-static void new_block(qemu_plugin_id_t id, struct qemu_plugin_tb *block)
-{
+static void new_block(qemu_plugin_id_t id, struct qemu_plugin_tb *block) {
     (void)id;
     if (used < COUNTS_MAX) {
         struct count *count = &counts[used++];
@@ -60,8 +58,7 @@ static void new_block(qemu_plugin_id_t id, struct qemu_plugin_tb *block)
 }
 
 int qemu_plugin_install(qemu_plugin_id_t id, const struct qemu_info *info,
-                        int argc, char **argv)
-{
+                        int argc, char **argv) {
     static const char folder[] = "folder=";
     char path[4096];
     (void)info;

@@ -18,16 +18,14 @@ static struct mpi_place place;
 static struct mpi_pipe pipes[2];
 static struct link *links[2];
 
-static uint64_t now_us(void)
-{
+static uint64_t now_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
 /* A link to `peer`, as port `own` of this rank. */
-static void open_link(unsigned i, int peer, int tag)
-{
+static void open_link(unsigned i, int peer, int tag) {
     struct link_config config = {.epoch = (uint32_t)(place.rank + 1),
                                  .node = (uint16_t)place.rank,
                                  .peer_node = (uint16_t)peer,
@@ -39,8 +37,7 @@ static void open_link(unsigned i, int peer, int tag)
         link_init(aligned_alloc(64, (bytes + 63) / 64 * 64), bytes, &config);
 }
 
-static int poll_links(unsigned count)
-{
+static int poll_links(unsigned count) {
     int moved = 0;
     for (unsigned i = 0; i < count; i++) {
         moved += link_poll(links[i], now_us());
@@ -48,8 +45,7 @@ static int poll_links(unsigned count)
     return moved;
 }
 
-static void rest(unsigned count)
-{
+static void rest(unsigned count) {
     uint64_t wait = 1000000;
     for (unsigned i = 0; i < count; i++) {
         uint64_t due = link_next_due_us(links[i], now_us());
@@ -58,8 +54,7 @@ static void rest(unsigned count)
     mpi_sleep(&place, pipes, count, NULL, wait);
 }
 
-static void put(unsigned i, unsigned count, const void *data, size_t size)
-{
+static void put(unsigned i, unsigned count, const void *data, size_t size) {
     while (link_write(links[i], data, size, NULL, 0) != 0) {
         if (poll_links(count) == 0) {
             rest(count);
@@ -68,8 +63,7 @@ static void put(unsigned i, unsigned count, const void *data, size_t size)
 }
 
 /* The next message of link i, copied. */
-static size_t get(unsigned i, unsigned count, uint8_t *data)
-{
+static size_t get(unsigned i, unsigned count, uint8_t *data) {
     struct link_message message;
     while (!link_read(links[i], &message)) {
         if (poll_links(count) == 0) {
@@ -83,8 +77,7 @@ static size_t get(unsigned i, unsigned count, uint8_t *data)
 }
 
 /* Passes on what comes, both ways, until an empty message has passed. */
-static void pass_on(void)
-{
+static void pass_on(void) {
     static uint8_t data[2][LINK_MESSAGE_MAX];
     struct link_message message;
     bool ending = false;
@@ -106,8 +99,7 @@ static void pass_on(void)
     }
 }
 
-static void first(const char *name, unsigned hops)
-{
+static void first(const char *name, unsigned hops) {
     static uint8_t data[LINK_MESSAGE_MAX];
     put(0, 1, data, 8); /* all links are up once it is back */
     (void)get(0, 1, data);
@@ -137,8 +129,7 @@ static void first(const char *name, unsigned hops)
 }
 
 /* Answers short messages, takes long ones. */
-static void last(void)
-{
+static void last(void) {
     static uint8_t data[LINK_MESSAGE_MAX];
     size_t size;
     while ((size = get(0, 1, data)) != 0) {
@@ -153,8 +144,7 @@ static void last(void)
 }
 
 /* The chain of these ranks, of which this rank is number `at`. */
-static void chain(const char *name, const int *ranks, int count, int tag)
-{
+static void chain(const char *name, const int *ranks, int count, int tag) {
     int at = -1;
     for (int i = 0; i < count; i++) {
         at = ranks[i] == place.rank ? i : at;
@@ -179,8 +169,7 @@ static void chain(const char *name, const int *ranks, int count, int tag)
     }
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     int ranks[MPI_RANKS_MAX] = {0};
     MPI_Init(&argc, &argv);
     if (mpi_place_open(&place) != 0) {

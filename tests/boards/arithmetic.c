@@ -4,8 +4,7 @@
 
 enum { ASKED_MAX = 120, GUARD_US = 60000000, WAIT_US = 10000 };
 
-static void put(void *context, const char *line)
-{
+static void put(void *context, const char *line) {
     (void)context;
     board_feed();
     while (*line != 0)
@@ -14,8 +13,7 @@ static void put(void *context, const char *line)
     (void)board_console_put('\n');
 }
 
-static uint8_t next(struct bare_ring *ring)
-{
+static uint8_t next(struct bare_ring *ring) {
     uint8_t byte;
     while (!bare_ring_take(ring, &byte)) {
         uint32_t before = board_lock();
@@ -27,8 +25,7 @@ static uint8_t next(struct bare_ring *ring)
     return byte;
 }
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     char asked[ASKED_MAX + 1];
     bare_uarts_init();
     board_start();

@@ -13,8 +13,7 @@
 enum { GUARD_US = 3000000, SILENCE_US = 1000000, DEEP = 10000 };
 
 static void say(const char *what, const char *name, uint32_t number,
-                const char *then)
-{
+                const char *then) {
     char room[300];
     struct cube_text text = cube_text_in(room, sizeof room);
     cube_text_put(&text, what);
@@ -27,8 +26,7 @@ static void say(const char *what, const char *name, uint32_t number,
     bare_console_end();
 }
 
-static uint8_t next(void)
-{
+static uint8_t next(void) {
     uint8_t byte = 0;
     while (!bare_ring_take(&bare_uart[0].receive, &byte)) {
         uint32_t before = board_lock();
@@ -42,14 +40,12 @@ static uint8_t next(void)
 }
 
 /* What it puts on the stack must stay there while it calls itself. */
-static uint32_t sink(const volatile uint32_t *deep)
-{
+static uint32_t sink(const volatile uint32_t *deep) {
     volatile uint32_t words[64] = {deep[0] + 1};
     return deep[0] == 0 ? 0 : sink(words) + words[1];
 }
 
-static __attribute__((noinline)) uint32_t use(void)
-{
+static __attribute__((noinline)) uint32_t use(void) {
     volatile uint8_t bytes[DEEP];
     bytes[0] = 1;
     return bytes[0];
@@ -57,15 +53,13 @@ static __attribute__((noinline)) uint32_t use(void)
 
 /* Volatile, so that a compiler takes it for a loop that may end. */
 static volatile bool hanging = true;
-static __attribute__((noinline)) void hang(void)
-{
+static __attribute__((noinline)) void hang(void) {
     while (hanging) {
     }
 }
 
 /* Takes nothing that comes until nothing more does.  clock: for a second. */
-static void be_deaf(void)
-{
+static void be_deaf(void) {
     uint32_t seen = 0;
     uint64_t since_us = board_now_us();
     while (board_now_us() - since_us < SILENCE_US) {
@@ -83,13 +77,11 @@ static void be_deaf(void)
     }
 }
 
-static uint8_t *data_end(void)
-{
+static uint8_t *data_end(void) {
     return (uint8_t *)bare_node_stack + board_facts.data_bytes;
 }
 
-static void obey(uint8_t order)
-{
+static void obey(uint8_t order) {
     static const uint32_t one[] = {1};
     if (order == 'e') { /* the last byte is there, */
         say("last byte ", "", *(volatile uint8_t *)(data_end() - 1) & 0, "");
@@ -119,8 +111,7 @@ static void obey(uint8_t order)
     }
 }
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     uint32_t boot = 0;
     bare_uarts_init();
     board_start();

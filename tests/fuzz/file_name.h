@@ -16,8 +16,7 @@ enum { FILE_NAME_MAX = 32, FILE_NAME_PACKED = 192 };
 
 /* choice: of 256. */
 static inline void file_name(enum host_use use, unsigned choice,
-                             char name[FILE_NAME_MAX])
-{
+                             char name[FILE_NAME_MAX]) {
     char list[HOST_FORMAT_LIST_MAX];
     unsigned count = 1;
     host_format_list(use, list, sizeof list);

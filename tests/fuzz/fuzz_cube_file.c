@@ -20,8 +20,7 @@ const char *__lsan_default_suppressions(void) /* NOLINT */
 /* Names of hosts are looked up nowhere: numbers alone are known here. */
 int getaddrinfo(const char *restrict node, const char *restrict service,
                 const struct addrinfo *restrict hints,
-                struct addrinfo **restrict found)
-{
+                struct addrinfo **restrict found) {
     typedef int look_up(const char *, const char *, const struct addrinfo *,
                         struct addrinfo **);
     struct addrinfo numbers = *hints;
@@ -31,8 +30,7 @@ int getaddrinfo(const char *restrict node, const char *restrict service,
     return system(node, service, &numbers, found);
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct host_cube_file file;
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};

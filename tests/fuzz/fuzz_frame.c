@@ -21,8 +21,7 @@ struct stream {
     size_t sent_size;
 };
 
-static int take(void *context, uint8_t *bytes, size_t size)
-{
+static int take(void *context, uint8_t *bytes, size_t size) {
     struct stream *s = context;
     size_t left = s->end - s->begin;
     size = size < left ? size : left;
@@ -31,8 +30,7 @@ static int take(void *context, uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static int give(void *context, const uint8_t *bytes, size_t size)
-{
+static int give(void *context, const uint8_t *bytes, size_t size) {
     struct stream *s = context;
     s->sent_size = size < sizeof s->sent ? size : sizeof s->sent;
     memcpy(s->sent, bytes, s->sent_size);
@@ -41,8 +39,7 @@ static int give(void *context, const uint8_t *bytes, size_t size)
 
 /* The session that the link put into its last frame tells nothing of the one
  * that it expects: that is computed as PROTOCOL.md says. */
-static uint32_t session(uint32_t epoch, uint32_t to_epoch)
-{
+static uint32_t session(uint32_t epoch, uint32_t to_epoch) {
     uint8_t bytes[12] = {(uint8_t)epoch,
                          (uint8_t)(epoch >> 8),
                          (uint8_t)(epoch >> 16),
@@ -63,8 +60,7 @@ struct input {
     size_t size;
 };
 
-static unsigned next_byte(struct input *in)
-{
+static unsigned next_byte(struct input *in) {
     if (in->size == 0) {
         return 0;
     }
@@ -73,8 +69,7 @@ static unsigned next_byte(struct input *in)
 }
 
 /* A frame with sound checks around bytes of the fuzzer's choice. */
-static void put_frame(struct stream *s, struct input *in, uint32_t epoch)
-{
+static void put_frame(struct stream *s, struct input *in, uint32_t epoch) {
     uint8_t payload[256] = {0};
     struct frame_header h = {.kind = next_byte(in) & 15,
                              .flags = next_byte(in) & 15,
@@ -118,8 +113,7 @@ static void put_frame(struct stream *s, struct input *in, uint32_t epoch)
     s->end += frame_encode(s->bytes + s->end, &h, payload);
 }
 
-static void check_message(const struct link_message *message)
-{
+static void check_message(const struct link_message *message) {
     volatile uint8_t sum = 0;
     LINK_ASSERT(message->size <= 200);
     for (size_t i = 0; i < message->size; i++) {
@@ -127,8 +121,7 @@ static void check_message(const struct link_message *message)
     }
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct stream stream = {.end = 0};
     struct input in = {data, size};
     struct link_config c = {.pipe = {&stream, give, take},

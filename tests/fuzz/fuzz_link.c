@@ -39,8 +39,7 @@ struct script {
     size_t size;
 };
 
-static uint8_t next(struct script *script)
-{
+static uint8_t next(struct script *script) {
     if (script->size == 0) {
         return 0;
     }
@@ -48,8 +47,7 @@ static uint8_t next(struct script *script)
     return *script->bytes++;
 }
 
-static int pipe_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     struct pipe *pipe = ((struct end *)context)->out;
     size_t room = PIPE - pipe->count;
     if (pipe->closed) {
@@ -61,8 +59,7 @@ static int pipe_send(void *context, const uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static int pipe_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct pipe *pipe = ((struct end *)context)->in;
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
@@ -74,13 +71,11 @@ static int pipe_receive(void *context, uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static size_t message_size(uint8_t number)
-{
+static size_t message_size(uint8_t number) {
     return 1 + number * 37u % MESSAGE;
 }
 
-static void write_message(struct end *end)
-{
+static void write_message(struct end *end) {
     uint8_t data[MESSAGE];
     size_t size = message_size(end->sent);
     for (size_t i = 0; i < size; i++) {
@@ -93,8 +88,7 @@ static void write_message(struct end *end)
     }
 }
 
-static void read_messages(struct end *end, bool trusted)
-{
+static void read_messages(struct end *end, bool trusted) {
     struct link_message message;
     while (link_read(end->link, &message)) {
         if (message.size > MESSAGE) {
@@ -114,13 +108,11 @@ static void read_messages(struct end *end, bool trusted)
 
 static const uint8_t news[] = "what is so";
 
-static void tell(struct end *end, bool ask)
-{
+static void tell(struct end *end, bool ask) {
     link_put_datagram(end->link, news, 1 + end->sent % sizeof news, ask);
 }
 
-static void read_datagram(struct end *end, bool trusted)
-{
+static void read_datagram(struct end *end, bool trusted) {
     struct link_message datagram;
     bool ask;
     if (!link_take_datagram(end->link, &datagram, &ask)) {
@@ -134,8 +126,7 @@ static void read_datagram(struct end *end, bool trusted)
 }
 
 static void insert(struct pipe *pipe, size_t at, const uint8_t *bytes,
-                   size_t size)
-{
+                   size_t size) {
     if (pipe->count + size > PIPE) {
         return;
     }
@@ -145,8 +136,7 @@ static void insert(struct pipe *pipe, size_t at, const uint8_t *bytes,
 }
 
 /* A sound frame with fields from the script. */
-static void forge(struct pipe *pipe, struct script *script)
-{
+static void forge(struct pipe *pipe, struct script *script) {
     uint8_t payload[PAYLOAD], frame[FRAME_ENCODED(PAYLOAD) + FRAME_SLACK];
     struct frame_header header = {0};
     header.kind = next(script) % 6;
@@ -162,8 +152,7 @@ static void forge(struct pipe *pipe, struct script *script)
     insert(pipe, pipe->count, frame, frame_encode(frame, &header, payload));
 }
 
-static void spoil(struct pipe *pipe, struct script *script)
-{
+static void spoil(struct pipe *pipe, struct script *script) {
     uint8_t bytes[8] = {0};
     size_t at = pipe->count == 0 ? 0 : next(script) * 16u % pipe->count;
     size_t size = 1 + next(script) % 8u;
@@ -196,8 +185,7 @@ static void spoil(struct pipe *pipe, struct script *script)
 }
 
 static void open_end(struct end *end, struct pipe *out, struct pipe *in,
-                     uint16_t node)
-{
+                     uint16_t node) {
     struct link_config config = {0};
     config.pipe.context = end;
     config.pipe.send = pipe_send;
@@ -219,8 +207,7 @@ static void open_end(struct end *end, struct pipe *out, struct pipe *in,
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static struct end a, b;
     static struct pipe pipes[2];
     struct script script = {data, size};

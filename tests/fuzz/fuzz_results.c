@@ -20,22 +20,19 @@ static struct host_service service;
 static struct host_tetrahedra tets;
 static struct sim_end nowhere;
 
-static void demand(bool holds)
-{
+static void demand(bool holds) {
     if (!holds) {
         abort();
     }
 }
 
-static void told(void *context, const char *line)
-{
+static void told(void *context, const char *line) {
     (void)context;
     demand(strncmp(line, "node 0 link 0: ", 15) == 0);
 }
 
 /* Points and their order, once; a service of one node. */
-static void begin(void)
-{
+static void begin(void) {
     struct host_error error = {0};
     struct cube_config config = {.self = CUBE_HOST, .window = 1, .epoch = 1};
     config.pipes[0] = sim_pipe(&nowhere);
@@ -65,8 +62,7 @@ static void begin(void)
     (void)host_ledger_open(&service.ledger, 0, 0, order.bricks);
 }
 
-static void end(void)
-{
+static void end(void) {
     host_ledger_free(&service.ledger);
     free(service.cube_memory);
     free(service.node);
@@ -76,8 +72,7 @@ static void end(void)
 }
 
 /* Hands the bytes over as messages, their lengths among them. */
-static void take(const uint8_t *data, size_t size)
-{
+static void take(const uint8_t *data, size_t size) {
     uint8_t body[BYTES_MAX];
     while (size > 0) {
         size_t length = (size_t)1 + data[0], head = 8;
@@ -98,8 +93,7 @@ static void take(const uint8_t *data, size_t size)
 }
 
 /* The first byte chooses the format of the output. */
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct host_digest digest;
     struct host_error error = {0};
     if (size == 0) {

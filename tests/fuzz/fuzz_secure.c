@@ -50,8 +50,7 @@ struct end {
 static struct end ends[2];
 static struct end *working; /* whose call it is */
 
-static uint8_t next(struct script *script)
-{
+static uint8_t next(struct script *script) {
     if (script->size == 0) {
         return 0;
     }
@@ -59,8 +58,7 @@ static uint8_t next(struct script *script)
     return *script->bytes++;
 }
 
-static void expect(bool so)
-{
+static void expect(bool so) {
     if (!so) {
         abort();
     }
@@ -70,16 +68,14 @@ static void expect(bool so)
 
 static void x25519(uint8_t out[SECURE_KEY_BYTES],
                    const uint8_t secret[SECURE_KEY_BYTES],
-                   const uint8_t point[SECURE_KEY_BYTES])
-{
+                   const uint8_t point[SECURE_KEY_BYTES]) {
     working->multiplied++;
     secure_sodium.x25519(out, secret, point);
 }
 
 static bool open(uint8_t *out, const uint8_t *in, size_t size,
                  const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
-                 const uint8_t key[SECURE_KEY_BYTES])
-{
+                 const uint8_t key[SECURE_KEY_BYTES]) {
     bool good = secure_sodium.open(out, in, size, ad, counter, key);
     working->vain = good ? 0 : working->vain + size + 1;
     expect(working->vain <= SECURE_LOST_MAX + SECURE_RECORD_MAX + 1);
@@ -89,27 +85,23 @@ static bool open(uint8_t *out, const uint8_t *in, size_t size,
 /* --- pipes -----------------------------------------------------------------
  */
 
-static void put(struct lane *lane, const uint8_t *bytes, size_t size)
-{
+static void put(struct lane *lane, const uint8_t *bytes, size_t size) {
     size = size < LANE - lane->count ? size : LANE - lane->count;
     memmove(lane->bytes + lane->count, bytes, size);
     lane->count += size;
 }
 
-static void take(struct lane *lane, size_t size)
-{
+static void take(struct lane *lane, size_t size) {
     lane->count -= size;
     memmove(lane->bytes, lane->bytes + size, lane->count);
 }
 
-static size_t limit(const struct end *end, size_t size, size_t have)
-{
+static size_t limit(const struct end *end, size_t size, size_t have) {
     size = size < have ? size : have;
     return end->most != 0 && size > end->most ? end->most : size;
 }
 
-static int pipe_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     struct end *end = context;
     size = limit(end, size, LANE - end->said.count);
     put(&end->said, bytes, size);
@@ -119,8 +111,7 @@ static int pipe_send(void *context, const uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static int pipe_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct end *end = context;
     size = limit(end, size, end->hears.count);
     memcpy(bytes, end->hears.bytes, size);
@@ -132,8 +123,7 @@ static int pipe_receive(void *context, uint8_t *bytes, size_t size)
  */
 
 static void open_end(unsigned who, uint8_t salt, uint8_t key_salt,
-                     const struct secure_ends *wire)
-{
+                     const struct secure_ends *wire) {
     static struct secure_suite suite;
     static uint8_t keys[2][SECURE_KEY_BYTES];
     struct secure_self self = {&suite, keys[who], who == 0, *wire};
@@ -150,8 +140,7 @@ static void open_end(unsigned who, uint8_t salt, uint8_t key_salt,
 }
 
 /* It is proven by what the other end has said, to the last byte. */
-static void shake(struct end *end)
-{
+static void shake(struct end *end) {
     const struct end *peer = &ends[end == ends];
     struct link_pipe pipe = {end, pipe_send, pipe_receive};
     if (end->status != 0) {
@@ -170,21 +159,18 @@ static void shake(struct end *end)
 }
 
 /* Its length, and byte i: none is zero, and the first two say the number. */
-static size_t record_size(unsigned number)
-{
+static size_t record_size(unsigned number) {
     return 100 + number * 37 % (RECORD_MAX - 100);
 }
 
-static uint8_t record_byte(unsigned number, size_t i)
-{
+static uint8_t record_byte(unsigned number, size_t i) {
     size_t value = i == 0   ? number % 255
                    : i == 1 ? number / 255
                             : (number * 7 + i) % 255;
     return (uint8_t)(1 + value);
 }
 
-static void say(struct end *end, unsigned number)
-{
+static void say(struct end *end, unsigned number) {
     struct link_pipe pipe = secure_records_pipe(&end->records);
     uint8_t bytes[RECORD_MAX];
     size_t size = record_size(number);
@@ -199,8 +185,7 @@ static void say(struct end *end, unsigned number)
 }
 
 /* One byte more of what the peer has said. */
-static void check(struct end *end, const struct end *peer, uint8_t byte)
-{
+static void check(struct end *end, const struct end *peer, uint8_t byte) {
     if (end->at == 0 && byte == 0) {
         expect(!end->gap);
         end->gap = true;
@@ -229,8 +214,7 @@ static void check(struct end *end, const struct end *peer, uint8_t byte)
 }
 
 /* Whether something was heard. */
-static bool hear(struct end *end, const struct end *peer, size_t size)
-{
+static bool hear(struct end *end, const struct end *peer, size_t size) {
     struct link_pipe pipe = secure_records_pipe(&end->records);
     uint8_t bytes[256];
     working = end;
@@ -248,8 +232,7 @@ static bool hear(struct end *end, const struct end *peer, size_t size)
 /* What both have said in an earlier connection, under the same key. */
 static struct lane earlier[2];
 
-static void pass_on(unsigned who, size_t size)
-{
+static void pass_on(unsigned who, size_t size) {
     struct lane *said = &ends[who].said;
     size = size < said->count ? size : said->count;
     size = size < LANE - ends[1 - who].hears.count
@@ -259,8 +242,7 @@ static void pass_on(unsigned who, size_t size)
     take(said, size);
 }
 
-static void remember(void)
-{
+static void remember(void) {
     static const struct secure_ends wire = {{0, 0}, {0, 0}};
     open_end(0, 200, 1, &wire);
     open_end(1, 201, 1, &wire);
@@ -277,8 +259,7 @@ static void remember(void)
 }
 
 /* To what `who` hears next.  The peer's bytes that it changes come first. */
-static void spoil(unsigned who, struct script *script)
-{
+static void spoil(unsigned who, struct script *script) {
     struct lane *hears = &ends[who].hears;
     uint8_t how = next(script), noise[16];
     size_t size = 1 + (size_t)next(script) * 3, begin = next(script) * 8u;
@@ -312,8 +293,7 @@ static void spoil(unsigned who, struct script *script)
     }
 }
 
-static void step(struct script *script, bool spoils_openings)
-{
+static void step(struct script *script, bool spoils_openings) {
     uint8_t what = next(script);
     unsigned who = what & 1;
     struct end *end = &ends[who], *peer = &ends[1 - who];
@@ -342,8 +322,7 @@ static void step(struct script *script, bool spoils_openings)
 }
 
 /* Without anybody between them. */
-static void leave_alone(void)
-{
+static void leave_alone(void) {
     unsigned said[2] = {0, 0};
     for (unsigned turn = 0;
          turn < TURNS_MAX && said[0] + said[1] < 2 * LAST_RECORDS; turn++) {
@@ -368,8 +347,7 @@ static void leave_alone(void)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct script script = {data, size};
     uint8_t how = next(&script);
     /* 0: both have the key, and the opening passes; 1: and it is spoilt;

@@ -9,23 +9,20 @@ enum { PLACES = 3 };
 
 static uint64_t arena[2048];
 
-static void demand(bool condition)
-{
+static void demand(bool condition) {
     if (!condition) {
         abort();
     }
 }
 
 static int write_message(void *context, uint16_t place, const void *data,
-                         size_t size)
-{
+                         size_t size) {
     (void)context, (void)data;
     demand(place > 0 && place < PLACES && size >= TUPLES_HEADER_BYTES);
     return 0;
 }
 
-static bool run(void *context, struct tuple *tuple)
-{
+static bool run(void *context, struct tuple *tuple) {
     (void)context;
     return tuple->count > 1;
 }
@@ -33,8 +30,7 @@ static bool run(void *context, struct tuple *tuple)
 static tuples_function *const functions[] = {run};
 
 /* Calls of this place, by chance: of one number and some bytes. */
-static void call(struct tuples *space, unsigned which)
-{
+static void call(struct tuples *space, unsigned which) {
     struct tuple t = {.count = 2, .keyed = which & 8};
     t.field[0] = TUPLE_UINT32(which >> 4 & 1);
     t.field[1] = which & 32 ? TUPLE_FORMAL(TUPLE_TYPE_BYTES)
@@ -53,8 +49,7 @@ static void call(struct tuples *space, unsigned which)
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 /* A byte that says how many follow, and from whom; 0: a call. */
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct tuples_config config = {.places = PLACES,
                                    .operations = 4,
                                    .processes = 1,

@@ -8,15 +8,13 @@
 
 static struct routes_altered table[2048];
 
-static void demand(bool condition)
-{
+static void demand(bool condition) {
     if (!condition) {
         abort();
     }
 }
 
-static void route(struct cube_wiring *wiring, unsigned dimension)
-{
+static void route(struct cube_wiring *wiring, unsigned dimension) {
     struct routes routes;
     unsigned nodes = 1u << dimension, from = wiring->generation % nodes;
     demand(routes_bytes(dimension) <= sizeof table);
@@ -40,8 +38,7 @@ struct bytes {
     size_t size;
 };
 
-static int receive(void *context, uint8_t *bytes, size_t size)
-{
+static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bytes *from = context;
     size = size < from->size ? size : from->size;
     for (size_t i = 0; i < size; i++) {
@@ -51,8 +48,7 @@ static int receive(void *context, uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static void learn(const uint8_t *data, size_t size)
-{
+static void learn(const uint8_t *data, size_t size) {
     struct bytes from = {data, size};
     struct link_pipe pipe = {&from, NULL, receive};
     struct learner learner;
@@ -76,8 +72,7 @@ static void learn(const uint8_t *data, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
-{
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct cube_wiring mine = {0}, theirs;
     uint8_t bytes[WIRING_BYTES_MAX];
     learn(data, size);

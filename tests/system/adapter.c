@@ -23,14 +23,12 @@ enum { TURN_MS = 100 };
 
 static volatile sig_atomic_t toggled, ended;
 
-static void toggle(int number)
-{
+static void toggle(int number) {
     (void)number;
     toggled = !toggled;
 }
 
-static void end(int number)
-{
+static void end(int number) {
     (void)number;
     ended = 1;
 }
@@ -38,8 +36,7 @@ static void end(int number)
 /* The far end stays open, so that the port is there without a host. */
 static int port = -1, far = -1;
 
-static bool plug_in(const char *name)
-{
+static bool plug_in(const char *name) {
     struct termios raw;
     port = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     const char *device = port < 0 || grantpt(port) != 0 || unlockpt(port) != 0
@@ -54,16 +51,14 @@ static bool plug_in(const char *name)
     return tcsetattr(far, TCSANOW, &raw) == 0 && symlink(device, name) == 0;
 }
 
-static void pull_out(const char *name)
-{
+static void pull_out(const char *name) {
     (void)unlink(name);
     close(far);
     close(port);
     port = far = -1;
 }
 
-static int call(const char *path)
-{
+static int call(const char *path) {
     struct sockaddr_un there = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
     snprintf(there.sun_path, sizeof there.sun_path, "%s", path);
@@ -73,8 +68,7 @@ static int call(const char *path)
 }
 
 /* What does not fit is lost, as on a wire.  False: there is no more. */
-static bool pass(int from, int to)
-{
+static bool pass(int from, int to) {
     char bytes[4096];
     ssize_t n = read(from, bytes, sizeof bytes), done = 0;
     while (n > 0 && done < n && to >= 0) {
@@ -89,8 +83,7 @@ static bool pass(int from, int to)
     return n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     struct sigaction action[2] = {{.sa_handler = toggle}, {.sa_handler = end}};
     int board = argc == 3 ? call(argv[2]) : -1;
     if (board < 0 || sigaction(SIGUSR1, &action[0], NULL) != 0 ||

@@ -21,16 +21,14 @@
 enum { AGAIN_MS = 3000, DEADLINE_MS = 120000, BYTES_MAX = 65536 };
 
 /* clock: two minutes in all. */
-static int64_t now_ms(void)
-{
+static int64_t now_ms(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
 }
 
 /* The next byte; -1: none has come by then. */
-static int next(int fd, int64_t end_ms)
-{
+static int next(int fd, int64_t end_ms) {
     unsigned char byte;
     struct pollfd ready = {.fd = fd, .events = POLLIN};
     int64_t wait_ms = end_ms - now_ms();
@@ -41,8 +39,7 @@ static int next(int fd, int64_t end_ms)
 }
 
 /* To the beginning of an answer: 00 FF, \r. */
-static bool find_answer(int fd, int64_t end_ms)
-{
+static bool find_answer(int fd, int64_t end_ms) {
     int last[3] = {1, 1, 1}, byte;
     while ((byte = next(fd, end_ms)) >= 0) {
         last[0] = last[1], last[1] = last[2], last[2] = byte;
@@ -54,8 +51,7 @@ static bool find_answer(int fd, int64_t end_ms)
 }
 
 /* Whether the answer is that the board does not know the end of the word. */
-static bool is_torn(const char *text, const char *word)
-{
+static bool is_torn(const char *text, const char *word) {
     static const char unknown[] = ": no such word";
     text += strspn(text, "\n");
     for (const char *tail = word + 1; word[0] != 0 && *tail != 0; tail++) {
@@ -70,8 +66,7 @@ static bool is_torn(const char *text, const char *word)
 
 /* To its end, 00, which frames may come behind; false: it has none in time, or
  * it answers the end of the word. */
-static bool print_answer(int fd, int64_t end_ms, const char *word)
-{
+static bool print_answer(int fd, int64_t end_ms, const char *word) {
     static char text[BYTES_MAX + 1];
     size_t size = 0;
     int byte;
@@ -85,8 +80,7 @@ static bool print_answer(int fd, int64_t end_ms, const char *word)
            fwrite(text, 1, size, stdout) == size;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     char line[100];
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);

@@ -13,8 +13,7 @@
 
 enum { NOISE = 24, EVERY_US = 100000 };
 
-int main(void)
-{
+int main(void) {
     static const char banner[] = "U-Boot 2023.01 \033[2J\r\n";
     uint64_t state = 88172645463325252u;
     struct termios raw;

@@ -23,8 +23,7 @@
 
 enum { CHIP = 16 << 20, IMAGE_MAX = 1 << 20 };
 
-static uint8_t *open_chip(const char *path)
-{
+static uint8_t *open_chip(const char *path) {
     int fd = open(path, O_RDWR | O_CREAT, 0600);
     off_t size = fd < 0 ? -1 : lseek(fd, 0, SEEK_END);
     void *chip = MAP_FAILED;
@@ -41,8 +40,7 @@ static uint8_t *open_chip(const char *path)
     return chip;
 }
 
-static uint32_t read_image(const char *path, uint8_t *bytes)
-{
+static uint32_t read_image(const char *path, uint8_t *bytes) {
     FILE *file = fopen(path, "rb");
     size_t size = file == NULL ? 0 : fread(bytes, 1, IMAGE_MAX, file);
     if (file != NULL) {
@@ -58,8 +56,7 @@ static uint32_t read_image(const char *path, uint8_t *bytes)
 /* Into the slot that is not in use. */
 static bool try_image(const struct loader_flash *flash,
                       struct loader_slots *slots, const uint8_t *bytes,
-                      uint32_t size)
-{
+                      uint32_t size) {
     struct loader_layout layout = loader_layout(flash);
     unsigned slot = slots->state.slot == 0 ? 1 : 0;
     for (uint32_t s = 0; s < layout.sectors; s++) {
@@ -73,8 +70,7 @@ static bool try_image(const struct loader_flash *flash,
 }
 
 /* By their marks in a journal. */
-static unsigned held(const struct loader_flash *flash)
-{
+static unsigned held(const struct loader_flash *flash) {
     struct loader_layout layout = loader_layout(flash);
     unsigned most = 0;
     for (unsigned slot = 0; slot < LOADER_SLOTS; slot++) {
@@ -94,8 +90,7 @@ static unsigned held(const struct loader_flash *flash)
 }
 
 static void tell(const struct loader_flash *flash,
-                 const struct loader_slots *slots)
-{
+                 const struct loader_slots *slots) {
     struct loader_layout layout = loader_layout(flash);
     printf("slot %u%s, tries %u, floor %u\n", slots->state.slot,
            slots->state.trial ? " on trial" : "", slots->state.tries,
@@ -115,8 +110,7 @@ static void tell(const struct loader_flash *flash,
     }
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     static uint8_t bytes[IMAGE_MAX];
     const char *what = argc == 4 ? argv[2] : "";
     if (argc != 2 && argc != 4) {

@@ -18,8 +18,7 @@ struct set {
     uint32_t count;
 };
 
-static void *must(void *memory)
-{
+static void *must(void *memory) {
     if (memory == NULL) {
         perror("points");
         exit(1);
@@ -27,8 +26,7 @@ static void *must(void *memory)
     return memory;
 }
 
-static struct set read_points(FILE *in)
-{
+static struct set read_points(FILE *in) {
     struct set set = {NULL, 0};
     uint32_t capacity = 0;
     double p[3];
@@ -42,14 +40,12 @@ static struct set read_points(FILE *in)
     return set;
 }
 
-static void print_point(const double p[3])
-{
+static void print_point(const double p[3]) {
     printf("%.17g %.17g %.17g\n", p[0], p[1], p[2]);
 }
 
 /* from[new row] = old row, by Fisher and Yates. */
-static uint32_t *permutation(uint32_t count, uint64_t seed)
-{
+static uint32_t *permutation(uint32_t count, uint64_t seed) {
     uint32_t *from = must(malloc((count + 1) * sizeof *from));
     uint64_t state = seed * 0x9e3779b97f4a7c15u + 0x2545f4914f6cdd1du;
     for (uint32_t i = 0; i < count; i++) {
@@ -68,8 +64,7 @@ static uint32_t *permutation(uint32_t count, uint64_t seed)
 }
 
 /* By the angles of cosines 3/5 and 5/13, about z and then about x. */
-static void rotate(double p[3])
-{
+static void rotate(double p[3]) {
     double x = (3.0 * p[0] - 4.0 * p[1]) / 5.0;
     double y = (4.0 * p[0] + 3.0 * p[1]) / 5.0;
     p[0] = x;
@@ -79,8 +74,7 @@ static void rotate(double p[3])
 
 static const struct set *compared;
 
-static int by_point(const void *a, const void *b)
-{
+static int by_point(const void *a, const void *b) {
     uint32_t i = *(const uint32_t *)a, j = *(const uint32_t *)b;
     for (int d = 0; d < 3; d++) {
         double x = compared->p[i][d], y = compared->p[j][d];
@@ -92,8 +86,7 @@ static int by_point(const void *a, const void *b)
 }
 
 /* lowest[row] = lowest row with the same point. */
-static uint32_t *lowest_rows(const struct set *set)
-{
+static uint32_t *lowest_rows(const struct set *set) {
     uint32_t *rows = permutation(set->count, 0);
     uint32_t *lowest = must(malloc((set->count + 1) * sizeof *lowest));
     compared = set;
@@ -111,8 +104,7 @@ static uint32_t *lowest_rows(const struct set *set)
 }
 
 /* An .ele numbered from 0, its vertices mapped; comments are dropped. */
-static int unshuffle(const struct set *set, const uint32_t *from)
-{
+static int unshuffle(const struct set *set, const uint32_t *from) {
     uint32_t *lowest = lowest_rows(set);
     unsigned long rows = 0, row, v[4];
     int done = scanf("%lu %*[^\n]", &rows) == 1;
@@ -131,8 +123,7 @@ static int unshuffle(const struct set *set, const uint32_t *from)
     return done ? 0 : 1;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     const char *verb = argc > 1 ? argv[1] : "";
     long argument = argc > 2 ? strtol(argv[2], NULL, 10) : 0;
     FILE *in = argc > 3 ? fopen(argv[3], "r") : stdin;

@@ -10,8 +10,7 @@
 
 #include "host/lines/lines.h"
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     struct host_cube_file file;
     struct host_lines lines;
     struct host_error error = {0};

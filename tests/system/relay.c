@@ -24,20 +24,17 @@
 
 static volatile sig_atomic_t ended;
 
-static void end(int number)
-{
+static void end(int number) {
     (void)number;
     ended = 1;
 }
 
-static int complain(const char *text)
-{
+static int complain(const char *text) {
     fprintf(stderr, "relay: %s: %s\n", text, strerror(errno));
     return 1;
 }
 
-static int relay_network(int argc, char **argv)
-{
+static int relay_network(int argc, char **argv) {
     struct network_settings settings = {
         strtoull(argv[1], NULL, 10), strtoull(argv[2], NULL, 10),
         strtoull(argv[3], NULL, 10), strtoull(argv[4], NULL, 10)};
@@ -56,8 +53,7 @@ static int relay_network(int argc, char **argv)
 
 /* --- UARTs ---------------------------------------------------------------- */
 
-static bool set_uart(struct uart_settings *settings, const char *text)
-{
+static bool set_uart(struct uart_settings *settings, const char *text) {
     unsigned long long value = 0;
     char name[8];
     if (sscanf(text, "%7[a-z]=%llu", name, &value) != 2 || value > UINT32_MAX) {
@@ -84,8 +80,7 @@ static bool set_uart(struct uart_settings *settings, const char *text)
     return false;
 }
 
-static void print_uarts(const struct uart_counts *c)
-{
+static void print_uarts(const struct uart_counts *c) {
     printf("%llu bytes, %llu flips, %llu drops, %llu bursts of %llu bytes, "
            "%llu overruns, %llu unheard, %llu connections\n",
            (unsigned long long)c->bytes, (unsigned long long)c->flips,
@@ -94,8 +89,7 @@ static void print_uarts(const struct uart_counts *c)
            (unsigned long long)c->unheard, (unsigned long long)c->connections);
 }
 
-static int relay_uarts(char **argv)
-{
+static int relay_uarts(char **argv) {
     static struct uart_wires wires;
     struct uart_settings settings = {.seed = 1, .baud = 115200};
     for (; *argv != NULL && set_uart(&settings, *argv); argv++) {
@@ -116,8 +110,7 @@ static int relay_uarts(char **argv)
     return 0;
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     bool uarts = argc >= 3 && strcmp(argv[1], "uart") == 0;
     if (!uarts && argc < 6) {
         fprintf(stderr, "usage: relay SEED BYTES_A_FAULT MS_A_CLOSE DELAY_MS "

@@ -15,8 +15,7 @@
 enum { ANSWER_MS = 60000 };
 
 /* Reads until a text has come; clock: a minute at most between two bytes. */
-static bool hears(int fd, const char *text)
-{
+static bool hears(int fd, const char *text) {
     static char said[4096];
     size_t size = 0;
     struct pollfd wait = {fd, POLLIN, 0};
@@ -33,15 +32,13 @@ static bool hears(int fd, const char *text)
     return false;
 }
 
-static bool says(int fd, const char *command)
-{
+static bool says(int fd, const char *command) {
     char line[100];
     int size = snprintf(line, sizeof line, "{\"execute\": \"%s\"}\n", command);
     return write(fd, line, (size_t)size) == size && hears(fd, "\"return\"");
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     struct sockaddr_un there = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM, 0);
     if (argc != 2 || strlen(argv[1]) >= sizeof there.sun_path) {

@@ -72,20 +72,17 @@ static struct {
 
 static volatile sig_atomic_t ended;
 
-static void end(int number)
-{
+static void end(int number) {
     (void)number;
     ended = 1;
 }
 
-static uint64_t draw(uint64_t below)
-{
+static uint64_t draw(uint64_t below) {
     all.random = all.random * 6364136223846793005u + 1442695040888963407u;
     return (all.random >> 33) % below;
 }
 
-static uint64_t now_us(void)
-{
+static uint64_t now_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now); /* clock: when it calls next */
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
@@ -93,8 +90,7 @@ static uint64_t now_us(void)
 
 /* --- who listens where ---------------------------------------------------- */
 
-static bool is_ours(pid_t pid)
-{
+static bool is_ours(pid_t pid) {
     for (unsigned i = 0; i < all.processes; i++) {
         if (all.process[i] == pid) {
             return true;
@@ -103,8 +99,7 @@ static bool is_ours(pid_t pid)
     return false;
 }
 
-static pid_t parent_of(const char *pid)
-{
+static pid_t parent_of(const char *pid) {
     char path[64], text[512] = "";
     int parent = 0;
     snprintf(path, sizeof path, "/proc/%.16s/stat", pid);
@@ -123,8 +118,7 @@ static pid_t parent_of(const char *pid)
 }
 
 /* All processes below the first, but this one. */
-static void find_processes(void)
-{
+static void find_processes(void) {
     all.processes = 1;
     for (bool more = true; more;) {
         DIR *directory = opendir("/proc");
@@ -145,8 +139,7 @@ static void find_processes(void)
     }
 }
 
-static void find_sockets(void)
-{
+static void find_sockets(void) {
     all.sockets = 0;
     for (unsigned i = 0; i < all.processes; i++) {
         char path[64];
@@ -169,8 +162,7 @@ static void find_sockets(void)
     }
 }
 
-static bool has_socket(unsigned long inode)
-{
+static bool has_socket(unsigned long inode) {
     for (unsigned i = 0; i < all.sockets; i++) {
         if (all.socket[i] == inode) {
             return true;
@@ -179,8 +171,7 @@ static bool has_socket(unsigned long inode)
     return false;
 }
 
-static void add_target(const struct target *target)
-{
+static void add_target(const struct target *target) {
     for (unsigned i = 0; i < all.targets; i++) {
         if (all.target[i].size == target->size &&
             memcmp(&all.target[i].address, &target->address, target->size) ==
@@ -195,8 +186,7 @@ static void add_target(const struct target *target)
 
 /* A line of /proc/net/tcp or tcp6: number, address:port in hexadecimal, peer,
  * state (0A: listens), ..., inode. */
-static void look_at_tcp(const char *line)
-{
+static void look_at_tcp(const char *line) {
     char address[64];
     unsigned port, state;
     unsigned long inode;
@@ -221,8 +211,7 @@ static void look_at_tcp(const char *line)
 
 /* One of /proc/net/unix: address, count, protocol, flags (bit 16: listens),
  * type, state, inode, path (@: of no file). */
-static void look_at_unix(const char *line)
-{
+static void look_at_unix(const char *line) {
     struct target t = {0};
     char path[sizeof t.address.un.sun_path + 1] = "";
     unsigned flags, type;
@@ -243,8 +232,7 @@ static void look_at_unix(const char *line)
     add_target(&t);
 }
 
-static void look_into(const char *path, void (*look)(const char *line))
-{
+static void look_into(const char *path, void (*look)(const char *line)) {
     char line[512];
     FILE *file = fopen(path, "re");
     while (file != NULL && fgets(line, sizeof line, file) != NULL) {
@@ -255,8 +243,7 @@ static void look_into(const char *path, void (*look)(const char *line))
     }
 }
 
-static void look(void)
-{
+static void look(void) {
     find_processes();
     find_sockets();
     look_into("/proc/net/tcp", look_at_tcp);
@@ -267,13 +254,11 @@ static void look(void)
 /* --- what it says ----------------------------------------------------------
  */
 
-static void say(const struct call *c, const void *bytes, size_t size)
-{
+static void say(const struct call *c, const void *bytes, size_t size) {
     (void)!send(c->fd, bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-static void speak(struct call *c)
-{
+static void speak(struct call *c) {
     static const uint8_t greeting[] = {'i', 'n', 'c', 'o', 'd', 'e', 's'};
     uint8_t bytes[BYTES_MAX] = {0};
     size_t size = 1 + draw(sizeof bytes);
@@ -294,14 +279,12 @@ static void speak(struct call *c)
     c->spoke = true;
 }
 
-static void hang_up(struct call *c)
-{
+static void hang_up(struct call *c) {
     close(c->fd);
     c->fd = -1;
 }
 
-static void hear(struct call *c)
-{
+static void hear(struct call *c) {
     uint8_t bytes[BYTES_MAX];
     ssize_t got = recv(c->fd, bytes, sizeof bytes, MSG_DONTWAIT);
     if (got == 0 || (got < 0 && errno != EAGAIN)) {
@@ -317,8 +300,7 @@ static void hear(struct call *c)
     }
 }
 
-static bool connect_as_nobody(int fd, const struct target *t)
-{
+static bool connect_as_nobody(int fd, const struct target *t) {
     bool root = geteuid() == 0;
     if (root && seteuid(NOBODY) != 0) {
         return false;
@@ -329,15 +311,13 @@ static bool connect_as_nobody(int fd, const struct target *t)
 }
 
 /* Who is of the same user may say on a unix socket what a neighbour says. */
-static enum manner draw_manner(const struct target *t)
-{
+static enum manner draw_manner(const struct target *t) {
     enum manner manner = (enum manner)draw(MANNERS);
     bool allowed = t->address.any.sa_family == AF_UNIX && geteuid() != 0;
     return allowed && (manner == ECHO || manner == REPLAY) ? SILENT : manner;
 }
 
-static void call_one(void)
-{
+static void call_one(void) {
     const struct target *t = &all.target[draw(all.targets)];
     struct call *c = &all.call[draw(CALLS_MAX)];
     if (c->fd >= 0) {
@@ -363,8 +343,7 @@ static void call_one(void)
     c->end_us = now_us() + draw(2000000);
 }
 
-static void serve(struct call *c)
-{
+static void serve(struct call *c) {
     struct pollfd p = {c->fd, POLLIN | (c->spoke ? 0 : POLLOUT), 0};
     if (poll(&p, 1, 0) <= 0) {
         p.revents = 0;
@@ -380,8 +359,7 @@ static void serve(struct call *c)
     }
 }
 
-static void run(void)
-{
+static void run(void) {
     uint64_t next_us = 0;
     while (!ended) {
         if (now_us() >= next_us) {
@@ -400,8 +378,7 @@ static void run(void)
     }
 }
 
-static void print_target(const struct target *t)
-{
+static void print_target(const struct target *t) {
     const char *path = t->address.un.sun_path;
     if (t->address.any.sa_family != AF_UNIX) {
         printf("tcp %u\n", ntohs(t->address.in.sin_port)); /* as sin6_port */
@@ -411,8 +388,7 @@ static void print_target(const struct target *t)
     }
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     if (argc != 3) {
         fprintf(stderr, "usage: stranger SEED PID\n");
         return 2;

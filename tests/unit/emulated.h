@@ -20,8 +20,7 @@ enum { SANITIZED = 0 };
 #endif
 
 /* Valgrind has its own library loaded first into every program. */
-static inline bool emulated(void)
-{
+static inline bool emulated(void) {
     const char *preload = getenv("LD_PRELOAD");
     return preload != NULL && strstr(preload, "vgpreload") != NULL;
 }

@@ -32,29 +32,26 @@ struct reference {
     struct incode_tally tally;
 };
 
-static inline const double *reference_at(const struct reference *r, uint32_t v)
-{
+static inline const double *reference_at(const struct reference *r,
+                                         uint32_t v) {
     return r->xyz + 3 * (size_t)v;
 }
 
-static inline void reference_check(bool holds, const char *what)
-{
+static inline void reference_check(bool holds, const char *what) {
     if (!holds) {
         fprintf(stderr, "reference: %s\n", what);
         abort();
     }
 }
 
-static inline uint64_t reference_hash(const uint32_t f[3])
-{
+static inline uint64_t reference_hash(const uint32_t f[3]) {
     uint64_t h = (uint64_t)f[0] + f[1] + f[2];
     h = h << 40 ^ ((uint64_t)f[0] ^ f[1] ^ f[2]) << 20 ^
         (uint64_t)f[0] * f[1] * f[2];
     return h * UINT64_C(0x9e3779b97f4a7c15) >> 40;
 }
 
-static inline bool reference_same(const uint32_t f[3], const uint32_t g[3])
-{
+static inline bool reference_same(const uint32_t f[3], const uint32_t g[3]) {
     for (int i = 0; i < 3; i++) {
         if (f[i] != g[0] && f[i] != g[1] && f[i] != g[2]) {
             return false;
@@ -64,8 +61,7 @@ static inline bool reference_same(const uint32_t f[3], const uint32_t g[3])
 }
 
 /* Enters an open face, or takes out its twin. */
-static inline void reference_toggle(struct reference *r, const uint32_t f[3])
-{
+static inline void reference_toggle(struct reference *r, const uint32_t f[3]) {
     size_t i = reference_hash(f) % REFERENCE_FACES;
     for (;; i = (i + 1) % REFERENCE_FACES) {
         uint32_t *g = r->face[i];
@@ -82,8 +78,7 @@ static inline void reference_toggle(struct reference *r, const uint32_t f[3])
     }
 }
 
-static inline bool reference_is_open(struct reference *r, const uint32_t f[3])
-{
+static inline bool reference_is_open(struct reference *r, const uint32_t f[3]) {
     size_t i = reference_hash(f) % REFERENCE_FACES;
     for (;; i = (i + 1) % REFERENCE_FACES) {
         uint32_t *g = r->face[i];
@@ -99,8 +94,7 @@ static inline bool reference_is_open(struct reference *r, const uint32_t f[3])
 
 /* The apex on the face's outer side, or false on the hull. */
 static inline bool reference_apex(struct reference *r, const uint32_t f[3],
-                                  uint32_t *apex)
-{
+                                  uint32_t *apex) {
     const double *a = reference_at(r, f[0]), *b = reference_at(r, f[1]),
                  *c = reference_at(r, f[2]);
     bool any = false;
@@ -121,8 +115,7 @@ static inline bool reference_apex(struct reference *r, const uint32_t f[3],
 
 static inline void reference_add(struct reference *r,
                                  struct host_tetrahedra *tets,
-                                 const uint32_t t[4])
-{
+                                 const uint32_t t[4]) {
     struct host_error error = {0};
     uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, &error);
     reference_check(row != NULL, "no memory");
@@ -136,8 +129,7 @@ static inline void reference_add(struct reference *r,
 }
 
 /* A point, its nearest, and whatever two points make their sphere empty. */
-static inline void reference_start(struct reference *r, uint32_t t[4])
-{
+static inline void reference_start(struct reference *r, uint32_t t[4]) {
     uint32_t a = 0, b = UINT32_MAX;
     for (uint32_t p = 1; p < r->n; p++) {
         if (r->distinct[p] != 0 &&
@@ -172,8 +164,7 @@ static inline void reference_start(struct reference *r, uint32_t t[4])
 
 /* Appends the tetrahedra of n points, which must span the space. */
 static inline void reference_delaunay(const double *xyz, uint32_t n,
-                                      struct host_tetrahedra *tets)
-{
+                                      struct host_tetrahedra *tets) {
     struct reference r = {.xyz = xyz, .n = n};
     r.distinct = malloc(n);
     r.face = calloc(REFERENCE_FACES, sizeof *r.face);
@@ -206,8 +197,8 @@ static inline void reference_delaunay(const double *xyz, uint32_t n,
 }
 
 /* Reads a set of the shared data; false where it is not there. */
-static inline bool reference_data(const char *name, struct host_points *points)
-{
+static inline bool reference_data(const char *name,
+                                  struct host_points *points) {
     const char *folder = getenv("INCODE_DATA");
     char path[512];
     struct host_error error = {0};

@@ -14,8 +14,7 @@
 enum { DIGITS = 2 * SECURE_KEY_BYTES, TEXT = KEY_FILE_MARK_MAX + DIGITS };
 
 /* As many as there are, up to size; -1 and errno. */
-static ssize_t read_all(int fd, char *text, size_t size)
-{
+static ssize_t read_all(int fd, char *text, size_t size) {
     size_t have = 0;
     ssize_t got = 1;
     while (have < size && got > 0) {
@@ -25,8 +24,7 @@ static ssize_t read_all(int fd, char *text, size_t size)
     return got < 0 ? -1 : (ssize_t)have;
 }
 
-static bool read_digits(const char text[DIGITS], uint8_t *key)
-{
+static bool read_digits(const char text[DIGITS], uint8_t *key) {
     static const char digits[] = "0123456789abcdef";
     for (unsigned i = 0; i < DIGITS; i++) {
         const char *at = memchr(digits, text[i], sizeof digits - 1);
@@ -40,15 +38,13 @@ static bool read_digits(const char text[DIGITS], uint8_t *key)
 
 /* A key that is in memory is not to come to a disk with a core, nor to another
  * program of the user's. */
-static void forbid_dumps(void)
-{
+static void forbid_dumps(void) {
     const struct rlimit none = {0, 0};
     (void)setrlimit(RLIMIT_CORE, &none);
     (void)prctl(PR_SET_DUMPABLE, 0);
 }
 
-static enum key_file_state read_key(int fd, const char *mark, uint8_t *key)
-{
+static enum key_file_state read_key(int fd, const char *mark, uint8_t *key) {
     struct stat about;
     char text[TEXT];
     size_t before = strlen(mark);
@@ -82,8 +78,7 @@ static enum key_file_state read_key(int fd, const char *mark, uint8_t *key)
 }
 
 enum key_file_state key_file_read_marked(const char *path, const char *mark,
-                                         uint8_t *key)
-{
+                                         uint8_t *key) {
     forbid_dumps();
     /* A pipe's other end is not waited for. */
     int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
@@ -100,13 +95,11 @@ enum key_file_state key_file_read_marked(const char *path, const char *mark,
     return state;
 }
 
-enum key_file_state key_file_read(const char *path, uint8_t *key)
-{
+enum key_file_state key_file_read(const char *path, uint8_t *key) {
     return key_file_read_marked(path, "", key);
 }
 
-struct key_file_text key_file_text(enum key_file_state state)
-{
+struct key_file_text key_file_text(enum key_file_state state) {
     static const struct key_file_text texts[] = {
         [KEY_FILE_SEEN] = {"can be read by others, who can join the cube then",
                            "chmod 600 it"},

@@ -18,8 +18,7 @@
 bool opal_progress_set_yield_when_idle(bool yield) __attribute__((weak));
 
 /* The words of the ranks that share this machine's memory. */
-static void share_words(struct mpi_place *place)
-{
+static void share_words(struct mpi_place *place) {
     MPI_Group all, local;
     int count = 0, rank = 0;
     void *own = NULL;
@@ -55,8 +54,7 @@ static void share_words(struct mpi_place *place)
     MPI_Barrier(place->local); /* nobody rings before the words are zero */
 }
 
-int mpi_place_open(struct mpi_place *place)
-{
+int mpi_place_open(struct mpi_place *place) {
     memset(place, 0, sizeof *place);
     MPI_Comm_dup(MPI_COMM_WORLD, &place->comm);
     MPI_Comm_rank(place->comm, &place->rank);
@@ -71,8 +69,7 @@ int mpi_place_open(struct mpi_place *place)
     return 0;
 }
 
-void mpi_place_close(struct mpi_place *place)
-{
+void mpi_place_close(struct mpi_place *place) {
     if (place->yields) {
         (void)opal_progress_set_yield_when_idle(true);
     }
@@ -83,15 +80,13 @@ void mpi_place_close(struct mpi_place *place)
 
 /* --- sleep ---------------------------------------------------------------- */
 
-static uint64_t now_us(void)
-{
+static uint64_t now_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-void mpi_ring(struct mpi_place *place, int rank)
-{
+void mpi_ring(struct mpi_place *place, int rank) {
     _Atomic uint32_t *bell = place->bell[rank];
     if (bell == NULL) {
         return;
@@ -105,28 +100,24 @@ void mpi_ring(struct mpi_place *place, int rank)
     }
 }
 
-static bool done(MPI_Request request)
-{
+static bool done(MPI_Request request) {
     int flag = 0;
     MPI_Request_get_status(request, &flag, MPI_STATUS_IGNORE);
     return flag != 0;
 }
 
-static unsigned slot_of(uint32_t message)
-{
+static unsigned slot_of(uint32_t message) {
     return message % MPI_PIPE_SLOTS;
 }
 
 /* Whether the caller has something to do with this pipe. */
-static bool ready(struct mpi_pipe *pipe)
-{
+static bool ready(struct mpi_pipe *pipe) {
     return pipe->in_size >= 0 || done(pipe->in[slot_of(pipe->taken)]) ||
            (pipe->blocked && done(pipe->out[slot_of(pipe->sent)]));
 }
 
 /* A peer that was rung before the message was there sleeps again. */
-static void settle(struct mpi_pipe *pipe)
-{
+static void settle(struct mpi_pipe *pipe) {
     if (pipe->pending && done(pipe->out[slot_of(pipe->sent - 1)])) {
         pipe->pending = false;
         mpi_ring(pipe->place, pipe->peer);
@@ -134,8 +125,7 @@ static void settle(struct mpi_pipe *pipe)
 }
 
 void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
-               MPI_Request *request, uint64_t wait_us)
-{
+               MPI_Request *request, uint64_t wait_us) {
     uint64_t start = now_us(), passed = 0;
     _Atomic uint32_t *bell = place->bell[place->rank];
     while (passed < wait_us) {
@@ -169,16 +159,14 @@ void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
 
 /* --- the pipe ------------------------------------------------------------- */
 
-static void expect(struct mpi_pipe *pipe, uint32_t message)
-{
+static void expect(struct mpi_pipe *pipe, uint32_t message) {
     unsigned slot = slot_of(message);
     MPI_Irecv(pipe->in_bytes[slot], MPI_PIPE_BYTES, MPI_BYTE, pipe->peer,
               pipe->tag, pipe->place->comm, &pipe->in[slot]);
 }
 
 void mpi_pipe_open(struct mpi_pipe *pipe, struct mpi_place *place, int peer,
-                   int tag)
-{
+                   int tag) {
     memset(pipe, 0, offsetof(struct mpi_pipe, out_bytes));
     pipe->place = place;
     pipe->peer = peer;
@@ -190,8 +178,7 @@ void mpi_pipe_open(struct mpi_pipe *pipe, struct mpi_place *place, int peer,
     }
 }
 
-static int mpi_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int mpi_send(void *context, const uint8_t *bytes, size_t size) {
     struct mpi_pipe *pipe = context;
     size_t sent = 0;
     if (pipe->closed) {
@@ -222,8 +209,7 @@ static int mpi_send(void *context, const uint8_t *bytes, size_t size)
     return (int)sent;
 }
 
-static int mpi_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int mpi_receive(void *context, uint8_t *bytes, size_t size) {
     struct mpi_pipe *pipe = context;
     size_t got = 0;
     if (pipe->closed) {
@@ -262,8 +248,7 @@ static int mpi_receive(void *context, uint8_t *bytes, size_t size)
     return (int)got;
 }
 
-void mpi_pipe_end(struct mpi_pipe *pipe)
-{
+void mpi_pipe_end(struct mpi_pipe *pipe) {
     MPI_Request *request = &pipe->out[slot_of(pipe->sent)];
     int complete = 0;
     MPI_Test(request, &complete, MPI_STATUS_IGNORE);
@@ -275,8 +260,7 @@ void mpi_pipe_end(struct mpi_pipe *pipe)
     }
 }
 
-struct link_pipe mpi_link_pipe(struct mpi_pipe *pipe)
-{
+struct link_pipe mpi_link_pipe(struct mpi_pipe *pipe) {
     return (struct link_pipe){pipe, mpi_send, mpi_receive};
 }
 
@@ -284,8 +268,7 @@ struct link_pipe mpi_link_pipe(struct mpi_pipe *pipe)
 
 /* Drops what still comes, so that all that the peer sent gets complete.
  * Whether all that was sent from here is. */
-static bool drain(struct mpi_pipe *pipe)
-{
+static bool drain(struct mpi_pipe *pipe) {
     uint8_t bytes[256];
     int complete = 0;
     for (unsigned i = 0; i < MPI_PIPE_SLOTS * MPI_PIPE_BYTES / sizeof bytes &&
@@ -296,8 +279,7 @@ static bool drain(struct mpi_pipe *pipe)
     return complete != 0;
 }
 
-static void close_pipe(struct mpi_pipe *pipe)
-{
+static void close_pipe(struct mpi_pipe *pipe) {
     for (unsigned i = 0; i < MPI_PIPE_SLOTS; i++) {
         if (pipe->in[i] != MPI_REQUEST_NULL) {
             MPI_Cancel(&pipe->in[i]);
@@ -308,8 +290,7 @@ static void close_pipe(struct mpi_pipe *pipe)
 }
 
 bool mpi_place_part(struct mpi_place *place, struct mpi_pipe *pipes,
-                    unsigned count, uint64_t wait_us)
-{
+                    unsigned count, uint64_t wait_us) {
     uint64_t start = now_us();
     MPI_Request all = MPI_REQUEST_NULL;
     bool sent = false;

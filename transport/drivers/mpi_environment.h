@@ -12,8 +12,7 @@
 
 #include <stdlib.h>
 
-static inline void mpi_environment(void)
-{
+static inline void mpi_environment(void) {
     (void)setenv("HWLOC_COMPONENTS", "-gl", 0);
     (void)setenv("HWLOC_HIDE_ERRORS", "2", 0);
 }

@@ -12,8 +12,7 @@
 
 /* --- the pipe ------------------------------------------------------------ */
 
-static uint64_t clock_us(void)
-{
+static uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
@@ -21,8 +20,7 @@ static uint64_t clock_us(void)
 
 /* Ten bits a byte: the wire sends baud / 10 bytes a second, which is as many
  * millionths of a byte a microsecond. */
-static void drain_by_clock(struct serial_pipe *pipe)
-{
+static void drain_by_clock(struct serial_pipe *pipe) {
     uint64_t now_us = pipe->now_us(), gone = now_us - pipe->ahead_us;
     gone = (gone > 1000000 ? 1000000 : gone) * pipe->baud / 10;
     pipe->ahead_us = now_us;
@@ -32,15 +30,13 @@ static void drain_by_clock(struct serial_pipe *pipe)
 
 /* Bytes that may be ahead of the wire: a process that sleeps needs some time to
  * wake. */
-static size_t ahead_most(const struct serial_pipe *pipe)
-{
+static size_t ahead_most(const struct serial_pipe *pipe) {
     size_t bytes = (size_t)((uint64_t)pipe->baud * SERIAL_AHEAD_US / 10000000);
     return bytes > SERIAL_AHEAD_BYTES ? bytes : SERIAL_AHEAD_BYTES;
 }
 
 /* Bytes that may be given to the kernel now. */
-static size_t room(struct serial_pipe *pipe)
-{
+static size_t room(struct serial_pipe *pipe) {
     size_t ahead = 0;
     int queued = 0;
     if (pipe->baud != 0) {
@@ -56,15 +52,13 @@ static size_t room(struct serial_pipe *pipe)
 }
 
 /* Bytes moved, 0 for the present, or closed. */
-static int result(struct serial_pipe *pipe, ssize_t moved)
-{
+static int result(struct serial_pipe *pipe, ssize_t moved) {
     pipe->closed =
         moved < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR;
     return pipe->closed ? LINK_PIPE_CLOSED : moved < 0 ? 0 : (int)moved;
 }
 
-static int serial_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int serial_send(void *context, const uint8_t *bytes, size_t size) {
     struct serial_pipe *pipe = context;
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
@@ -84,8 +78,7 @@ static int serial_send(void *context, const uint8_t *bytes, size_t size)
     return taken;
 }
 
-static int serial_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int serial_receive(void *context, uint8_t *bytes, size_t size) {
     struct serial_pipe *pipe = context;
     if (pipe->closed && pipe->recover != NULL) {
         pipe->recover(pipe->context);
@@ -106,8 +99,7 @@ static int serial_receive(void *context, uint8_t *bytes, size_t size)
     return result(pipe, got);
 }
 
-void serial_pipe_init(struct serial_pipe *pipe, int fd, uint32_t baud)
-{
+void serial_pipe_init(struct serial_pipe *pipe, int fd, uint32_t baud) {
     memset(pipe, 0, sizeof *pipe);
     pipe->fd = fd;
     pipe->baud = baud;
@@ -117,21 +109,18 @@ void serial_pipe_init(struct serial_pipe *pipe, int fd, uint32_t baud)
     pipe->counts = isatty(fd) == 1;
 }
 
-struct link_pipe serial_link_pipe(struct serial_pipe *pipe)
-{
+struct link_pipe serial_link_pipe(struct serial_pipe *pipe) {
     return (struct link_pipe){pipe, serial_send, serial_receive};
 }
 
-short serial_events(const struct serial_pipe *pipe)
-{
+short serial_events(const struct serial_pipe *pipe) {
     if (pipe->closed) {
         return 0;
     }
     return pipe->blocked && pipe->baud == 0 ? POLLIN | POLLOUT : POLLIN;
 }
 
-uint64_t serial_wait_us(const struct serial_pipe *pipe)
-{
+uint64_t serial_wait_us(const struct serial_pipe *pipe) {
     if (pipe->closed || !pipe->blocked || pipe->baud == 0) {
         return UINT64_MAX;
     }
@@ -141,8 +130,7 @@ uint64_t serial_wait_us(const struct serial_pipe *pipe)
 
 /* --- terminals ----------------------------------------------------------- */
 
-int serial_raw(int fd)
-{
+int serial_raw(int fd) {
     struct termios t;
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 ||
@@ -170,8 +158,7 @@ static const struct {
               {1500000, B1500000}, {2000000, B2000000}, {2500000, B2500000},
               {3000000, B3000000}, {3500000, B3500000}, {4000000, B4000000}};
 
-static int set_wire(int fd, uint32_t baud, bool rts_cts)
-{
+static int set_wire(int fd, uint32_t baud, bool rts_cts) {
     struct termios t;
     if (tcgetattr(fd, &t) != 0) {
         return -1;
@@ -190,8 +177,7 @@ static int set_wire(int fd, uint32_t baud, bool rts_cts)
     return baud == 0 ? tcsetattr(fd, TCSANOW, &t) : -1;
 }
 
-int serial_open(const char *path, uint32_t baud, bool rts_cts)
-{
+int serial_open(const char *path, uint32_t baud, bool rts_cts) {
     int fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) {
         return -1;
@@ -206,8 +192,7 @@ int serial_open(const char *path, uint32_t baud, bool rts_cts)
     return fd;
 }
 
-void serial_close(int fd)
-{
+void serial_close(int fd) {
     struct termios t;
     if (fd < 0) {
         return;
@@ -222,8 +207,7 @@ void serial_close(int fd)
     close(fd);
 }
 
-int serial_pair(int fds[2])
-{
+int serial_pair(int fds[2]) {
     char path[64];
     fds[1] = -1;
     fds[0] = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);

@@ -23,22 +23,19 @@ enum { PSEUDO_FIRST = 136, PSEUDO_LAST = 143, PTMX_MAJOR = 5, PTMX_MINOR = 2 };
 
 /* --- who has it ---------------------------------------------------------- */
 
-static bool is_pseudo_terminal(dev_t device)
-{
+static bool is_pseudo_terminal(dev_t device) {
     return major(device) >= PSEUDO_FIRST && major(device) <= PSEUDO_LAST;
 }
 
 /* Pseudo-terminals have numbers of their own in every container, where another
  * file system makes them. */
-static bool is_same(const struct stat *a, const struct stat *b)
-{
+static bool is_same(const struct stat *a, const struct stat *b) {
     return S_ISCHR(a->st_mode) && a->st_rdev == b->st_rdev &&
            (!is_pseudo_terminal(a->st_rdev) || a->st_dev == b->st_dev);
 }
 
 /* Whether an open file is the master of the pseudo-terminal of that number. */
-static bool is_master(const char *pid, const char *fd, int number)
-{
+static bool is_master(const char *pid, const char *fd, int number) {
     char path[PATH_MAX], line[64];
     int index = -1;
     snprintf(path, sizeof path, "/proc/%s/fdinfo/%s", pid, fd);
@@ -55,8 +52,7 @@ static bool is_master(const char *pid, const char *fd, int number)
 /* A process that has made a pseudo-terminal and holds its master stands in the
  * place of the cable: it may keep the slave open as well, as socat does, so
  * that the master is not hung up before somebody comes. */
-static bool has_open(const char *pid, const struct stat *device)
-{
+static bool has_open(const char *pid, const struct stat *device) {
     char path[PATH_MAX];
     struct dirent *entry;
     struct stat about;
@@ -84,8 +80,7 @@ static bool has_open(const char *pid, const struct stat *device)
     return found && !made;
 }
 
-static void read_name(const char *pid, char *name, size_t size)
-{
+static void read_name(const char *pid, char *name, size_t size) {
     char path[PATH_MAX];
     snprintf(path, sizeof path, "/proc/%s/comm", pid);
     FILE *file = fopen(path, "re");
@@ -97,8 +92,7 @@ static void read_name(const char *pid, char *name, size_t size)
     }
 }
 
-int serial_port_holder(const char *device, char *name, size_t size)
-{
+int serial_port_holder(const char *device, char *name, size_t size) {
     struct stat about;
     struct dirent *entry;
     int holder = 0;
@@ -125,8 +119,7 @@ int serial_port_holder(const char *device, char *name, size_t size)
 /* --- which it is --------------------------------------------------------- */
 
 /* Whether a terminal is plugged in at "1-1.3", by the path that /sys gives. */
-static bool is_at(const char *device, const char *position)
-{
+static bool is_at(const char *device, const char *position) {
     char link[PATH_MAX], path[PATH_MAX], want[SERIAL_NAME_MAX + 2];
     const char *base = strrchr(device, '/');
     snprintf(link, sizeof link, "/sys/class/tty/%s/device",
@@ -135,8 +128,7 @@ static bool is_at(const char *device, const char *position)
     return realpath(link, path) != NULL && strstr(path, want) != NULL;
 }
 
-static bool fits(struct sp_port *port, const char *name)
-{
+static bool fits(struct sp_port *port, const char *name) {
     if (strncmp(name, "usb:", 4) == 0) {
         const char *number = sp_get_port_usb_serial(port);
         return number != NULL && strcmp(number, name + 4) == 0;
@@ -145,8 +137,7 @@ static bool fits(struct sp_port *port, const char *name)
 }
 
 /* The device that a name stands for: 0, or -1 and the fault. */
-static int find(struct serial_port *port)
-{
+static int find(struct serial_port *port) {
     const char *name = port->settings.name;
     struct sp_port **list;
     unsigned count = 0;
@@ -181,16 +172,14 @@ static int find(struct serial_port *port)
 
 #define PLUG_IN "plug it in, or give another: ls /dev/serial/by-id"
 
-static int refuse(struct serial_port *port, const char *why, const char *help)
-{
+static int refuse(struct serial_port *port, const char *why, const char *help) {
     snprintf(port->fault, sizeof port->fault, "%s: %s; %s", port->device, why,
              help);
     return -1;
 }
 
 /* Tells who has the port, where somebody has it. */
-static int refuse_used(struct serial_port *port)
-{
+static int refuse_used(struct serial_port *port) {
     char name[64], why[128];
     int pid = serial_port_holder(port->device, name, sizeof name);
     if (pid == 0) {
@@ -200,8 +189,7 @@ static int refuse_used(struct serial_port *port)
     return refuse(port, why, "end that, or give another port");
 }
 
-static int refuse_errno(struct serial_port *port, int reason)
-{
+static int refuse_errno(struct serial_port *port, int reason) {
     return reason == EBUSY    ? refuse_used(port)
            : reason == EACCES ? refuse(port, strerror(reason),
                                        "join its group, and log in anew")
@@ -209,16 +197,14 @@ static int refuse_errno(struct serial_port *port, int reason)
 }
 
 /* For this process alone, also against one that may override TIOCEXCL. */
-static bool hold(const struct serial_port *port, int fd)
-{
+static bool hold(const struct serial_port *port, int fd) {
     char name[64];
     return ioctl(fd, TIOCEXCL) == 0 && flock(fd, LOCK_EX | LOCK_NB) == 0 &&
            serial_port_holder(port->device, name, sizeof name) == 0;
 }
 
 /* Both lines in one step: some boards reset on one without the other. */
-static void set_lines(const struct serial_port *port, int fd)
-{
+static void set_lines(const struct serial_port *port, int fd) {
     int lines = (port->settings.dtr ? TIOCM_DTR : 0) |
                 (port->settings.rts ? TIOCM_RTS : 0);
     int have = 0, mask = TIOCM_DTR | TIOCM_RTS;
@@ -233,8 +219,7 @@ static void set_lines(const struct serial_port *port, int fd)
 
 /* Rate and flow control by the library, which knows rates without a name. */
 static int set_rate(struct sp_port *library,
-                    const struct serial_port_settings *s)
-{
+                    const struct serial_port_settings *s) {
     if (s->baud != 0 && sp_set_baudrate(library, (int)s->baud) != SP_OK) {
         return -1;
     }
@@ -244,8 +229,7 @@ static int set_rate(struct sp_port *library,
                : -1;
 }
 
-static int open_by_library(struct serial_port *port, const char *path)
-{
+static int open_by_library(struct serial_port *port, const char *path) {
     struct sp_port *library = NULL;
     int fd = -1;
     if (sp_get_port_by_name(path, &library) != SP_OK) {
@@ -278,8 +262,7 @@ static int open_by_library(struct serial_port *port, const char *path)
     return status == 0 && fd < 0 ? refuse_errno(port, errno) : fd;
 }
 
-static int open_terminal(struct serial_port *port, const char *path)
-{
+static int open_terminal(struct serial_port *port, const char *path) {
     int fd = serial_open(path, port->settings.baud, false);
     if (fd < 0) {
         return refuse_errno(port, errno);
@@ -293,8 +276,7 @@ static int open_terminal(struct serial_port *port, const char *path)
 
 /* The name may be a link, which may lead elsewhere the next time; the library
  * knows devices by their own names alone. */
-static int open_device(struct serial_port *port)
-{
+static int open_device(struct serial_port *port) {
     char path[PATH_MAX];
     struct stat about;
     if (realpath(port->device, path) == NULL || stat(path, &about) != 0) {
@@ -307,15 +289,13 @@ static int open_device(struct serial_port *port)
                                              : open_by_library(port, path);
 }
 
-static uint64_t clock_us(void)
-{
+static uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-static int look(struct serial_port *port)
-{
+static int look(struct serial_port *port) {
     int fd = find(port) == 0 ? open_device(port) : -1;
     port->look_us = clock_us();
     if (fd < 0) {
@@ -330,8 +310,7 @@ static int look(struct serial_port *port)
 }
 
 /* The pipe is closed: the port is let go, and looked for from time to time. */
-static void recover(void *context)
-{
+static void recover(void *context) {
     struct serial_port *port = context;
     if (port->pipe.fd >= 0) {
         serial_close(port->pipe.fd);
@@ -344,8 +323,7 @@ static void recover(void *context)
 }
 
 int serial_port_open(struct serial_port *port,
-                     const struct serial_port_settings *settings)
-{
+                     const struct serial_port_settings *settings) {
     memset(port, 0, sizeof *port);
     port->settings = *settings;
     serial_pipe_init(&port->pipe, -1, settings->baud);
@@ -354,16 +332,14 @@ int serial_port_open(struct serial_port *port,
     return look(port);
 }
 
-void serial_port_close(struct serial_port *port)
-{
+void serial_port_close(struct serial_port *port) {
     serial_close(port->pipe.fd);
     port->pipe.fd = -1;
     port->pipe.closed = true;
     port->pipe.recover = NULL;
 }
 
-int serial_port_set(const struct serial_port *port, bool rts, bool high)
-{
+int serial_port_set(const struct serial_port *port, bool rts, bool high) {
     int line = rts ? TIOCM_RTS : TIOCM_DTR;
     if (port->pipe.fd < 0) {
         errno = ENODEV;

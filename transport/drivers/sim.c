@@ -6,8 +6,7 @@ enum { SPOILED_BYTE = 6, LATE_STALLS = 3 };
 
 /* --- chance -------------------------------------------------------------- */
 
-uint64_t sim_draw(uint64_t *state)
-{
+uint64_t sim_draw(uint64_t *state) {
     *state ^= *state << 13;
     *state ^= *state >> 7;
     *state ^= *state << 17;
@@ -15,8 +14,7 @@ uint64_t sim_draw(uint64_t *state)
 }
 
 /* Steele, Lea and Flood's mixing (2014). */
-uint64_t sim_seed(uint64_t seed, uint64_t purpose)
-{
+uint64_t sim_seed(uint64_t seed, uint64_t purpose) {
     uint64_t x = seed * UINT64_C(0x9e3779b97f4a7c15) + purpose * 0x632be5abu;
     x = (x ^ x >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
     x = (x ^ x >> 27) * UINT64_C(0x94d049bb133111eb);
@@ -26,8 +24,7 @@ uint64_t sim_seed(uint64_t seed, uint64_t purpose)
 
 /* Exponentially distributed with mean 1, by comparisons alone (von Neumann,
  * 1951), so that it is the same on every machine. */
-static double exponential(uint64_t *state)
-{
+static double exponential(uint64_t *state) {
     for (double whole = 0;; whole++) {
         uint64_t first = sim_draw(state), last = first;
         unsigned falling = 1;
@@ -46,8 +43,7 @@ static double exponential(uint64_t *state)
 }
 
 /* How many go well before the next that does not. */
-static uint64_t draw_gap(uint64_t *state, double chance)
-{
+static uint64_t draw_gap(uint64_t *state, double chance) {
     if (chance <= 0) {
         return UINT64_MAX;
     }
@@ -57,8 +53,7 @@ static uint64_t draw_gap(uint64_t *state, double chance)
 
 /* Whether one of the next `steps` is struck; the gap is counted down. */
 static bool strikes(struct sim_direction *direction, enum sim_fault kind,
-                    uint64_t steps)
-{
+                    uint64_t steps) {
     uint64_t *gap = &direction->gap[kind];
     if (*gap == UINT64_MAX) {
         return false;
@@ -75,34 +70,29 @@ static bool strikes(struct sim_direction *direction, enum sim_fault kind,
 /* --- the direction
  * ------------------------------------------------------------ */
 
-static uint64_t now_ns(const struct sim_direction *direction)
-{
+static uint64_t now_ns(const struct sim_direction *direction) {
     return *direction->now_us * 1000;
 }
 
-static uint64_t latency_ns(const struct sim_direction *direction)
-{
+static uint64_t latency_ns(const struct sim_direction *direction) {
     return (uint64_t)direction->quality.latency_us * 1000;
 }
 
 static struct sim_segment *segment_at(const struct sim_direction *direction,
-                                      uint32_t i)
-{
+                                      uint32_t i) {
     return (struct sim_segment *)&direction
         ->segment[(direction->segment_first + i) % SIM_SEGMENTS];
 }
 
 /* Past the last byte of segment i. */
-static uint64_t segment_end(const struct sim_direction *direction, uint32_t i)
-{
+static uint64_t segment_end(const struct sim_direction *direction, uint32_t i) {
     return i + 1 < direction->segments ? segment_at(direction, i + 1)->first
                                        : direction->end;
 }
 
 /* Bytes [first, result) of segment i have left the driver at time_ns. */
 static uint64_t passed_of(const struct sim_direction *direction, uint32_t i,
-                          uint64_t time_ns)
-{
+                          uint64_t time_ns) {
     const struct sim_segment *s = segment_at(direction, i);
     uint64_t end = segment_end(direction, i);
     if (time_ns < s->from_ns) {
@@ -116,8 +106,8 @@ static uint64_t passed_of(const struct sim_direction *direction, uint32_t i,
 }
 
 /* Position up to which bytes have left the driver at time_ns. */
-static uint64_t passed(const struct sim_direction *direction, uint64_t time_ns)
-{
+static uint64_t passed(const struct sim_direction *direction,
+                       uint64_t time_ns) {
     for (uint32_t i = direction->segments; i-- > 0;) {
         if (segment_at(direction, i)->from_ns <= time_ns) {
             uint64_t at = passed_of(direction, i, time_ns);
@@ -129,8 +119,7 @@ static uint64_t passed(const struct sim_direction *direction, uint64_t time_ns)
 
 /* Bytes that nobody holds up any more begin a segment of their own. */
 static void put(struct sim_direction *direction, const uint8_t *bytes,
-                size_t size)
-{
+                size_t size) {
     uint64_t now = now_ns(direction), room = direction->quality.bytes;
     uint64_t left = room - (direction->end - direction->begin);
     size = size < left ? size : (size_t)left;
@@ -160,8 +149,7 @@ static void put(struct sim_direction *direction, const uint8_t *bytes,
 }
 
 /* Nothing for a while; then another segment. */
-static void stall(struct sim_direction *direction, uint64_t us)
-{
+static void stall(struct sim_direction *direction, uint64_t us) {
     uint64_t now = now_ns(direction);
     if (direction->segments + 1 >= SIM_SEGMENTS) {
         return;
@@ -178,8 +166,7 @@ static void stall(struct sim_direction *direction, uint64_t us)
 }
 
 /* A frame that went by, once more, if it is still there. */
-static void put_again(struct sim_direction *direction)
-{
+static void put_again(struct sim_direction *direction) {
     uint64_t at = direction->frame, end = direction->end,
              room = direction->quality.bytes;
     if (2 * (end - at) > room) {
@@ -194,8 +181,7 @@ static void put_again(struct sim_direction *direction)
 /* --- what goes wrong ----------------------------------------------------- */
 
 /* Bytes that pass before the next strike. */
-static uint64_t untouched(const struct sim_direction *direction)
-{
+static uint64_t untouched(const struct sim_direction *direction) {
     uint64_t least = direction->gap[SIM_FLIP] / 8;
     for (int kind = SIM_DELETE; kind < SIM_CHANCES; kind++) {
         least = direction->gap[kind] < least ? direction->gap[kind] : least;
@@ -203,8 +189,7 @@ static uint64_t untouched(const struct sim_direction *direction)
     return direction->burst > 0 ? 0 : least;
 }
 
-static void count_down(struct sim_direction *direction, uint64_t bytes)
-{
+static void count_down(struct sim_direction *direction, uint64_t bytes) {
     for (int kind = SIM_FLIP; kind < SIM_CHANCES; kind++) {
         if (direction->gap[kind] != UINT64_MAX) {
             direction->gap[kind] -= kind == SIM_FLIP ? 8 * bytes : bytes;
@@ -213,8 +198,7 @@ static void count_down(struct sim_direction *direction, uint64_t bytes)
 }
 
 /* A byte that something may happen to. */
-static void put_struck(struct sim_direction *direction, uint8_t byte)
-{
+static void put_struck(struct sim_direction *direction, uint8_t byte) {
     while (strikes(direction, SIM_FLIP, 8)) {
         byte ^= (uint8_t)(1u << (sim_draw(&direction->random) >> 32) % 8);
     }
@@ -242,8 +226,7 @@ static void put_struck(struct sim_direction *direction, uint8_t byte)
 }
 
 static void put_piece(struct sim_direction *direction, const uint8_t *bytes,
-                      size_t size)
-{
+                      size_t size) {
     while (size > 0) {
         uint64_t good = untouched(direction);
         size_t run = good < size ? (size_t)good : size;
@@ -259,8 +242,7 @@ static void put_piece(struct sim_direction *direction, const uint8_t *bytes,
 }
 
 /* The first piece of a frame. */
-static void begin_frame(struct sim_direction *direction)
-{
+static void begin_frame(struct sim_direction *direction) {
     direction->frames++;
     direction->inside = true;
     direction->frame = direction->end;
@@ -276,8 +258,7 @@ static void begin_frame(struct sim_direction *direction)
 
 /* A frame, or a part of one: its last byte is the only zero it may hold. */
 static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
-                       size_t size, bool last)
-{
+                       size_t size, bool last) {
     bool first = !direction->inside;
     if (first) {
         begin_frame(direction);
@@ -303,8 +284,7 @@ static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
 
 /* --- the pipe ------------------------------------------------------------ */
 
-static int sim_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int sim_send(void *context, const uint8_t *bytes, size_t size) {
     struct sim_end *end = context;
     struct sim_direction *direction = end->out;
     if (*end->cut) {
@@ -331,8 +311,7 @@ static int sim_send(void *context, const uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static int sim_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int sim_receive(void *context, uint8_t *bytes, size_t size) {
     struct sim_end *end = context;
     struct sim_direction *direction = end->in;
     uint64_t now = now_ns(direction), late = latency_ns(direction);
@@ -358,13 +337,12 @@ static int sim_receive(void *context, uint8_t *bytes, size_t size)
     return (int)got;
 }
 
-struct link_pipe sim_pipe(struct sim_end *end)
-{
+struct link_pipe sim_pipe(struct sim_end *end) {
     return (struct link_pipe){end, sim_send, sim_receive};
 }
 
-uint64_t sim_next_us(const struct sim_direction *direction, uint32_t gather_us)
-{
+uint64_t sim_next_us(const struct sim_direction *direction,
+                     uint32_t gather_us) {
     for (uint32_t i = 0; i < direction->segments; i++) {
         const struct sim_segment *s = segment_at(direction, i);
         uint64_t end = segment_end(direction, i);
@@ -382,8 +360,7 @@ uint64_t sim_next_us(const struct sim_direction *direction, uint32_t gather_us)
     return UINT64_MAX;
 }
 
-uint64_t sim_room_us(const struct sim_direction *direction)
-{
+uint64_t sim_room_us(const struct sim_direction *direction) {
     uint64_t half = direction->quality.room / 2 * direction->step_ns;
     if (!direction->blocked || direction->segments == SIM_SEGMENTS ||
         direction->end - direction->begin == direction->quality.bytes) {
@@ -396,8 +373,7 @@ uint64_t sim_room_us(const struct sim_direction *direction)
 /* --- the wire ------------------------------------------------------------ */
 
 void sim_direction_faults(struct sim_direction *direction,
-                          const struct sim_faults *faults)
-{
+                          const struct sim_faults *faults) {
     direction->burst = 0;
     if (faults == NULL) {
         memset(&direction->faults, 0, sizeof direction->faults);
@@ -410,13 +386,11 @@ void sim_direction_faults(struct sim_direction *direction,
     }
 }
 
-void sim_direction_deaf(struct sim_direction *direction, bool deaf)
-{
+void sim_direction_deaf(struct sim_direction *direction, bool deaf) {
     direction->deaf = deaf;
 }
 
-void sim_direction_flush(struct sim_direction *direction)
-{
+void sim_direction_flush(struct sim_direction *direction) {
     direction->begin = direction->end;
     direction->segments = 0;
     direction->segment_first = 0;
@@ -425,13 +399,11 @@ void sim_direction_flush(struct sim_direction *direction)
     direction->blocked = false;
 }
 
-void sim_wire_share(struct sim_wire *wire, uint64_t *free_ns)
-{
+void sim_wire_share(struct sim_wire *wire, uint64_t *free_ns) {
     wire->direction[0].medium_ns = wire->direction[1].medium_ns = free_ns;
 }
 
-void sim_wire_cut(struct sim_wire *wire, bool cut)
-{
+void sim_wire_cut(struct sim_wire *wire, bool cut) {
     for (int i = 0; i < 2; i++) {
         sim_direction_flush(&wire->direction[i]);
         wire->direction[i].struck[SIM_CUT] += cut && !wire->cut;
@@ -439,15 +411,13 @@ void sim_wire_cut(struct sim_wire *wire, bool cut)
     wire->cut = cut;
 }
 
-size_t sim_wire_bytes(const struct sim_quality *quality)
-{
+size_t sim_wire_bytes(const struct sim_quality *quality) {
     return 2 * (size_t)quality->bytes;
 }
 
 void sim_wire_init(struct sim_wire *wire, void *memory,
                    const struct sim_quality *quality, const uint64_t *now_us,
-                   uint64_t seed)
-{
+                   uint64_t seed) {
     memset(wire, 0, sizeof *wire);
     for (unsigned i = 0; i < 2; i++) {
         struct sim_direction *direction = &wire->direction[i];

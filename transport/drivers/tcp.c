@@ -13,8 +13,7 @@
 /* --- the pipe ------------------------------------------------------------ */
 
 /* Bytes moved, 0 for the present, or closed. */
-static int result(struct tcp_pipe *pipe, ssize_t moved)
-{
+static int result(struct tcp_pipe *pipe, ssize_t moved) {
     if (moved >= 0) {
         return (int)moved;
     }
@@ -26,8 +25,7 @@ static int result(struct tcp_pipe *pipe, ssize_t moved)
     return LINK_PIPE_CLOSED;
 }
 
-static int tcp_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int tcp_send(void *context, const uint8_t *bytes, size_t size) {
     struct tcp_pipe *pipe = context;
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
@@ -38,8 +36,7 @@ static int tcp_send(void *context, const uint8_t *bytes, size_t size)
     return taken;
 }
 
-static int tcp_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int tcp_receive(void *context, uint8_t *bytes, size_t size) {
     struct tcp_pipe *pipe = context;
     if (pipe->closed) {
         return LINK_PIPE_CLOSED;
@@ -57,34 +54,29 @@ static int tcp_receive(void *context, uint8_t *bytes, size_t size)
     return result(pipe, got);
 }
 
-void tcp_pipe_init(struct tcp_pipe *pipe, int fd)
-{
+void tcp_pipe_init(struct tcp_pipe *pipe, int fd) {
     *pipe = (struct tcp_pipe){.fd = fd, .closed = fd < 0};
 }
 
-struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe)
-{
+struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe) {
     return (struct link_pipe){pipe, tcp_send, tcp_receive};
 }
 
-short tcp_events(const struct tcp_pipe *pipe)
-{
+short tcp_events(const struct tcp_pipe *pipe) {
     if (pipe->closed) {
         return 0;
     }
     return pipe->blocked ? POLLIN | POLLOUT : POLLIN;
 }
 
-void tcp_heard(struct tcp_pipe *pipe, short revents)
-{
+void tcp_heard(struct tcp_pipe *pipe, short revents) {
     pipe->quiet = (revents & ~POLLOUT) == 0;
 }
 
 /* --- sockets ------------------------------------------------------------- */
 
 /* Fixed before the connection is made, when the window's scale is agreed. */
-static int fix_buffers(int fd)
-{
+static int fix_buffers(int fd) {
     int bytes = TCP_BUFFER_BYTES;
     if (setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes) != 0) {
         return -1;
@@ -92,8 +84,7 @@ static int fix_buffers(int fd)
     return setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
 }
 
-int tcp_prepare(int fd)
-{
+int tcp_prepare(int fd) {
     int on = 1;
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 ||
@@ -107,8 +98,7 @@ int tcp_prepare(int fd)
                : -1;
 }
 
-int tcp_buffers(int fd, int *send_bytes, int *receive_bytes)
-{
+int tcp_buffers(int fd, int *send_bytes, int *receive_bytes) {
     socklen_t size = sizeof *send_bytes;
     if (getsockopt(fd, SOL_SOCKET, SO_SNDBUF, send_bytes, &size) != 0) {
         return -1;
@@ -118,8 +108,7 @@ int tcp_buffers(int fd, int *send_bytes, int *receive_bytes)
 }
 
 /* A listener on a port of the kernel's choice. */
-static int listen_on_loopback(struct sockaddr_in *address)
-{
+static int listen_on_loopback(struct sockaddr_in *address) {
     socklen_t size = sizeof *address;
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     memset(address, 0, sizeof *address);
@@ -141,8 +130,7 @@ static int listen_on_loopback(struct sockaddr_in *address)
 }
 
 /* Accepts the connection that comes from `ours`, and no stranger's. */
-static int accept_ours(int listener, int ours)
-{
+static int accept_ours(int listener, int ours) {
     struct sockaddr_in here, there;
     socklen_t size = sizeof here;
     memset(&here, 0, sizeof here);
@@ -165,8 +153,7 @@ static int accept_ours(int listener, int ours)
     }
 }
 
-int tcp_pair(int fds[2])
-{
+int tcp_pair(int fds[2]) {
     struct sockaddr_in address;
     int listener = listen_on_loopback(&address);
     if (listener < 0) {

@@ -8,8 +8,7 @@
 #include <string.h>
 #include <sys/un.h>
 
-int tcp_address_parse(struct tcp_address *address, const char *text)
-{
+int tcp_address_parse(struct tcp_address *address, const char *text) {
     struct sockaddr_in *v4 = (struct sockaddr_in *)&address->to;
     struct sockaddr_in6 *v6 = (struct sockaddr_in6 *)&address->to;
     char host[INET6_ADDRSTRLEN + 2], *end;
@@ -42,8 +41,7 @@ int tcp_address_parse(struct tcp_address *address, const char *text)
 _Static_assert(sizeof((struct sockaddr_un *)0)->sun_path == TCP_PATH_MAX + 1,
                "a path and its end");
 
-int tcp_address_set_path(struct tcp_address *address, const char *path)
-{
+int tcp_address_set_path(struct tcp_address *address, const char *path) {
     struct sockaddr_un *at = (struct sockaddr_un *)&address->to;
     size_t length = strlen(path);
     memset(address, 0, sizeof *address);
@@ -57,15 +55,13 @@ int tcp_address_set_path(struct tcp_address *address, const char *path)
     return 0;
 }
 
-const char *tcp_address_path(const struct tcp_address *address)
-{
+const char *tcp_address_path(const struct tcp_address *address) {
     return address->to.any.sa_family == AF_UNIX
                ? ((const struct sockaddr_un *)&address->to)->sun_path
                : NULL;
 }
 
-bool tcp_address_is_any(const struct tcp_address *address)
-{
+bool tcp_address_is_any(const struct tcp_address *address) {
     const struct sockaddr_in *v4 = (const struct sockaddr_in *)&address->to;
     const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)&address->to;
     return address->to.any.sa_family == AF_INET6

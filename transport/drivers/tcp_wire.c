@@ -11,23 +11,20 @@
 #include "transport/secure_wipe.h"
 #include "unix_file.h"
 
-static uint64_t clock_us(void)
-{
+static uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
 /* Whether the kernel says who is at the other end. */
-static bool is_local(const struct tcp_wire *wire)
-{
+static bool is_local(const struct tcp_wire *wire) {
     return tcp_address_path(&wire->config.address) != NULL;
 }
 
 /* --- connections that are not proven ------------------------------------- */
 
-static void drop(struct tcp_candidate *c)
-{
+static void drop(struct tcp_candidate *c) {
     if (c->fd >= 0) {
         close(c->fd);
         c->fd = -1;
@@ -36,8 +33,7 @@ static void drop(struct tcp_candidate *c)
 }
 
 /* Whether it has begun as the peer does. */
-static bool begun(const struct tcp_wire *wire, const struct tcp_candidate *c)
-{
+static bool begun(const struct tcp_wire *wire, const struct tcp_candidate *c) {
     return wire->config.suite != NULL && c->heard.shake.greeted;
 }
 
@@ -45,8 +41,7 @@ static bool begun(const struct tcp_wire *wire, const struct tcp_candidate *c)
  * begun as the peer does; from the oldest that has, where they have more than
  * half of the places, so that newcomers have time to begin.  So strangers who
  * say little cannot crowd out one who is about to prove himself. */
-static struct tcp_candidate *place(struct tcp_wire *wire)
-{
+static struct tcp_candidate *place(struct tcp_wire *wire) {
     struct tcp_candidate *oldest[2] = {NULL, NULL};
     unsigned count[2] = {0, 0};
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
@@ -64,20 +59,17 @@ static struct tcp_candidate *place(struct tcp_wire *wire)
 }
 
 /* Whether the next to come would take the place of one who began well. */
-static bool crowded(struct tcp_wire *wire)
-{
+static bool crowded(struct tcp_wire *wire) {
     const struct tcp_candidate *c = place(wire);
     return c->fd >= 0 && begun(wire, c);
 }
 
-bool tcp_random(void *context, uint8_t *bytes, size_t size)
-{
+bool tcp_random(void *context, uint8_t *bytes, size_t size) {
     (void)context;
     return getrandom(bytes, size, 0) == (ssize_t)size;
 }
 
-static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake)
-{
+static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake) {
     static const struct link_end unknown = {SECURE_NODE_UNKNOWN,
                                             SECURE_PORT_UNKNOWN};
     const struct tcp_wire_config *c = &wire->config;
@@ -99,8 +91,7 @@ static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake)
 }
 
 static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
-                  bool connected, uint64_t now_us)
-{
+                  bool connected, uint64_t now_us) {
     memset(&c->heard, 0, sizeof c->heard);
     if (wire->config.suite != NULL && !begin_shake(wire, &c->heard.shake)) {
         return false;
@@ -118,8 +109,7 @@ static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
     return true;
 }
 
-static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
-{
+static bool accept_some(struct tcp_wire *wire, uint64_t now_us) {
     bool some = false;
     for (unsigned i = 0; i < TCP_ACCEPTS_MAX; i++) {
         struct tcp_candidate *c = place(wire);
@@ -145,8 +135,7 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us)
 }
 
 /* A call that failed is made again after a pause, longer each time. */
-static void pause_calls(struct tcp_wire *wire, uint64_t now_us, uint64_t most)
-{
+static void pause_calls(struct tcp_wire *wire, uint64_t now_us, uint64_t most) {
     uint64_t pause = 2 * wire->pause_us;
     wire->pause_us = pause < TCP_PAUSE_MIN_US ? TCP_PAUSE_MIN_US
                      : pause > most           ? most
@@ -154,8 +143,7 @@ static void pause_calls(struct tcp_wire *wire, uint64_t now_us, uint64_t most)
     wire->call_us = now_us + wire->pause_us;
 }
 
-static void call(struct tcp_wire *wire, uint64_t now_us)
-{
+static void call(struct tcp_wire *wire, uint64_t now_us) {
     const struct tcp_address *to = &wire->config.address;
     int fd = socket(to->to.any.sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd >= 0 && tcp_prepare(fd) == 0) {
@@ -172,15 +160,13 @@ static void call(struct tcp_wire *wire, uint64_t now_us)
     pause_calls(wire, now_us, TCP_PAUSE_MAX_US);
 }
 
-static uint64_t within(uint64_t least_us, uint64_t us)
-{
+static uint64_t within(uint64_t least_us, uint64_t us) {
     return us < least_us ? least_us : us > TCP_PROVE_US ? TCP_PROVE_US : us;
 }
 
 /* Whether the call was answered: 1, 0 not yet, -1 no. */
 static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
-                    uint64_t now_us)
-{
+                    uint64_t now_us) {
     struct pollfd wait = {c->fd, POLLOUT, 0};
     int fault = 0;
     socklen_t size = sizeof fault;
@@ -206,8 +192,7 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
  * one and it has kept silent, or greets as one with a key, which is to hear
  * that there is none here; 0 not yet, -1 it says something else. */
 static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
-                      uint64_t now_us)
-{
+                      uint64_t now_us) {
     struct tcp_first *first = &c->heard.first;
     struct link_pipe pipe = tcp_link_pipe(&c->pipe);
     int got = pipe.receive(pipe.context, first->bytes + first->end,
@@ -227,8 +212,7 @@ static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
 
 /* What the end of a proof tells of who it was. */
 static void note_keys(struct tcp_wire *wire, int status,
-                      enum secure_fault fault, uint64_t now_us)
-{
+                      enum secure_fault fault, uint64_t now_us) {
     if (status != 0) {
         wire->other_key = status < 0 && fault == SECURE_OTHER_KEY;
         wire->lone_key = status < 0 && fault == SECURE_NO_KEY;
@@ -237,8 +221,7 @@ static void note_keys(struct tcp_wire *wire, int status,
 }
 
 static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
-                 uint64_t now_us)
-{
+                 uint64_t now_us) {
     struct link_pipe pipe = tcp_link_pipe(&c->pipe);
     wire->other_user = is_local(wire) && !unix_file_peer_is_ours(c->fd);
     if (wire->other_user) {
@@ -256,8 +239,7 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
 
 /* The candidate becomes the connection. */
 static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
-                    uint64_t now_us)
-{
+                    uint64_t now_us) {
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         wire->replaced = true;
@@ -281,8 +263,7 @@ static void promote(struct tcp_wire *wire, struct tcp_candidate *c,
  * lost, strangers crowd the other end, or the way is longer than was thought.
  * The end that called gives up first, and calls again. */
 static uint64_t patience(const struct tcp_wire *wire,
-                         const struct tcp_candidate *c)
-{
+                         const struct tcp_candidate *c) {
     return wire->config.listens ? TCP_PROVE_US
            : c->connected       ? wire->prove_us
                                 : wire->answer_us;
@@ -290,8 +271,7 @@ static uint64_t patience(const struct tcp_wire *wire,
 
 /* A call came to nothing: whether for want of time, or of a key. */
 static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
-                       bool late, uint64_t now_us)
-{
+                       bool late, uint64_t now_us) {
     bool crowded_out = late ? !c->connected
                             : c->connected && tcp_wire_doubt(wire).what == NULL;
     uint64_t *again = c->connected ? &wire->prove_us : &wire->answer_us;
@@ -303,8 +283,7 @@ static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
 }
 
 static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
-                    uint64_t now_us)
-{
+                    uint64_t now_us) {
     int status = answered(wire, c, now_us);
     if (status > 0) {
         status = prove(wire, c, now_us);
@@ -326,20 +305,17 @@ static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
 }
 
 /* Whether strangers have to wait for their turn. */
-static bool holds_off(const struct tcp_wire *wire, uint64_t now_us)
-{
+static bool holds_off(const struct tcp_wire *wire, uint64_t now_us) {
     return wire->listener >= 0 && wire->tcp.fd >= 0 && wire->proven &&
            now_us < wire->look_us;
 }
 
 /* Whether the door is open. */
-static bool admits(const struct tcp_wire *wire, uint64_t now_us)
-{
+static bool admits(const struct tcp_wire *wire, uint64_t now_us) {
     return wire->listener >= 0 && now_us >= wire->admit_us;
 }
 
-static void tick(struct tcp_wire *wire)
-{
+static void tick(struct tcp_wire *wire) {
     uint64_t now_us = clock_us();
     bool quiet = wire->quiet, met = false;
     wire->quiet = false;
@@ -370,8 +346,7 @@ static void tick(struct tcp_wire *wire)
 
 /* --- the pipe ------------------------------------------------------------ */
 
-static void leave(struct tcp_wire *wire)
-{
+static void leave(struct tcp_wire *wire) {
     if (wire->tcp.fd >= 0) {
         close(wire->tcp.fd);
         tcp_pipe_init(&wire->tcp, -1);
@@ -380,8 +355,7 @@ static void leave(struct tcp_wire *wire)
 }
 
 /* The connection is over: the next one begins. */
-static int broken(struct tcp_wire *wire)
-{
+static int broken(struct tcp_wire *wire) {
     if (wire->tcp.fd >= 0) {
         leave(wire);
         wire->proven = false;
@@ -391,14 +365,12 @@ static int broken(struct tcp_wire *wire)
     return LINK_PIPE_CLOSED;
 }
 
-static struct link_pipe inner(struct tcp_wire *wire)
-{
+static struct link_pipe inner(struct tcp_wire *wire) {
     return wire->config.suite != NULL ? secure_records_pipe(&wire->records)
                                       : tcp_link_pipe(&wire->tcp);
 }
 
-static int wire_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int wire_send(void *context, const uint8_t *bytes, size_t size) {
     struct tcp_wire *wire = context;
     if (wire->tcp.fd < 0 || wire->replaced) {
         return LINK_PIPE_CLOSED;
@@ -409,8 +381,7 @@ static int wire_send(void *context, const uint8_t *bytes, size_t size)
 }
 
 /* What the connection said before it was taken. */
-static int receive_first(struct tcp_wire *wire, uint8_t *bytes, size_t size)
-{
+static int receive_first(struct tcp_wire *wire, uint8_t *bytes, size_t size) {
     struct tcp_first *first = &wire->first;
     size_t have = first->end - first->begin;
     have = have < size ? have : size;
@@ -422,8 +393,7 @@ static int receive_first(struct tcp_wire *wire, uint8_t *bytes, size_t size)
 /* Without a key: whether the connection greets as a link does, or as one with a
  * key. */
 static void hear_greeting(struct tcp_wire *wire, const uint8_t *bytes,
-                          size_t size)
-{
+                          size_t size) {
     wire->proven = link_greets(bytes, size);
     if (wire->proven || secure_greets(bytes, size)) {
         wire->lone_key = !wire->proven;
@@ -431,8 +401,7 @@ static void hear_greeting(struct tcp_wire *wire, const uint8_t *bytes,
     }
 }
 
-static int wire_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int wire_receive(void *context, uint8_t *bytes, size_t size) {
     struct tcp_wire *wire = context;
     tick(wire);
     if (wire->tcp.fd < 0 || wire->replaced) {
@@ -449,8 +418,7 @@ static int wire_receive(void *context, uint8_t *bytes, size_t size)
     return got < 0 ? broken(wire) : got;
 }
 
-struct tcp_wire_doubt tcp_wire_doubt(const struct tcp_wire *wire)
-{
+struct tcp_wire_doubt tcp_wire_doubt(const struct tcp_wire *wire) {
     static const char same_key[] = "give both ends the same key file";
     struct tcp_wire_doubt doubt = {NULL, NULL};
     if (wire->other_key) {
@@ -467,15 +435,13 @@ struct tcp_wire_doubt tcp_wire_doubt(const struct tcp_wire *wire)
     return doubt;
 }
 
-struct link_pipe tcp_wire_pipe(struct tcp_wire *wire)
-{
+struct link_pipe tcp_wire_pipe(struct tcp_wire *wire) {
     return (struct link_pipe){wire, wire_send, wire_receive};
 }
 
 /* --- opening ------------------------------------------------------------- */
 
-static int bind_there(const struct tcp_wire *wire, int fd)
-{
+static int bind_there(const struct tcp_wire *wire, int fd) {
     const struct tcp_address *at = &wire->config.address;
     int on = 1;
     if (is_local(wire)) {
@@ -485,8 +451,7 @@ static int bind_there(const struct tcp_wire *wire, int fd)
     return bind(fd, &at->to.any, at->size);
 }
 
-static int listen_there(struct tcp_wire *wire)
-{
+static int listen_there(struct tcp_wire *wire) {
     int fd = socket(wire->config.address.to.any.sa_family,
                     SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd < 0) {
@@ -503,8 +468,7 @@ static int listen_there(struct tcp_wire *wire)
     return 0;
 }
 
-int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
-{
+int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config) {
     memset(wire, 0, sizeof *wire);
     wire->config = *config;
     wire->listener = -1;
@@ -524,8 +488,7 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config)
     return config->listens ? listen_there(wire) : 0;
 }
 
-void tcp_wire_close(struct tcp_wire *wire)
-{
+void tcp_wire_close(struct tcp_wire *wire) {
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         drop(&wire->candidate[i]);
     }
@@ -539,15 +502,13 @@ void tcp_wire_close(struct tcp_wire *wire)
     }
 }
 
-void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us)
-{
+void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us) {
     drop(&wire->candidate[0]);
     (void)broken(wire);
     wire->call_us = clock_us() + rest_us;
 }
 
-unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
-{
+unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds) {
     unsigned used = 0;
     short events = wire->tcp.fd < 0 ? 0 : tcp_events(&wire->tcp);
     if (events != 0) {
@@ -570,8 +531,7 @@ unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds)
     return used;
 }
 
-uint64_t tcp_wire_wait_us(const struct tcp_wire *wire)
-{
+uint64_t tcp_wire_wait_us(const struct tcp_wire *wire) {
     return wire->listener < 0    ? UINT64_MAX
            : wire->admit_us != 0 ? TCP_CROWD_US
            : wire->look_us != 0  ? TCP_LOOK_US
@@ -579,8 +539,7 @@ uint64_t tcp_wire_wait_us(const struct tcp_wire *wire)
 }
 
 void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,
-                    unsigned count)
-{
+                    unsigned count) {
     for (unsigned i = 0; i < count; i++) {
         if (fds[i].fd == wire->tcp.fd) {
             tcp_heard(&wire->tcp, fds[i].revents);

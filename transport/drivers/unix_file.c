@@ -5,8 +5,7 @@
 #include <unistd.h>
 
 /* Whether the file is a socket without a listener: 0, or what it is instead. */
-static int left_over(const struct tcp_address *address)
-{
+static int left_over(const struct tcp_address *address) {
     struct stat about;
     if (lstat(tcp_address_path(address), &about) != 0) {
         return errno;
@@ -23,8 +22,7 @@ static int left_over(const struct tcp_address *address)
     return reason == ECONNREFUSED ? 0 : EADDRINUSE;
 }
 
-static int bind_for_owner(int fd, const struct tcp_address *address)
-{
+static int bind_for_owner(int fd, const struct tcp_address *address) {
     mode_t before = umask(0177);
     int status = bind(fd, &address->to.any, address->size);
     int reason = errno;
@@ -33,14 +31,12 @@ static int bind_for_owner(int fd, const struct tcp_address *address)
     return status;
 }
 
-int unix_file_pair(int fds[2])
-{
+int unix_file_pair(int fds[2]) {
     return socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0,
                       fds);
 }
 
-int unix_file_bind(int fd, const struct tcp_address *address)
-{
+int unix_file_bind(int fd, const struct tcp_address *address) {
     if (bind_for_owner(fd, address) == 0) {
         return 0;
     }
@@ -58,16 +54,14 @@ int unix_file_bind(int fd, const struct tcp_address *address)
     return bind_for_owner(fd, address);
 }
 
-bool unix_file_peer_is_ours(int fd)
-{
+bool unix_file_peer_is_ours(int fd) {
     struct ucred peer;
     socklen_t size = sizeof peer;
     return getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
            (peer.uid == geteuid() || peer.uid == 0);
 }
 
-void unix_file_remove(const struct tcp_address *address)
-{
+void unix_file_remove(const struct tcp_address *address) {
     int before = errno;
     if (left_over(address) == 0) {
         (void)unlink(tcp_address_path(address));

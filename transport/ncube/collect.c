@@ -6,8 +6,7 @@
 
 enum { BROADCAST = NCUBE_INNER, GATHER, REDUCE, BARRIER_COME, BARRIER_GO };
 
-static unsigned relative(const struct ncube *n, unsigned root)
-{
+static unsigned relative(const struct ncube *n, unsigned root) {
     LINK_ASSERT(n->config.self < 1u << n->config.dimension &&
                 root < 1u << n->config.dimension);
     return n->config.self ^ root;
@@ -15,14 +14,12 @@ static unsigned relative(const struct ncube *n, unsigned root)
 
 /* Children of a node that is `relative` to the root: those with one bit more,
  * below its lowest. */
-static unsigned children(const struct ncube *n, unsigned relative)
-{
+static unsigned children(const struct ncube *n, unsigned relative) {
     return relative == 0 ? n->config.dimension
                          : (unsigned)__builtin_ctz(relative);
 }
 
-static size_t least(size_t a, size_t b)
-{
+static size_t least(size_t a, size_t b) {
     return a < b ? a : b;
 }
 
@@ -35,8 +32,7 @@ struct piece {
     void (*combine)(void *into, const void *from, size_t bytes);
 };
 
-static void take(void *context, const uint8_t *data, size_t size)
-{
+static void take(void *context, const uint8_t *data, size_t size) {
     struct piece *piece = context;
     piece->right = size == piece->expected;
     if (!piece->right || size == 0) {
@@ -50,8 +46,7 @@ static void take(void *context, const uint8_t *data, size_t size)
 }
 
 static int receive(struct ncube *n, unsigned from, int type,
-                   struct piece *piece)
-{
+                   struct piece *piece) {
     int source = (int)from;
     struct ncube_sink sink = {take, piece};
     if (ncube_receive(n, &source, &type, &sink) != 0) {
@@ -67,8 +62,7 @@ static int receive(struct ncube *n, unsigned from, int type,
 /* One message at least, so that what is empty arrives too. */
 static int receive_all(struct ncube *n, unsigned from, int type, uint8_t *data,
                        size_t size, size_t most,
-                       void (*combine)(void *, const void *, size_t))
-{
+                       void (*combine)(void *, const void *, size_t)) {
     size_t done = 0;
     do {
         struct piece piece = {NULL, least(size - done, most), false, combine};
@@ -82,8 +76,7 @@ static int receive_all(struct ncube *n, unsigned from, int type, uint8_t *data,
 }
 
 static int send_all(struct ncube *n, unsigned to, unsigned type,
-                    const uint8_t *data, size_t size, size_t most)
-{
+                    const uint8_t *data, size_t size, size_t most) {
     size_t done = 0;
     do {
         size_t part = least(size - done, most);
@@ -99,8 +92,7 @@ static int send_all(struct ncube *n, unsigned to, unsigned type,
 
 /* The largest subtree first. */
 static int send_to_children(struct ncube *n, unsigned root, unsigned type,
-                            const uint8_t *data, size_t size)
-{
+                            const uint8_t *data, size_t size) {
     unsigned self = relative(n, root);
     for (unsigned k = children(n, self); k-- > 0;) {
         if (ncube_send(n, data, size, root ^ (self | 1u << k), type) != 0) {
@@ -112,8 +104,7 @@ static int send_to_children(struct ncube *n, unsigned root, unsigned type,
 
 /* Not the cube's own message to all: on its way it may pass by others that a
  * neighbour wrote before, and so stand before what is asked for. */
-int ncube_broadcast(struct ncube *n, unsigned root, void *data, size_t size)
-{
+int ncube_broadcast(struct ncube *n, unsigned root, void *data, size_t size) {
     unsigned self = relative(n, root);
     uint8_t *bytes = data;
     size_t done = 0;
@@ -133,8 +124,7 @@ int ncube_broadcast(struct ncube *n, unsigned root, void *data, size_t size)
     return 0;
 }
 
-static void hold(void *context, const uint8_t *data, size_t size)
-{
+static void hold(void *context, const uint8_t *data, size_t size) {
     struct piece *piece = context;
     memcpy(piece->into, data, size);
     piece->expected = size;
@@ -142,8 +132,7 @@ static void hold(void *context, const uint8_t *data, size_t size)
 
 /* All pieces of the nodes below child k go on to the parent, in order. */
 static int pass_on(struct ncube *n, unsigned child, unsigned parent,
-                   size_t pieces)
-{
+                   size_t pieces) {
     for (size_t i = 0; i < pieces; i++) {
         struct piece piece = {n->out + NCUBE_HEAD, 0, true, NULL};
         struct ncube_sink sink = {hold, &piece};
@@ -160,8 +149,7 @@ static int pass_on(struct ncube *n, unsigned child, unsigned parent,
  * second's, ..: so they come in ascending order of the numbers relative to the
  * root. */
 int ncube_gather(struct ncube *n, unsigned root, const void *own, size_t size,
-                 void *all)
-{
+                 void *all) {
     unsigned self = relative(n, root), count = children(n, self);
     unsigned parent = root ^ (self & (self - 1));
     size_t pieces =
@@ -191,8 +179,7 @@ int ncube_gather(struct ncube *n, unsigned root, const void *own, size_t size,
 
 int ncube_reduce(struct ncube *n, unsigned root, void *data, size_t size,
                  size_t element,
-                 void (*combine)(void *into, const void *from, size_t bytes))
-{
+                 void (*combine)(void *into, const void *from, size_t bytes)) {
     unsigned self = relative(n, root), count = children(n, self);
     LINK_ASSERT(element >= 1 && element <= NCUBE_BYTES_MAX);
     size_t most = NCUBE_BYTES_MAX / element * element;
@@ -207,8 +194,7 @@ int ncube_reduce(struct ncube *n, unsigned root, void *data, size_t size,
                                 size, most);
 }
 
-int ncube_barrier(struct ncube *n)
-{
+int ncube_barrier(struct ncube *n) {
     unsigned self = relative(n, 0), count = children(n, self);
     struct piece nothing = {NULL, 0, false, NULL};
     for (unsigned k = 0; k < count; k++) {

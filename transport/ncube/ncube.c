@@ -8,8 +8,7 @@
 /* The head: type (16 bits, low byte first), two bytes of zero. */
 enum { HEAD = NCUBE_HEAD };
 
-void ncube_init(struct ncube *n, const struct ncube_config *config)
-{
+void ncube_init(struct ncube *n, const struct ncube_config *config) {
     LINK_ASSERT(config->slot_count >= 1);
     memset(n, 0, sizeof *n);
     n->config = *config;
@@ -17,8 +16,7 @@ void ncube_init(struct ncube *n, const struct ncube_config *config)
 }
 
 void whoami(const struct ncube *n, int *node, int *process, int *host,
-            int *dimension)
-{
+            int *dimension) {
     *node = n->config.self;
     *process = 0;
     *host = CUBE_HOST;
@@ -27,16 +25,14 @@ void whoami(const struct ncube *n, int *node, int *process, int *host,
 
 /* --- waiting ------------------------------------------------------------- */
 
-static int failed(struct ncube *n, enum ncube_failure failure)
-{
+static int failed(struct ncube *n, enum ncube_failure failure) {
     n->failure = failure;
     return -1;
 }
 
 /* Whether all that waited here, and all that was agreed on, is of another
  * generation.  The first one is no loss. */
-static bool renewed(struct ncube *n)
-{
+static bool renewed(struct ncube *n) {
     uint32_t before = n->generation;
     n->generation = cube_wiring(n->config.cube)->generation;
     if (n->generation == before) {
@@ -50,8 +46,7 @@ static bool renewed(struct ncube *n)
 }
 
 /* Lets the cube work, or time pass.  0, or -1. */
-static int wait(struct ncube *n, uint64_t start_us)
-{
+static int wait(struct ncube *n, uint64_t start_us) {
     const struct ncube_config *c = &n->config;
     uint64_t now_us = c->now_us(c->context);
     int moved = cube_poll(c->cube, now_us);
@@ -80,23 +75,20 @@ struct found {
     size_t size;
 };
 
-static bool fits(const struct found *found, int source, int type)
-{
+static bool fits(const struct found *found, int source, int type) {
     bool any = type == NCUBE_ANY && found->type < NCUBE_INNER;
     return (source == NCUBE_ANY || found->source == source) &&
            (any || found->type == type);
 }
 
-static struct found in_slot(const struct ncube *n, unsigned i)
-{
+static struct found in_slot(const struct ncube *n, unsigned i) {
     const struct ncube_slot *slot = &n->config.slots[i];
     return (struct found){slot->source, slot->type, slot->data, slot->size};
 }
 
 /* False: it was not written by this library. */
 static bool open_message(const struct cube_message *message,
-                         struct found *found)
-{
+                         struct found *found) {
     if (message->size < HEAD) {
         return false;
     }
@@ -107,8 +99,7 @@ static bool open_message(const struct cube_message *message,
     return true;
 }
 
-static void keep(struct ncube *n, const struct found *found)
-{
+static void keep(struct ncube *n, const struct found *found) {
     struct ncube_slot *slot = &n->config.slots[n->used++];
     LINK_ASSERT(n->used <= n->config.slot_count);
     slot->source = (uint16_t)found->source;
@@ -118,8 +109,7 @@ static void keep(struct ncube *n, const struct found *found)
     n->used_max = n->used > n->used_max ? n->used : n->used_max;
 }
 
-static void drop(struct ncube *n, unsigned i)
-{
+static void drop(struct ncube *n, unsigned i) {
     struct ncube_slot *slots = n->config.slots;
     n->used--;
     memmove(&slots[i], &slots[i + 1], (n->used - i) * sizeof slots[0]);
@@ -128,8 +118,7 @@ static void drop(struct ncube *n, unsigned i)
 /* What link d has brought, up to a message that fits, which is left in hand, or
  * one for which there is no slot; *blocked then. */
 static bool look_at_link(struct ncube *n, unsigned d, int source, int type,
-                         struct found *found, bool *blocked)
-{
+                         struct found *found, bool *blocked) {
     struct cube *cube = n->config.cube;
     struct cube_message message;
     while (cube_read_from(cube, d, &message)) {
@@ -155,8 +144,7 @@ static bool look_at_link(struct ncube *n, unsigned d, int source, int type,
 enum { NOWHERE = -1, IN_HAND = -2, NOBODY = -2 };
 
 static int look(struct ncube *n, int source, int type, struct found *found,
-                bool *stuck)
-{
+                bool *stuck) {
     unsigned blocked_links = 0, links = cube_links(n->config.cube);
     *stuck = false;
     for (unsigned i = 0; i < n->used; i++) {
@@ -178,8 +166,7 @@ static int look(struct ncube *n, int source, int type, struct found *found,
 
 /* Two that write to each other, and do not read, would wait for ever: what
  * comes meanwhile goes to the slots. */
-static void take_in(struct ncube *n)
-{
+static void take_in(struct ncube *n) {
     struct found found;
     bool stuck;
     LINK_ASSERT(look(n, NOBODY, NCUBE_ANY, &found, &stuck) == NOWHERE);
@@ -188,8 +175,7 @@ static void take_in(struct ncube *n)
 /* --- sending and receiving ----------------------------------------------- */
 
 static int send_to_self(struct ncube *n, const void *data, size_t size,
-                        unsigned type)
-{
+                        unsigned type) {
     struct found found = {n->config.self, (int)type, data, size};
     if (n->used == n->config.slot_count) {
         return failed(n, NCUBE_FULL);
@@ -199,8 +185,7 @@ static int send_to_self(struct ncube *n, const void *data, size_t size,
 }
 
 int ncube_send(struct ncube *n, const void *data, size_t size, unsigned dest,
-               unsigned type)
-{
+               unsigned type) {
     const struct ncube_config *c = &n->config;
     uint64_t start_us = c->now_us(c->context);
     bool node = dest < 1u << c->dimension;
@@ -236,8 +221,7 @@ int ncube_send(struct ncube *n, const void *data, size_t size, unsigned dest,
 }
 
 int ncube_receive(struct ncube *n, int *source, int *type,
-                  const struct ncube_sink *sink)
-{
+                  const struct ncube_sink *sink) {
     const struct ncube_config *c = &n->config;
     uint64_t start_us = c->now_us(c->context);
     struct found found;
@@ -274,8 +258,7 @@ int ncube_receive(struct ncube *n, int *source, int *type,
 /* --- the vendor's calls -------------------------------------------------- */
 
 int nwrite(struct ncube *n, const void *buffer, int size, int dest, int type,
-           int *flag)
-{
+           int *flag) {
     if (size < 0 || dest < 0 || type < 0 || type > NCUBE_TYPE_MAX) {
         return failed(n, NCUBE_NOT_SOUND);
     }
@@ -294,8 +277,7 @@ struct buffer {
     size_t size, room;
 };
 
-static void copy(void *context, const uint8_t *data, size_t size)
-{
+static void copy(void *context, const uint8_t *data, size_t size) {
     struct buffer *b = context;
     b->size = size < b->room ? size : b->room;
     if (b->size > 0) {
@@ -304,8 +286,7 @@ static void copy(void *context, const uint8_t *data, size_t size)
 }
 
 int nread(struct ncube *n, void *buffer, int size, int *source, int *type,
-          int *flag)
-{
+          int *flag) {
     struct buffer b = {buffer, 0, size > 0 ? (size_t)size : 0};
     struct ncube_sink sink = {copy, &b};
     if (size < 0 || *source < NCUBE_ANY || *type < NCUBE_ANY ||
@@ -321,8 +302,7 @@ int nread(struct ncube *n, void *buffer, int size, int *source, int *type,
     return (int)b.size;
 }
 
-int ntest(struct ncube *n, int *source, int *type)
-{
+int ntest(struct ncube *n, int *source, int *type) {
     const struct ncube_config *c = &n->config;
     struct found found;
     bool stuck;

@@ -5,32 +5,27 @@
 
 #include "transport/check.h"
 
-static bool takes(const struct tuples_operation *op)
-{
+static bool takes(const struct tuples_operation *op) {
     return op->verb == TUPLES_VERB_IN || op->verb == TUPLES_VERB_INP;
 }
 
-static bool waits(const struct tuples_operation *op)
-{
+static bool waits(const struct tuples_operation *op) {
     return op->verb == TUPLES_VERB_IN || op->verb == TUPLES_VERB_RD;
 }
 
-static bool puts_one(const struct tuples_operation *op)
-{
+static bool puts_one(const struct tuples_operation *op) {
     return op->verb == TUPLES_VERB_OUT || op->verb == TUPLES_VERB_EVAL;
 }
 
 static void tie(struct tuples_operation *op, unsigned place,
-                enum tuples_tie tied)
-{
+                enum tuples_tie tied) {
     op->owed = (uint16_t)(op->owed + (tied >= TUPLES_OWES) -
                           (op->ties[place] >= TUPLES_OWES));
     op->ties[place] = (uint8_t)tied;
 }
 
 /* Ready for another, where nobody looks at it and it owes nothing. */
-static void free_if_over(struct tuples_operation *op)
-{
+static void free_if_over(struct tuples_operation *op) {
     if (op->phase == TUPLES_OVER && op->closed && op->owed == 0) {
         op->phase = TUPLES_FREE;
     }
@@ -39,8 +34,7 @@ static void free_if_over(struct tuples_operation *op)
 /* --- the calls */
 
 static void begin(struct tuples *space, struct tuples_operation *op,
-                  enum tuples_verb verb)
-{
+                  enum tuples_verb verb) {
     LINK_ASSERT(op->phase == TUPLES_FREE && op->owed == 0);
     op->verb = (uint8_t)verb;
     op->phase = puts_one(op) ? TUPLES_PUTTING : TUPLES_FIRST;
@@ -50,8 +44,7 @@ static void begin(struct tuples *space, struct tuples_operation *op,
     op->serial = ++space->serial;
 }
 
-static int find_free(const struct tuples *space)
-{
+static int find_free(const struct tuples *space) {
     for (unsigned i = 0; i < space->config.operations; i++) {
         if (space->operations[i].phase == TUPLES_FREE) {
             return (int)i;
@@ -60,8 +53,7 @@ static int find_free(const struct tuples *space)
     return TUPLES_BUSY;
 }
 
-unsigned tuples_room(const struct tuples *space)
-{
+unsigned tuples_room(const struct tuples *space) {
     unsigned room = 0;
     for (unsigned i = 0; i < space->config.operations; i++) {
         room += space->operations[i].phase == TUPLES_FREE;
@@ -69,15 +61,13 @@ unsigned tuples_room(const struct tuples *space)
     return room;
 }
 
-static unsigned home_of(const struct tuples *space, const uint8_t *tuple)
-{
+static unsigned home_of(const struct tuples *space, const uint8_t *tuple) {
     uint32_t hash =
         tuple_is_keyed(tuple) ? tuple_key(tuple) : tuple_signature(tuple);
     return hash % space->config.places;
 }
 
-unsigned tuples_home(const struct tuples *space, const struct tuple *tuple)
-{
+unsigned tuples_home(const struct tuples *space, const struct tuple *tuple) {
     uint8_t bytes[TUPLES_TUPLE_MAX];
     LINK_ASSERT(tuple_write(tuple, bytes, space->config.tuple_bytes) > 0 &&
                 !tuple_has_formal(bytes));
@@ -85,24 +75,21 @@ unsigned tuples_home(const struct tuples *space, const struct tuple *tuple)
 }
 
 /* The places after this one in turn, as long as there are others. */
-static unsigned place_of_eval(struct tuples *space)
-{
+static unsigned place_of_eval(struct tuples *space) {
     unsigned others = space->config.places - 1u;
     unsigned step = others == 0 ? 0 : 1 + space->evals++ % others;
     return (space->config.self + step) % space->config.places;
 }
 
 static bool write_tuple(const struct tuples *space, struct tuples_operation *op,
-                        const struct tuple *tuple)
-{
+                        const struct tuple *tuple) {
     size_t size = tuple_write(tuple, op->tuple, space->config.tuple_bytes);
     op->size = (uint16_t)size;
     return size > 0 && !tuple_has_formal(op->tuple);
 }
 
 bool tuples_operation_put(struct tuples *space, unsigned number,
-                          const struct tuple *tuple)
-{
+                          const struct tuple *tuple) {
     struct tuples_operation *op = &space->operations[number];
     if (!write_tuple(space, op, tuple)) {
         return false;
@@ -113,8 +100,7 @@ bool tuples_operation_put(struct tuples *space, unsigned number,
     return true;
 }
 
-int tuples_out(struct tuples *space, const struct tuple *tuple)
-{
+int tuples_out(struct tuples *space, const struct tuple *tuple) {
     int number = find_free(space);
     if (number < 0) {
         return number;
@@ -124,8 +110,7 @@ int tuples_out(struct tuples *space, const struct tuple *tuple)
 }
 
 int tuples_eval(struct tuples *space, uint32_t function,
-                const struct tuple *tuple)
-{
+                const struct tuple *tuple) {
     int number = find_free(space);
     if (number < 0) {
         return number;
@@ -142,8 +127,7 @@ int tuples_eval(struct tuples *space, uint32_t function,
 }
 
 /* The places where such a tuple may be. */
-static void ask_all(const struct tuples *space, struct tuples_operation *op)
-{
+static void ask_all(const struct tuples *space, struct tuples_operation *op) {
     unsigned places = space->config.places;
     if (tuple_begins_formal(op->pattern)) {
         for (unsigned p = 0; p < places; p++) {
@@ -158,8 +142,7 @@ static void ask_all(const struct tuples *space, struct tuples_operation *op)
 }
 
 static int ask(struct tuples *space, enum tuples_verb verb,
-               const struct tuple *pattern)
-{
+               const struct tuple *pattern) {
     int number = find_free(space);
     if (number < 0) {
         return number;
@@ -175,28 +158,23 @@ static int ask(struct tuples *space, enum tuples_verb verb,
     return number;
 }
 
-int tuples_in(struct tuples *space, const struct tuple *pattern)
-{
+int tuples_in(struct tuples *space, const struct tuple *pattern) {
     return ask(space, TUPLES_VERB_IN, pattern);
 }
 
-int tuples_rd(struct tuples *space, const struct tuple *pattern)
-{
+int tuples_rd(struct tuples *space, const struct tuple *pattern) {
     return ask(space, TUPLES_VERB_RD, pattern);
 }
 
-int tuples_inp(struct tuples *space, const struct tuple *pattern)
-{
+int tuples_inp(struct tuples *space, const struct tuple *pattern) {
     return ask(space, TUPLES_VERB_INP, pattern);
 }
 
-int tuples_rdp(struct tuples *space, const struct tuple *pattern)
-{
+int tuples_rdp(struct tuples *space, const struct tuple *pattern) {
     return ask(space, TUPLES_VERB_RDP, pattern);
 }
 
-unsigned tuples_due(const struct tuples *space, uint16_t place)
-{
+unsigned tuples_due(const struct tuples *space, uint16_t place) {
     unsigned due = 0;
     LINK_ASSERT(place < space->config.places);
     for (unsigned i = 0; i < space->each; i++) {
@@ -207,23 +185,20 @@ unsigned tuples_due(const struct tuples *space, uint16_t place)
     return due;
 }
 
-bool tuples_is_open(const struct tuples *space, int operation)
-{
+bool tuples_is_open(const struct tuples *space, int operation) {
     LINK_ASSERT(operation >= 0 && operation < space->config.operations);
     const struct tuples_operation *op = &space->operations[operation];
     return op->phase != TUPLES_FREE && !op->closed;
 }
 
 static struct tuples_operation *open_operation(const struct tuples *space,
-                                               int number)
-{
+                                               int number) {
     LINK_ASSERT(tuples_is_open(space, number));
     return &space->operations[number];
 }
 
 enum tuples_status tuples_poll(const struct tuples *space, int operation,
-                               struct tuple *tuple)
-{
+                               struct tuple *tuple) {
     const struct tuples_operation *op = open_operation(space, operation);
     if (op->status == TUPLES_DONE && op->has_tuple) {
         LINK_ASSERT(tuple_read(tuple, op->tuple, op->size));
@@ -236,8 +211,7 @@ enum tuples_status tuples_poll(const struct tuples *space, int operation,
 /* All places but that whose tuple is taken are told that nothing is wanted of
  * them any more. */
 static void finish(struct tuples *space, struct tuples_operation *op,
-                   enum tuples_status status)
-{
+                   enum tuples_status status) {
     for (unsigned p = 0; p < space->config.places; p++) {
         uint8_t tied = op->ties[p];
         if (tied == TUPLES_OWES_ASK) {
@@ -253,8 +227,7 @@ static void finish(struct tuples *space, struct tuples_operation *op,
     free_if_over(op);
 }
 
-void tuples_close(struct tuples *space, int operation)
-{
+void tuples_close(struct tuples *space, int operation) {
     struct tuples_operation *op = open_operation(space, operation);
     op->closed = true;
     if (op->status == TUPLES_PENDING && !puts_one(op)) {
@@ -264,8 +237,7 @@ void tuples_close(struct tuples *space, int operation)
     }
 }
 
-void tuples_operations_end(struct tuples *space)
-{
+void tuples_operations_end(struct tuples *space) {
     for (unsigned i = 0; i < space->each; i++) {
         struct tuples_operation *op = &space->operations[i];
         memset(op->ties, TUPLES_UNTIED, space->config.places);
@@ -283,22 +255,19 @@ void tuples_operations_end(struct tuples *space)
 
 /* The oldest by their makers' clocks, then the lowest place's. */
 static bool is_better(const struct tuples_operation *op, uint32_t age,
-                      uint16_t place)
-{
+                      uint16_t place) {
     return !op->has_tuple || age < op->number ||
            (age == op->number && place < op->best);
 }
 
 /* What is not needed goes back; a copy has no home. */
-static void give_back(struct tuples_operation *op, uint16_t place)
-{
+static void give_back(struct tuples_operation *op, uint16_t place) {
     tie(op, place, takes(op) ? TUPLES_OWES_RELEASE : TUPLES_UNTIED);
 }
 
 static bool take_offer(const struct tuples *space, struct tuples_operation *op,
                        uint16_t source, const struct tuples_header *header,
-                       const uint8_t *data, size_t size)
-{
+                       const uint8_t *data, size_t size) {
     struct tuple tuple;
     uint8_t tied = op->ties[source];
     if ((tied != TUPLES_ASKED && tied != TUPLES_WAITS &&
@@ -326,8 +295,7 @@ static bool take_offer(const struct tuples *space, struct tuples_operation *op,
 
 /* A place has had nothing, so far or for good. */
 static bool take_none(struct tuples_operation *op, uint16_t source,
-                      enum tuples_kind kind)
-{
+                      enum tuples_kind kind) {
     uint8_t tied = op->ties[source];
     if (tied == TUPLES_ASKED && (kind == TUPLES_NONE) == op->alone) {
         tie(op, source, kind == TUPLES_NONE ? TUPLES_UNTIED : TUPLES_WAITS);
@@ -340,8 +308,7 @@ static bool take_none(struct tuples_operation *op, uint16_t source,
     return true;
 }
 
-static void ask_last(const struct tuples *space, struct tuples_operation *op)
-{
+static void ask_last(const struct tuples *space, struct tuples_operation *op) {
     op->phase = TUPLES_FINAL;
     for (unsigned p = 0; p < space->config.places; p++) {
         if (op->ties[p] == TUPLES_WAITS) {
@@ -352,8 +319,7 @@ static void ask_last(const struct tuples *space, struct tuples_operation *op)
 }
 
 /* Where the answers so far lead. */
-static void go_on(struct tuples *space, struct tuples_operation *op)
-{
+static void go_on(struct tuples *space, struct tuples_operation *op) {
     if (op->phase == TUPLES_FIRST && op->due > 0) {
         return;
     }
@@ -370,8 +336,7 @@ static void go_on(struct tuples *space, struct tuples_operation *op)
 }
 
 static bool take_put_answer(struct tuples *space, struct tuples_operation *op,
-                            uint16_t source, enum tuples_kind kind)
-{
+                            uint16_t source, enum tuples_kind kind) {
     if (op->ties[source] != TUPLES_PUT_SENT) {
         return false;
     }
@@ -386,8 +351,7 @@ static bool take_put_answer(struct tuples *space, struct tuples_operation *op,
 
 bool tuples_operation_take(struct tuples *space, uint16_t source,
                            const struct tuples_header *header,
-                           const uint8_t *data, size_t size)
-{
+                           const uint8_t *data, size_t size) {
     struct tuples_operation *op = &space->operations[header->operation];
     enum tuples_kind kind = (enum tuples_kind)header->kind;
     if (op->serial != header->serial || op->phase == TUPLES_FREE ||
@@ -413,8 +377,7 @@ bool tuples_operation_take(struct tuples *space, uint16_t source,
 /* --- sending */
 
 static bool send_owed(struct tuples *space, struct tuples_operation *op,
-                      uint16_t place)
-{
+                      uint16_t place) {
     struct tuples_header header = {.operation =
                                        (uint16_t)(op - space->operations),
                                    .serial = op->serial,
@@ -460,8 +423,7 @@ static bool send_owed(struct tuples *space, struct tuples_operation *op,
 /* Whether an operation that began before owes the place a word, which must come
  * first: what it gives back, the next may ask for. */
 static bool is_preceded(const struct tuples *space,
-                        const struct tuples_operation *op, unsigned place)
-{
+                        const struct tuples_operation *op, unsigned place) {
     for (unsigned i = 0; i < space->each; i++) {
         const struct tuples_operation *other = &space->operations[i];
         if (other->owed > 0 && other->ties[place] >= TUPLES_OWES &&
@@ -473,8 +435,7 @@ static bool is_preceded(const struct tuples *space,
 }
 
 unsigned tuples_operation_send(struct tuples *space,
-                               struct tuples_operation *op, unsigned *tries)
-{
+                               struct tuples_operation *op, unsigned *tries) {
     unsigned places = space->config.places, sent = 0;
     for (unsigned i = 0; i < places && op->owed > 0 && *tries > 0; i++) {
         uint16_t place = op->cursor;

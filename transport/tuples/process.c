@@ -5,8 +5,7 @@
 
 #include "transport/check.h"
 
-unsigned tuples_processes_free(const struct tuples *space)
-{
+unsigned tuples_processes_free(const struct tuples *space) {
     unsigned count = 0;
     for (unsigned i = 0; i < space->config.processes; i++) {
         count += space->processes[i].state == TUPLES_IDLE;
@@ -15,8 +14,7 @@ unsigned tuples_processes_free(const struct tuples *space)
 }
 
 void tuples_process_start(struct tuples *space, uint32_t function,
-                          const uint8_t *data, size_t size)
-{
+                          const uint8_t *data, size_t size) {
     unsigned i = 0;
     while (space->processes[i].state != TUPLES_IDLE) {
         i++;
@@ -29,8 +27,7 @@ void tuples_process_start(struct tuples *space, uint32_t function,
     process->function = function;
 }
 
-unsigned tuples_processes_run(struct tuples *space)
-{
+unsigned tuples_processes_run(struct tuples *space) {
     const struct tuples_config *config = &space->config;
     unsigned moved = 0;
     for (unsigned i = 0; i < config->processes; i++) {

@@ -7,21 +7,18 @@
 
 #include "transport/check.h"
 
-static struct tuples_request *row_at(struct tuples *space, uint32_t row)
-{
+static struct tuples_request *row_at(struct tuples *space, uint32_t row) {
     LINK_ASSERT(row < space->rows);
     return &space->requests[row];
 }
 
-static bool asks(const struct tuples_request *r)
-{
+static bool asks(const struct tuples_request *r) {
     return r->wish == TUPLES_TAKE || r->wish == TUPLES_READ;
 }
 
 /* --- the line */
 
-static void join(struct tuples *space, uint32_t row)
-{
+static void join(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
     r->waits = true;
     r->next = TUPLES_NOBODY;
@@ -38,8 +35,7 @@ static void join(struct tuples *space, uint32_t row)
     }
 }
 
-static void leave(struct tuples *space, uint32_t row)
-{
+static void leave(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
     if (r->previous == TUPLES_NOBODY) {
         space->first = r->next;
@@ -58,8 +54,7 @@ static void leave(struct tuples *space, uint32_t row)
 
 /* --- replies */
 
-static void reply(struct tuples *space, uint32_t row, enum tuples_kind kind)
-{
+static void reply(struct tuples *space, uint32_t row, enum tuples_kind kind) {
     struct tuples_request *r = row_at(space, row);
     r->reply = (uint8_t)kind;
     if (!r->queued) {
@@ -71,8 +66,7 @@ static void reply(struct tuples *space, uint32_t row, enum tuples_kind kind)
     }
 }
 
-static void set_free(struct tuples_request *r)
-{
+static void set_free(struct tuples_request *r) {
     r->wish = TUPLES_NO_WISH;
     r->reply = 0;
     r->promised = false;
@@ -80,8 +74,7 @@ static void set_free(struct tuples_request *r)
 
 /* The record is this request's, until it says whether it takes it; a copy's,
  * until it is sent. */
-static void hold(struct tuples *space, uint32_t row, uint32_t at)
-{
+static void hold(struct tuples *space, uint32_t row, uint32_t at) {
     tuples_store_at(&space->store, at)->holder = row;
     if (row_at(space, row)->waits) {
         leave(space, row);
@@ -90,8 +83,7 @@ static void hold(struct tuples *space, uint32_t row, uint32_t at)
 }
 
 /* Gives a record that nobody holds to the first in line that it matches. */
-static void pass(struct tuples *space, uint32_t at)
-{
+static void pass(struct tuples *space, uint32_t at) {
     const uint8_t *tuple = tuples_store_tuple(&space->store, at);
     tuples_store_at(&space->store, at)->holder = TUPLES_UNHELD;
     for (uint32_t row = space->first; row != TUPLES_NOBODY;
@@ -106,8 +98,7 @@ static void pass(struct tuples *space, uint32_t at)
 
 /* Tells a request in the line that there is nothing: not while something that
  * it matches is held, which may come back. */
-static void tell_none(struct tuples *space, uint32_t row)
-{
+static void tell_none(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
     if (!tuples_store_is_held(&space->store, r->pattern)) {
         leave(space, row);
@@ -115,8 +106,7 @@ static void tell_none(struct tuples *space, uint32_t row)
     }
 }
 
-static void tell_all_none(struct tuples *space)
-{
+static void tell_all_none(struct tuples *space) {
     uint32_t row = space->asking_last == 0 ? TUPLES_NOBODY : space->first;
     while (row != TUPLES_NOBODY) {
         uint32_t next = space->requests[row].next;
@@ -130,8 +120,7 @@ static void tell_all_none(struct tuples *space)
 /* --- room */
 
 static bool may_promise(const struct tuples *space,
-                        const struct tuples_request *r)
-{
+                        const struct tuples_request *r) {
     if (r->wish == TUPLES_RUN) {
         return tuples_processes_free(space) > space->promised_processes;
     }
@@ -139,8 +128,7 @@ static bool may_promise(const struct tuples *space,
            space->store.room - space->store.used - space->promised_bytes;
 }
 
-void tuples_request_promise(struct tuples *space)
-{
+void tuples_request_promise(struct tuples *space) {
     bool full[TUPLES_RUN + 1] = {false};
     uint32_t row = space->first;
     while (row != TUPLES_NOBODY && !(full[TUPLES_STORE] && full[TUPLES_RUN])) {
@@ -164,8 +152,7 @@ void tuples_request_promise(struct tuples *space)
 }
 
 /* A request is over that held a record: taken, or given back. */
-static void decide(struct tuples *space, uint32_t row, bool taken)
-{
+static void decide(struct tuples *space, uint32_t row, bool taken) {
     uint32_t at = tuples_store_held_by(&space->store, row);
     LINK_ASSERT(at != TUPLES_NOWHERE);
 #ifdef INCODE_PLANT_TAKEN_BY_TWO /* a fault that the tests have to find */
@@ -191,8 +178,7 @@ static void decide(struct tuples *space, uint32_t row, bool taken)
 
 static bool take_ask(struct tuples *space, uint32_t row,
                      const struct tuples_header *header, const uint8_t *data,
-                     size_t size)
-{
+                     size_t size) {
     struct tuples_request *r = row_at(space, row);
     struct tuple pattern;
     if (r->wish != TUPLES_NO_WISH || size > TUPLES_PATTERN_MAX ||
@@ -218,8 +204,7 @@ static bool take_ask(struct tuples *space, uint32_t row,
     return true;
 }
 
-static bool take_last(struct tuples *space, uint32_t row)
-{
+static bool take_last(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
     if (r->last) {
         return false;
@@ -232,8 +217,7 @@ static bool take_last(struct tuples *space, uint32_t row)
     return true;
 }
 
-static bool take_release(struct tuples *space, uint32_t row, bool accepted)
-{
+static bool take_release(struct tuples *space, uint32_t row, bool accepted) {
     struct tuples_request *r = row_at(space, row);
     bool offered = !r->waits && r->reply == 0;
     bool holds = !r->waits && (r->reply == 0 || r->reply == TUPLES_OFFER);
@@ -253,8 +237,7 @@ static bool take_release(struct tuples *space, uint32_t row, bool accepted)
 /* Stores or starts what there is a promise for. */
 static void keep_promise(struct tuples *space, uint32_t row,
                          const struct tuples_header *header,
-                         const uint8_t *data)
-{
+                         const uint8_t *data) {
     struct tuples_request *r = row_at(space, row);
     r->promised = false;
     reply(space, row, TUPLES_STORED);
@@ -276,8 +259,7 @@ static void keep_promise(struct tuples *space, uint32_t row,
 
 static bool take_put(struct tuples *space, uint32_t row,
                      const struct tuples_header *header, const uint8_t *data,
-                     size_t size)
-{
+                     size_t size) {
     struct tuples_request *r = row_at(space, row);
     uint8_t wish = header->kind == TUPLES_START ? TUPLES_RUN : TUPLES_STORE;
     struct tuple tuple;
@@ -313,8 +295,7 @@ static bool take_put(struct tuples *space, uint32_t row,
 
 bool tuples_request_take(struct tuples *space, uint16_t source,
                          const struct tuples_header *header,
-                         const uint8_t *data, size_t size)
-{
+                         const uint8_t *data, size_t size) {
     uint32_t row = source * space->each + header->operation;
     struct tuples_request *r = row_at(space, row);
     if (header->kind == TUPLES_ASK) {
@@ -338,8 +319,7 @@ bool tuples_request_take(struct tuples *space, uint16_t source,
 /* --- sending */
 
 /* What follows when a reply has left. */
-static void has_sent(struct tuples *space, uint32_t row)
-{
+static void has_sent(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
     uint8_t kind = r->reply;
     bool copy = kind == TUPLES_OFFER && r->wish == TUPLES_READ;
@@ -353,8 +333,7 @@ static void has_sent(struct tuples *space, uint32_t row)
     }
 }
 
-static bool send_reply(struct tuples *space, uint32_t row)
-{
+static bool send_reply(struct tuples *space, uint32_t row) {
     const struct tuples_request *r = row_at(space, row);
     struct tuples_header header = {.kind = r->reply,
                                    .operation = (uint16_t)(row % space->each),
@@ -372,8 +351,7 @@ static bool send_reply(struct tuples *space, uint32_t row)
                        size);
 }
 
-unsigned tuples_request_send(struct tuples *space, unsigned tries)
-{
+unsigned tuples_request_send(struct tuples *space, unsigned tries) {
     unsigned sent = 0;
     uint32_t queued = space->reply_count;
     for (uint32_t i = 0; i < queued && i < tries; i++) {

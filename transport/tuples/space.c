@@ -10,13 +10,11 @@
 
 enum { ALIGNMENT = 8 };
 
-static size_t aligned(size_t bytes)
-{
+static size_t aligned(size_t bytes) {
     return (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
 }
 
-static bool is_sound(const struct tuples_config *c)
-{
+static bool is_sound(const struct tuples_config *c) {
     return c->places > 0 && c->places <= TUPLES_PLACES_MAX &&
            c->self < c->places && c->operations > 0 &&
            c->operations + c->processes <= TUPLES_OPERATIONS_MAX &&
@@ -37,15 +35,13 @@ struct cut {
     size_t bytes;
 };
 
-static void *piece(struct cut *cut, size_t bytes)
-{
+static void *piece(struct cut *cut, size_t bytes) {
     void *at = cut->memory == NULL ? NULL : cut->memory + cut->bytes;
     cut->bytes += aligned(bytes);
     return at;
 }
 
-static void lay(struct tuples *space, struct cut *cut)
-{
+static void lay(struct tuples *space, struct cut *cut) {
     const struct tuples_config *c = &space->config;
     unsigned each = space->each;
     space->operations = piece(cut, each * sizeof *space->operations);
@@ -73,16 +69,15 @@ static void lay(struct tuples *space, struct cut *cut)
     }
 }
 
-static void set_config(struct tuples *space, const struct tuples_config *config)
-{
+static void set_config(struct tuples *space,
+                       const struct tuples_config *config) {
     memset(space, 0, sizeof *space);
     space->config = *config;
     space->each = (uint32_t)config->operations + config->processes;
     space->rows = space->each * config->places;
 }
 
-size_t tuples_arena_bytes(const struct tuples_config *config)
-{
+size_t tuples_arena_bytes(const struct tuples_config *config) {
     struct tuples space;
     struct cut cut = {NULL, aligned(sizeof space)};
     if (!is_sound(config)) {
@@ -94,8 +89,7 @@ size_t tuples_arena_bytes(const struct tuples_config *config)
 }
 
 /* Nothing is stored, asked for or run. */
-static void empty(struct tuples *space, uint32_t generation)
-{
+static void empty(struct tuples *space, uint32_t generation) {
     space->generation = generation;
     space->clock = space->evals = 0;
     space->store.used = space->store.count = 0;
@@ -112,8 +106,7 @@ static void empty(struct tuples *space, uint32_t generation)
 
 struct tuples *tuples_init(void *arena, size_t bytes,
                            const struct tuples_config *config,
-                           uint32_t generation)
-{
+                           uint32_t generation) {
     size_t needed = tuples_arena_bytes(config);
     struct tuples *space = arena;
     struct cut cut = {arena, aligned(sizeof *space)};
@@ -127,16 +120,14 @@ struct tuples *tuples_init(void *arena, size_t bytes,
     return space;
 }
 
-void tuples_renew(struct tuples *space, uint32_t generation)
-{
+void tuples_renew(struct tuples *space, uint32_t generation) {
     tuples_operations_end(space);
     empty(space, generation);
 }
 
 /* --- messages */
 
-static void put_header(uint8_t *p, const struct tuples_header *header)
-{
+static void put_header(uint8_t *p, const struct tuples_header *header) {
     p[0] = header->kind;
     p[1] = header->flags;
     bytes_put16(p + 2, header->operation);
@@ -146,8 +137,7 @@ static void put_header(uint8_t *p, const struct tuples_header *header)
     bytes_put32(p + 16, header->number);
 }
 
-static void get_header(const uint8_t *p, struct tuples_header *header)
-{
+static void get_header(const uint8_t *p, struct tuples_header *header) {
     header->kind = p[0];
     header->flags = p[1];
     header->operation = bytes_get16(p + 2);
@@ -159,8 +149,7 @@ static void get_header(const uint8_t *p, struct tuples_header *header)
 
 static bool deliver(struct tuples *space, uint16_t source,
                     const struct tuples_header *header, const uint8_t *data,
-                    size_t size)
-{
+                    size_t size) {
     return header->kind < TUPLES_OFFER
                ? tuples_request_take(space, source, header, data, size)
                : tuples_operation_take(space, source, header, data, size);
@@ -168,8 +157,7 @@ static bool deliver(struct tuples *space, uint16_t source,
 
 bool tuples_send(struct tuples *space, uint16_t place,
                  const struct tuples_header *header, const uint8_t *data,
-                 size_t size)
-{
+                 size_t size) {
     const struct tuples_config *config = &space->config;
     struct tuples_header whole = *header;
     if (place == config->self) {
@@ -191,8 +179,7 @@ bool tuples_send(struct tuples *space, uint16_t place,
 }
 
 bool tuples_take(struct tuples *space, uint16_t source, const uint8_t *data,
-                 size_t size)
-{
+                 size_t size) {
     struct tuples_header header;
     if (size < TUPLES_HEADER_BYTES || source >= space->config.places ||
         source == space->config.self) {
@@ -214,8 +201,7 @@ bool tuples_take(struct tuples *space, uint16_t source, const uint8_t *data,
                    size - TUPLES_HEADER_BYTES);
 }
 
-unsigned tuples_step(struct tuples *space)
-{
+unsigned tuples_step(struct tuples *space) {
     unsigned tries = TUPLES_STEP_MESSAGES / 2;
     unsigned moved = tuples_processes_run(space);
     moved += tuples_request_send(space, tries);
@@ -227,8 +213,7 @@ unsigned tuples_step(struct tuples *space)
     return moved;
 }
 
-uint32_t tuples_held(const struct tuples *space)
-{
+uint32_t tuples_held(const struct tuples *space) {
     uint32_t held = space->store.count + space->promised_bytes +
                     space->promised_processes + space->config.processes -
                     tuples_processes_free(space);
@@ -241,13 +226,12 @@ uint32_t tuples_held(const struct tuples *space)
     return held;
 }
 
-struct tuples_account tuples_account(const struct tuples *space, uint16_t place)
-{
+struct tuples_account tuples_account(const struct tuples *space,
+                                     uint16_t place) {
     LINK_ASSERT(place < space->config.places);
     return space->accounts[place];
 }
 
-const struct tuples_statistics *tuples_statistics(const struct tuples *space)
-{
+const struct tuples_statistics *tuples_statistics(const struct tuples *space) {
     return &space->statistics;
 }

@@ -5,31 +5,27 @@
 #include "transport/check.h"
 #include "tuple.h"
 
-uint32_t tuples_store_needed(size_t size)
-{
+uint32_t tuples_store_needed(size_t size) {
     return (uint32_t)(sizeof(struct tuples_record) + (size + 3) / 4 * 4);
 }
 
 struct tuples_record *tuples_store_at(const struct tuples_store *store,
-                                      uint32_t at)
-{
+                                      uint32_t at) {
     LINK_ASSERT(at < store->used && at % 4 == 0);
     return (struct tuples_record *)(void *)(store->bytes + at);
 }
 
-const uint8_t *tuples_store_tuple(const struct tuples_store *store, uint32_t at)
-{
+const uint8_t *tuples_store_tuple(const struct tuples_store *store,
+                                  uint32_t at) {
     return store->bytes + at + sizeof(struct tuples_record);
 }
 
-static uint32_t behind(const struct tuples_store *store, uint32_t at)
-{
+static uint32_t behind(const struct tuples_store *store, uint32_t at) {
     return at + tuples_store_needed(tuples_store_at(store, at)->size);
 }
 
 uint32_t tuples_store_add(struct tuples_store *store, uint32_t age,
-                          const uint8_t *tuple, size_t size)
-{
+                          const uint8_t *tuple, size_t size) {
     uint32_t at = store->used, needed = tuples_store_needed(size);
     LINK_ASSERT(size > 0 && needed <= store->room - store->used);
     store->used += needed;
@@ -43,8 +39,7 @@ uint32_t tuples_store_add(struct tuples_store *store, uint32_t age,
 }
 
 uint32_t tuples_store_find(const struct tuples_store *store,
-                           const uint8_t *pattern)
-{
+                           const uint8_t *pattern) {
     for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
         if (tuples_store_at(store, at)->holder == TUPLES_UNHELD &&
             tuple_matches(pattern, tuples_store_tuple(store, at))) {
@@ -55,8 +50,7 @@ uint32_t tuples_store_find(const struct tuples_store *store,
 }
 
 bool tuples_store_is_held(const struct tuples_store *store,
-                          const uint8_t *pattern)
-{
+                          const uint8_t *pattern) {
     for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
         if (tuples_store_at(store, at)->holder != TUPLES_UNHELD &&
             tuple_matches(pattern, tuples_store_tuple(store, at))) {
@@ -66,8 +60,7 @@ bool tuples_store_is_held(const struct tuples_store *store,
     return false;
 }
 
-uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row)
-{
+uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row) {
     for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
         if (tuples_store_at(store, at)->holder == row) {
             return at;
@@ -76,8 +69,7 @@ uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row)
     return TUPLES_NOWHERE;
 }
 
-void tuples_store_drop(struct tuples_store *store, uint32_t at)
-{
+void tuples_store_drop(struct tuples_store *store, uint32_t at) {
     uint32_t next = behind(store, at);
     memmove(store->bytes + at, store->bytes + next, store->used - next);
     store->used -= next - at;

@@ -11,26 +11,22 @@ enum { TYPES_AT = 2, FORMAL = 0x80 };
 static_assert(sizeof(double) == 8, "a double as eight bytes");
 
 /* Bytes of a value, without the length that stands before bytes. */
-static size_t fixed_size(unsigned type)
-{
+static size_t fixed_size(unsigned type) {
     return type == TUPLE_TYPE_BYTES                                ? 0
            : type == TUPLE_TYPE_INT64 || type == TUPLE_TYPE_DOUBLE ? 8
                                                                    : 4;
 }
 
-static void put64(uint8_t *p, uint64_t value)
-{
+static void put64(uint8_t *p, uint64_t value) {
     bytes_put32(p, (uint32_t)value);
     bytes_put32(p + 4, (uint32_t)(value >> 32));
 }
 
-static uint64_t get64(const uint8_t *p)
-{
+static uint64_t get64(const uint8_t *p) {
     return bytes_get32(p) | (uint64_t)bytes_get32(p + 4) << 32;
 }
 
-static size_t value_size(const struct tuple_field *field)
-{
+static size_t value_size(const struct tuple_field *field) {
     if (field->formal) {
         return 0;
     }
@@ -38,8 +34,7 @@ static size_t value_size(const struct tuple_field *field)
                                            : fixed_size(field->type);
 }
 
-static void write_value(const struct tuple_field *field, uint8_t *p)
-{
+static void write_value(const struct tuple_field *field, uint8_t *p) {
     uint64_t bits;
     switch (field->type) {
     case TUPLE_TYPE_INT32:
@@ -63,8 +58,7 @@ static void write_value(const struct tuple_field *field, uint8_t *p)
     }
 }
 
-size_t tuple_write(const struct tuple *tuple, uint8_t *bytes, size_t room)
-{
+size_t tuple_write(const struct tuple *tuple, uint8_t *bytes, size_t room) {
     unsigned count = tuple->count;
     size_t size = TYPES_AT + (size_t)count;
     if (count == 0 || count > TUPLE_FIELDS_MAX || size > room) {
@@ -90,8 +84,7 @@ size_t tuple_write(const struct tuple *tuple, uint8_t *bytes, size_t room)
 /* Takes a field's value; the bytes that it took in *used.  False: there are
  * too few. */
 static bool read_value(struct tuple_field *field, const uint8_t *p, size_t left,
-                       size_t *used)
-{
+                       size_t *used) {
     uint64_t bits;
     size_t least =
         field->type == TUPLE_TYPE_BYTES ? 2 : fixed_size(field->type);
@@ -120,8 +113,7 @@ static bool read_value(struct tuple_field *field, const uint8_t *p, size_t left,
     return *used <= left;
 }
 
-bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size)
-{
+bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size) {
     memset(tuple, 0, sizeof *tuple);
     if (size < TYPES_AT || bytes[0] == 0 || bytes[0] > TUPLE_FIELDS_MAX ||
         bytes[1] > 1 || size < TYPES_AT + (size_t)bytes[0]) {
@@ -145,8 +137,7 @@ bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size)
     return at == size;
 }
 
-bool tuple_has_formal(const uint8_t *bytes)
-{
+bool tuple_has_formal(const uint8_t *bytes) {
     unsigned any = 0;
     for (unsigned i = 0; i < bytes[0]; i++) {
         any |= bytes[TYPES_AT + i];
@@ -154,23 +145,19 @@ bool tuple_has_formal(const uint8_t *bytes)
     return (any & FORMAL) != 0;
 }
 
-bool tuple_begins_formal(const uint8_t *bytes)
-{
+bool tuple_begins_formal(const uint8_t *bytes) {
     return (bytes[TYPES_AT] & FORMAL) != 0;
 }
 
-bool tuple_is_keyed(const uint8_t *bytes)
-{
+bool tuple_is_keyed(const uint8_t *bytes) {
     return bytes[1] != 0;
 }
 
-static size_t written_size(unsigned type, const uint8_t *p)
-{
+static size_t written_size(unsigned type, const uint8_t *p) {
     return type == TUPLE_TYPE_BYTES ? 2u + bytes_get16(p) : fixed_size(type);
 }
 
-bool tuple_matches(const uint8_t *pattern, const uint8_t *tuple)
-{
+bool tuple_matches(const uint8_t *pattern, const uint8_t *tuple) {
     unsigned count = tuple[0];
     size_t p = TYPES_AT + (size_t)count, t = p;
     if (pattern[0] != count) {
@@ -196,23 +183,20 @@ bool tuple_matches(const uint8_t *pattern, const uint8_t *tuple)
 
 /* Fowler, Noll and Vo's hash 1a, and the last steps of Appleby's murmur3, so
  * that the low bits depend on all. */
-static uint32_t add(uint32_t hash, const uint8_t *p, size_t size)
-{
+static uint32_t add(uint32_t hash, const uint8_t *p, size_t size) {
     for (size_t i = 0; i < size; i++) {
         hash = (hash ^ p[i]) * UINT32_C(16777619);
     }
     return hash;
 }
 
-static uint32_t spread(uint32_t h)
-{
+static uint32_t spread(uint32_t h) {
     h = (h ^ h >> 16) * UINT32_C(0x85ebca6b);
     h = (h ^ h >> 13) * UINT32_C(0xc2b2ae35);
     return h ^ h >> 16;
 }
 
-static uint32_t add_types(const uint8_t *bytes)
-{
+static uint32_t add_types(const uint8_t *bytes) {
     uint32_t hash = add(UINT32_C(2166136261), bytes, 1);
     for (unsigned i = 0; i < bytes[0]; i++) {
         uint8_t type = bytes[TYPES_AT + i] & (FORMAL - 1);
@@ -221,13 +205,11 @@ static uint32_t add_types(const uint8_t *bytes)
     return hash;
 }
 
-uint32_t tuple_signature(const uint8_t *bytes)
-{
+uint32_t tuple_signature(const uint8_t *bytes) {
     return spread(add_types(bytes));
 }
 
-uint32_t tuple_key(const uint8_t *bytes)
-{
+uint32_t tuple_key(const uint8_t *bytes) {
     const uint8_t *value = bytes + TYPES_AT + bytes[0];
     size_t size = written_size(bytes[TYPES_AT], value);
     return spread(add(add_types(bytes), value, size));

@@ -54,8 +54,7 @@ struct tuple {
 
 /* Fields, as initialisers within braces or behind (struct tuple_field). */
 #define TUPLE_FIELD(kind, name, value)                                         \
-    (struct tuple_field)                                                       \
-    {                                                                          \
+    (struct tuple_field) {                                                     \
         .type = (kind), .as.name = (value)                                     \
     }
 #define TUPLE_INT32(value) TUPLE_FIELD(TUPLE_TYPE_INT32, int32, value)
@@ -63,13 +62,11 @@ struct tuple {
 #define TUPLE_INT64(value) TUPLE_FIELD(TUPLE_TYPE_INT64, int64, value)
 #define TUPLE_DOUBLE(value) TUPLE_FIELD(TUPLE_TYPE_DOUBLE, real, value)
 #define TUPLE_BYTES(at, length)                                                \
-    (struct tuple_field)                                                       \
-    {                                                                          \
+    (struct tuple_field) {                                                     \
         .type = TUPLE_TYPE_BYTES, .size = (uint16_t)(length), .as.bytes = (at) \
     }
 #define TUPLE_FORMAL(kind)                                                     \
-    (struct tuple_field)                                                       \
-    {                                                                          \
+    (struct tuple_field) {                                                     \
         .type = (kind), .formal = true                                         \
     }
 

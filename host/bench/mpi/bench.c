@@ -9,14 +9,12 @@
 static struct mpi_place place;
 static struct mpi_pipe wire;
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     (void)context;
     mpi_sleep(&place, &wire, 1, NULL, wait_us);
 }
 
-int host_mpi_bench(void)
-{
+int host_mpi_bench(void) {
     struct host_bench_row row;
     struct host_bench_end end;
     memset(&row, 0, sizeof row);

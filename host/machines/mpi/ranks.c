@@ -18,14 +18,12 @@ enum {
 
 static volatile sig_atomic_t terminated;
 
-static void note_end(int signal)
-{
+static void note_end(int signal) {
     (void)signal;
     terminated = 1;
 }
 
-static uint64_t clock_us(void)
-{
+static uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
@@ -33,8 +31,7 @@ static uint64_t clock_us(void)
 
 /* --- orders --------------------------------------------------------------- */
 
-static void tell_all(struct host_ranks *r, uint32_t word)
-{
+static void tell_all(struct host_ranks *r, uint32_t word) {
     r->order.word = word;
     for (int i = 1; i < r->place.ranks; i++) {
         /* A few bytes, which MPI takes at once. */
@@ -44,8 +41,7 @@ static void tell_all(struct host_ranks *r, uint32_t word)
     }
 }
 
-int host_ranks_open(struct host_ranks *ranks, struct host_error *error)
-{
+int host_ranks_open(struct host_ranks *ranks, struct host_error *error) {
     struct sigaction action = {.sa_handler = note_end};
     unsigned nodes = 0;
     int count = 0;
@@ -66,8 +62,7 @@ int host_ranks_open(struct host_ranks *ranks, struct host_error *error)
 }
 
 int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
-                     unsigned window, struct host_error *error)
-{
+                     unsigned window, struct host_error *error) {
     struct mpi_order *order = &ranks->order;
     if (nodes >= (unsigned)ranks->place.ranks) {
         return host_fail(error, HOST_USAGE,
@@ -103,8 +98,7 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
 /* --- losses --------------------------------------------------------------- */
 
 /* Open MPI waits for its processes as soon as they end. */
-static int find_lost(const struct host_ranks *r)
-{
+static int find_lost(const struct host_ranks *r) {
     for (int i = 1; i < r->place.ranks; i++) {
         pid_t process = (pid_t)r->place.process[i];
         if (process != 0 && kill(process, 0) != 0 && errno == ESRCH) {
@@ -114,8 +108,7 @@ static int find_lost(const struct host_ranks *r)
     return 0;
 }
 
-static int check(void *context, struct host_error *error)
-{
+static int check(void *context, struct host_error *error) {
     struct host_ranks *r = context;
     uint64_t end = clock_us() + LOOKS_US;
     if (!r->running) {
@@ -144,14 +137,12 @@ static int check(void *context, struct host_error *error)
 
 /* --- as a machine --------------------------------------------------------- */
 
-static uint64_t machine_now_us(void *context)
-{
+static uint64_t machine_now_us(void *context) {
     (void)context;
     return clock_us();
 }
 
-static void machine_idle(void *context, uint64_t wait_us)
-{
+static void machine_idle(void *context, uint64_t wait_us) {
     struct host_ranks *r = context;
     if (!r->running) {
         return; /* nothing more will come */
@@ -159,8 +150,7 @@ static void machine_idle(void *context, uint64_t wait_us)
     mpi_sleep(&r->place, r->pipe, r->wires, NULL, wait_us);
 }
 
-static bool machine_ended(void *context)
-{
+static bool machine_ended(void *context) {
     struct host_ranks *r = context;
     int there = r->running;
     uint32_t tag = 0;
@@ -176,8 +166,7 @@ static bool machine_ended(void *context)
     return !r->running || r->ended == r->order.nodes;
 }
 
-static void leave(struct host_ranks *r)
-{
+static void leave(struct host_ranks *r) {
     if (r->open) {
         tell_all(r, MPI_WORD_LEAVE);
         mpi_place_close(&r->place);
@@ -190,8 +179,7 @@ static void leave(struct host_ranks *r)
     r->left = true;
 }
 
-static void machine_stop(void *context)
-{
+static void machine_stop(void *context) {
     struct host_ranks *r = context;
     if (!r->running) {
         return;
@@ -210,8 +198,7 @@ static void machine_stop(void *context)
     }
 }
 
-struct host_machine host_ranks_machine(struct host_ranks *ranks)
-{
+struct host_machine host_ranks_machine(struct host_ranks *ranks) {
     struct host_machine machine;
     memset(&machine, 0, sizeof machine);
     machine.context = ranks;
@@ -231,8 +218,7 @@ struct host_machine host_ranks_machine(struct host_ranks *ranks)
     return machine;
 }
 
-void host_ranks_close(struct host_ranks *ranks, int status)
-{
+void host_ranks_close(struct host_ranks *ranks, int status) {
     if (ranks->lost != 0 || ranks->terminated || ranks->stuck) {
         (void)fflush(NULL);
         _exit(status);

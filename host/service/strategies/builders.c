@@ -7,8 +7,7 @@ enum { JOBS_PER_WORKER = 2 };
 
 /* How many of the group before this node are there. */
 static unsigned place(const struct host_work *work,
-                      const struct host_builders *group, unsigned node)
-{
+                      const struct host_builders *group, unsigned node) {
     unsigned before = 0;
     for (unsigned i = group->first; i < node; i++) {
         before += !host_is_lost(work, i);
@@ -18,8 +17,7 @@ static unsigned place(const struct host_work *work,
 
 static void appoint(const struct host_work *work,
                     const struct host_builders *group, unsigned manager,
-                    struct node_setup_message *setup)
-{
+                    struct node_setup_message *setup) {
     unsigned left = group->builders, kept = group->holders;
     setup->role = NODE_MANAGER;
     for (unsigned i = manager + 1; i < group->last && left > 0; i++) {
@@ -36,8 +34,7 @@ static void appoint(const struct host_work *work,
 }
 
 struct host_builders host_builders_of_all(const struct host_work *work,
-                                          unsigned faces_per_job)
-{
+                                          unsigned faces_per_job) {
     unsigned asked = work->sharing.builders, most = work->nodes - 1;
     unsigned builders = asked != 0 && asked < most ? asked : most;
     bool all = work->living == work->nodes;
@@ -47,8 +44,7 @@ struct host_builders host_builders_of_all(const struct host_work *work,
 
 void host_builders_set_up(const struct host_work *work,
                           const struct host_builders *group, unsigned node,
-                          struct node_setup_message *setup)
-{
+                          struct node_setup_message *setup) {
     const struct host_sharing *sharing = &work->sharing;
     unsigned faces = sharing->faces_per_job != 0 ? sharing->faces_per_job
                                                  : group->faces_per_job;
@@ -80,8 +76,7 @@ void host_builders_set_up(const struct host_work *work,
 
 int host_builders_check(const char *name, unsigned group,
                         const struct host_sharing *sharing,
-                        enum incode_face_rule rule, struct host_error *error)
-{
+                        enum incode_face_rule rule, struct host_error *error) {
     if (rule != INCODE_FACE_OWN) {
         return host_fail(error, HOST_USAGE,
                          "--face-rule paper: asks for points, which a face "

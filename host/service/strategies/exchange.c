@@ -16,8 +16,7 @@ struct exchange {
     uint32_t to_all, next;
 };
 
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     /* Less is built again than in `spatial`, but each tetrahedron at a border
      * is told to others. */
     struct host_cost cost = host_regions_cost(task, 0.5);
@@ -27,15 +26,13 @@ static struct host_cost cost(const struct host_task *task)
 /* In this generation: nobody is lost, nothing is done that the others would
  * have to know, and each message has its e-cube way, or one that is held back
  * could hold up the way to the host. */
-static bool exchanges(const struct host_work *work)
-{
+static bool exchanges(const struct host_work *work) {
     return work->living == work->nodes && !work->goes_round &&
            (work->ledger == NULL || work->ledger->committed == 0);
 }
 
 static int check(unsigned nodes, const struct host_sharing *sharing,
-                 enum incode_face_rule rule, struct host_error *error)
-{
+                 enum incode_face_rule rule, struct host_error *error) {
     (void)nodes, (void)sharing;
     return rule == INCODE_FACE_OWN
                ? 0
@@ -46,8 +43,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 }
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     (void)node;
     setup->holders = 0;
     setup->role = exchanges(work) ? NODE_EXCHANGE : NODE_WORKER;
@@ -57,8 +53,7 @@ static void set_up(const struct host_work *work, unsigned node,
 /* From which page on all nodes are sent all: the first one where each holds
  * them all, or that of a level of boxes where those from there on take up no
  * more than half of its room. */
-static uint32_t first_to_all(const struct host_work *work)
-{
+static uint32_t first_to_all(const struct host_work *work) {
     const struct incode_tree *tree = &work->order->tree;
     uint32_t level = 1;
     if (tree->pages <= work->frames) {
@@ -71,8 +66,8 @@ static uint32_t first_to_all(const struct host_work *work)
     return level < tree->levels ? tree->base[level] : tree->pages;
 }
 
-static bool first(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool first(struct host_work *work, unsigned node,
+                  struct incode_job *job) {
     struct exchange *state = work->state;
     if (exchanges(work) && !state->dealt) {
         state->dealt = true;
@@ -82,8 +77,7 @@ static bool first(struct host_work *work, unsigned node, struct incode_job *job)
     return host_regions_first(work, node, job);
 }
 
-static bool send_regions(struct host_work *work, struct exchange *state)
-{
+static bool send_regions(struct host_work *work, struct exchange *state) {
     struct {
         struct node_regions_message head;
         uint32_t first[NODE_REGIONS_A_MESSAGE];
@@ -110,8 +104,7 @@ static bool send_regions(struct host_work *work, struct exchange *state)
 }
 
 /* From the last page down: boxes before what is in them. */
-static bool send_page(struct host_work *work, struct exchange *state)
-{
+static bool send_page(struct host_work *work, struct exchange *state) {
     struct node_page_message body;
     body.head.page = state->next - 1;
     size_t size = host_page(work->order, body.head.page, body.data);
@@ -124,8 +117,7 @@ static bool send_page(struct host_work *work, struct exchange *state)
 }
 
 /* What goes to all, in whosever turn. */
-static bool send(struct host_work *work, unsigned node)
-{
+static bool send(struct host_work *work, unsigned node) {
     struct exchange *state = work->state;
     (void)node;
     if (!state->dealt) {
@@ -137,8 +129,7 @@ static bool send(struct host_work *work, unsigned node)
     return state->next > state->to_all && send_page(work, state);
 }
 
-static void lose(struct host_work *work)
-{
+static void lose(struct host_work *work) {
     uint32_t pieces = work->living > 1 ? PIECES * work->living : 1;
     (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
     memset(work->state, 0, sizeof(struct exchange));

@@ -9,8 +9,7 @@
 
 enum { CLUSTER = 4 };
 
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     unsigned faces = task->sharing.faces_per_job;
     unsigned cluster =
         task->sharing.cluster != 0 ? task->sharing.cluster : CLUSTER;
@@ -19,15 +18,13 @@ static struct host_cost cost(const struct host_task *task)
                                    faces != 0 ? faces : cluster);
 }
 
-static unsigned cluster_of(unsigned nodes, const struct host_sharing *sharing)
-{
+static unsigned cluster_of(unsigned nodes, const struct host_sharing *sharing) {
     unsigned cluster = sharing->cluster != 0 ? sharing->cluster : CLUSTER;
     return cluster < nodes ? cluster : nodes;
 }
 
 static int check(unsigned nodes, const struct host_sharing *sharing,
-                 enum incode_face_rule rule, struct host_error *error)
-{
+                 enum incode_face_rule rule, struct host_error *error) {
     unsigned cluster = sharing->cluster;
     if (nodes < 2) {
         return host_fail(error, HOST_USAGE,
@@ -48,8 +45,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 }
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     unsigned cluster = cluster_of(work->nodes, &work->sharing);
     unsigned builders = work->sharing.builders, lowest = node - node % cluster;
     const struct host_builders group = {lowest, lowest + cluster, 0,
@@ -60,15 +56,14 @@ static void set_up(const struct host_work *work, unsigned node,
 
 /* Whether it is the first one that is left of its cluster: the face manager, or
  * a worker where there is no other. */
-static bool is_taker(const struct host_work *work, unsigned node)
-{
+static bool is_taker(const struct host_work *work, unsigned node) {
     unsigned cluster = cluster_of(work->nodes, &work->sharing);
     return node == host_first_left(work, node - node % cluster);
 }
 
 /* The regions of its cluster, for the first node of it. */
-static bool first(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool first(struct host_work *work, unsigned node,
+                  struct incode_job *job) {
     unsigned cluster = cluster_of(work->nodes, &work->sharing);
     struct incode_job more = {0};
     if (node % cluster != 0 || !host_regions_first(work, node, job)) {
@@ -88,13 +83,12 @@ static bool first(struct host_work *work, unsigned node, struct incode_job *job)
 }
 
 /* A builder has no jobs. */
-static bool next(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool next(struct host_work *work, unsigned node,
+                 struct incode_job *job) {
     return is_taker(work, node) && host_regions_next(work, node, job);
 }
 
-static void lose(struct host_work *work)
-{
+static void lose(struct host_work *work) {
     unsigned takers = 0;
     for (unsigned i = 0; i < work->nodes; i++) {
         takers += !work->lost[i] && is_taker(work, i);

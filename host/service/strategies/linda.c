@@ -10,8 +10,7 @@
 enum { FACES_PER_JOB = 30, JOBS_PER_WORKER = 3 };
 
 /* As master-slaves, with more messages for each list. */
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     unsigned faces = task->sharing.faces_per_job;
     struct host_cost lists =
         host_regions_lists_cost(1, faces != 0 ? faces : FACES_PER_JOB);
@@ -19,8 +18,7 @@ static struct host_cost cost(const struct host_task *task)
 }
 
 static int check(unsigned nodes, const struct host_sharing *sharing,
-                 enum incode_face_rule rule, struct host_error *error)
-{
+                 enum incode_face_rule rule, struct host_error *error) {
     if (nodes < 2) {
         return host_fail(error, HOST_USAGE,
                          "--strategy linda: needs a face manager and a "
@@ -31,8 +29,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 
 /* All that have a share of the tuple space are told who else has one. */
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     const struct host_sharing *sharing = &work->sharing;
     const struct host_builders group =
         host_builders_of_all(work, FACES_PER_JOB);

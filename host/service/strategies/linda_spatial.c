@@ -20,16 +20,14 @@ struct state {
     } node[NODES_MAX];
 };
 
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     struct host_cost cost = host_regions_cost(task, 2.2);
     return (struct host_cost){1.1 * cost.busiest, 1.1 * cost.total};
 }
 
 /* One by itself needs no space. */
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     (void)node;
     setup->holders = 0;
     setup->role = NODE_WORKER;
@@ -46,15 +44,15 @@ static void set_up(const struct host_work *work, unsigned node,
     }
 }
 
-static bool first(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool first(struct host_work *work, unsigned node,
+                  struct incode_job *job) {
     struct state *s = work->state;
     s->dealt = true;
     return work->nodes == 1 && host_regions_first(work, node, job);
 }
 
-static bool next(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool next(struct host_work *work, unsigned node,
+                 struct incode_job *job) {
     struct state *s = work->state;
     if (work->living == 1) {
         return host_regions_next(work, node, job);
@@ -68,8 +66,7 @@ static bool next(struct host_work *work, unsigned node, struct incode_job *job)
 }
 
 /* A region of the order, as long as nothing is done; then what is left. */
-static bool find_next(struct host_work *work, struct state *s)
-{
+static bool find_next(struct host_work *work, struct state *s) {
     if (!s->waits) {
         s->waits = host_regions_first(work, s->region, &s->next) ||
                    host_regions_next(work, 0, &s->next);
@@ -78,8 +75,7 @@ static bool find_next(struct host_work *work, struct state *s)
     return s->waits;
 }
 
-static bool send(struct host_work *work, unsigned node)
-{
+static bool send(struct host_work *work, unsigned node) {
     struct state *s = work->state;
     if (!s->dealt || work->living == 1 || node != host_first_left(work, 0) ||
         s->out_count == NODE_OUT_MAX || !find_next(work, s) ||
@@ -92,8 +88,7 @@ static bool send(struct host_work *work, unsigned node)
 }
 
 static int take(struct host_work *work, const struct cube_message *message,
-                struct host_error *error)
-{
+                struct host_error *error) {
     struct state *s = work->state;
     struct node_taken_message m;
     if (message->type != NODE_TAKEN) {
@@ -121,14 +116,12 @@ static int take(struct host_work *work, const struct cube_message *message,
     return 0;
 }
 
-static bool owes(const struct host_work *work, unsigned node)
-{
+static bool owes(const struct host_work *work, unsigned node) {
     const struct state *s = work->state;
     return s->out_count > 0 && node == host_first_left(work, 0);
 }
 
-static void lose(struct host_work *work)
-{
+static void lose(struct host_work *work) {
     struct state *s = work->state;
     memset(s, 0, sizeof *s);
     host_regions_lose(work);

@@ -9,15 +9,13 @@
 
 /* One list of faces for all: it cannot be faster than its manager, and each
  * face travels twice. */
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     unsigned faces = task->sharing.faces_per_job;
     return host_regions_lists_cost(1, faces != 0 ? faces : task->nodes);
 }
 
 static int check(unsigned nodes, const struct host_sharing *sharing,
-                 enum incode_face_rule rule, struct host_error *error)
-{
+                 enum incode_face_rule rule, struct host_error *error) {
     if (nodes < 2) {
         return host_fail(error, HOST_USAGE,
                          "--strategy master-slaves: needs a face manager and a "
@@ -27,8 +25,7 @@ static int check(unsigned nodes, const struct host_sharing *sharing,
 }
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     const struct host_builders group = host_builders_of_all(work, work->nodes);
     host_builders_set_up(work, &group, node, setup);
 }

@@ -5,8 +5,7 @@
 #include "regions.h"
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     (void)node;
     setup->holders = 0;
     setup->role = NODE_WORKER;
@@ -16,8 +15,8 @@ static void set_up(const struct host_work *work, unsigned node,
 }
 
 /* The part of the next range that this node may do. */
-static bool next(struct host_work *work, unsigned node, struct incode_job *job)
-{
+static bool next(struct host_work *work, unsigned node,
+                 struct incode_job *job) {
     struct host_ledger *ledger = work->ledger;
     uint32_t first, last, end;
     if (!host_ledger_next(ledger, work->order, &first, &last)) {

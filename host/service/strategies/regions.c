@@ -14,8 +14,7 @@ enum { PIECES = 2 };
  * lattices take three times as long and more face by face.  Where one alone
  * goes face by face, too, several hold each other up for pages, if a node
  * cannot hold the points of all. */
-static double regions_total(const struct host_task *task)
-{
+static double regions_total(const struct host_task *task) {
     enum { POINT_BYTES = 32 };
     double open = 8 * 38 * pow((double)task->points, 2.0 / 3);
     bool holds_all = task->points <= task->memory / POINT_BYTES;
@@ -29,8 +28,7 @@ static double regions_total(const struct host_task *task)
 }
 
 /* A surface has more of its tetrahedra at borders than a volume. */
-struct host_cost host_regions_cost(const struct host_task *task, double again)
-{
+struct host_cost host_regions_cost(const struct host_task *task, double again) {
     double regions = (double)task->nodes / (double)(task->points + 1);
     double border = (task->uneven ? 2 : 1) * again * cbrt(regions);
     double total = regions_total(task) * (1 + border);
@@ -38,26 +36,22 @@ struct host_cost host_regions_cost(const struct host_task *task, double again)
                             : (struct host_cost){total / task->nodes, total};
 }
 
-struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces)
-{
+struct host_cost host_regions_lists_cost(unsigned groups, unsigned faces) {
     double group = 3 + 30.0 / faces;
     return (struct host_cost){group / groups, 2 * group};
 }
 
-unsigned host_regions_each(unsigned nodes)
-{
+unsigned host_regions_each(unsigned nodes) {
     return nodes;
 }
 
-unsigned host_regions_one(unsigned nodes)
-{
+unsigned host_regions_one(unsigned nodes) {
     (void)nodes;
     return 1;
 }
 
 bool host_regions_first(struct host_work *work, unsigned node,
-                        struct incode_job *job)
-{
+                        struct incode_job *job) {
     if (work->ledger->committed > 0 || work->living < work->nodes ||
         node >= work->order->regions) {
         return false;
@@ -71,8 +65,7 @@ bool host_regions_first(struct host_work *work, unsigned node,
 }
 
 struct incode_job host_regions_job(const struct host_order *order,
-                                   uint32_t first, uint32_t last)
-{
+                                   uint32_t first, uint32_t last) {
     struct incode_job job = {.first = first, .last = last};
     for (int k = 0; k < 3; k++) {
         job.lo[k] = INFINITY;
@@ -91,8 +84,7 @@ struct incode_job host_regions_job(const struct host_order *order,
 }
 
 bool host_regions_next(struct host_work *work, unsigned node,
-                       struct incode_job *job)
-{
+                       struct incode_job *job) {
     uint32_t first, last;
     (void)node;
     if (!host_ledger_next(work->ledger, work->order, &first, &last)) {
@@ -102,31 +94,26 @@ bool host_regions_next(struct host_work *work, unsigned node,
     return true;
 }
 
-int host_regions_commit(struct host_work *work, unsigned node, uint32_t brick)
-{
+int host_regions_commit(struct host_work *work, unsigned node, uint32_t brick) {
     return host_ledger_commit(work->ledger, node, brick);
 }
 
 bool host_regions_next_alone(struct host_work *work, unsigned node,
-                             struct incode_job *job)
-{
+                             struct incode_job *job) {
     return node == host_first_left(work, 0) &&
            host_regions_next(work, node, job);
 }
 
 /* One node has no use for more ranges than are left. */
-void host_regions_lose_among(struct host_work *work, unsigned takers)
-{
+void host_regions_lose_among(struct host_work *work, unsigned takers) {
     uint32_t pieces = takers > 1 ? PIECES * takers : 1;
     (void)host_ledger_abandon(work->ledger, pieces, work->order, work->tets);
 }
 
-void host_regions_lose(struct host_work *work)
-{
+void host_regions_lose(struct host_work *work) {
     host_regions_lose_among(work, work->living);
 }
 
-void host_regions_lose_alone(struct host_work *work)
-{
+void host_regions_lose_alone(struct host_work *work) {
     host_regions_lose_among(work, 1);
 }

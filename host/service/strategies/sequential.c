@@ -4,15 +4,13 @@
 #include "regions.h"
 #include "strategies.h"
 
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     (void)task;
     return (struct host_cost){1.0, 1.0};
 }
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     bool all = work->living == work->nodes;
     setup->holders = (uint16_t)(all ? work->nodes - 1 : 0);
     setup->role = all && node > 0 ? NODE_HOLDER : NODE_WORKER;

@@ -4,14 +4,12 @@
 #include "regions.h"
 #include "strategies.h"
 
-static struct host_cost cost(const struct host_task *task)
-{
+static struct host_cost cost(const struct host_task *task) {
     return host_regions_cost(task, 2.2);
 }
 
 static void set_up(const struct host_work *work, unsigned node,
-                   struct node_setup_message *setup)
-{
+                   struct node_setup_message *setup) {
     (void)work, (void)node;
     setup->holders = 0;
     setup->role = NODE_WORKER;

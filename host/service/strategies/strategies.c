@@ -9,13 +9,11 @@ static const struct host_strategy *const rows[] = {HOST_STRATEGIES(POINT)};
 
 enum { ROWS = sizeof rows / sizeof rows[0] };
 
-const struct host_strategy *host_strategy_row(unsigned i)
-{
+const struct host_strategy *host_strategy_row(unsigned i) {
     return i < ROWS ? rows[i] : NULL;
 }
 
-const struct host_strategy *host_strategy_linda(unsigned i)
-{
+const struct host_strategy *host_strategy_linda(unsigned i) {
     unsigned row = 0;
     while (row < ROWS && (rows[row]->linda == NULL || i-- > 0)) {
         row++;
@@ -23,14 +21,12 @@ const struct host_strategy *host_strategy_linda(unsigned i)
     return host_strategy_row(row);
 }
 
-const char *host_linda_name(unsigned i)
-{
+const char *host_linda_name(unsigned i) {
     const struct host_strategy *row = host_strategy_linda(i);
     return row == NULL ? NULL : row->linda;
 }
 
-const struct host_strategy *host_strategy_named(const char *name)
-{
+const struct host_strategy *host_strategy_named(const char *name) {
     for (unsigned i = 0; i < ROWS; i++) {
         if (strcmp(rows[i]->name, name) == 0) {
             return rows[i];
@@ -51,8 +47,7 @@ enum { POINT_BYTES = 70 };
 int host_strategy_check(const struct host_strategy *strategy, unsigned nodes,
                         const struct host_sharing *sharing,
                         enum incode_face_rule rule, enum incode_build build,
-                        struct host_error *error)
-{
+                        struct host_error *error) {
     if (strategy->by_faces && build == INCODE_BUILD_POINTS) {
         return host_fail(error, HOST_USAGE,
                          "--build points: --strategy %s goes face by face; "
@@ -65,8 +60,7 @@ int host_strategy_check(const struct host_strategy *strategy, unsigned nodes,
 }
 
 double host_strategy_time(const struct host_strategy *strategy,
-                          const struct host_task *task)
-{
+                          const struct host_task *task) {
     struct host_error refused = {0};
     if (host_strategy_check(strategy, task->nodes, &task->sharing,
                             task->face_rule, task->build, &refused) != 0 ||
@@ -84,8 +78,7 @@ double host_strategy_time(const struct host_strategy *strategy,
 }
 
 /* The row of the one that takes least, and what each takes. */
-static unsigned choose(const struct host_task *task, double time[ROWS])
-{
+static unsigned choose(const struct host_task *task, double time[ROWS]) {
     unsigned best = 0;
     for (unsigned i = 0; i < ROWS; i++) {
         time[i] = host_strategy_time(rows[i], task);
@@ -94,14 +87,13 @@ static unsigned choose(const struct host_task *task, double time[ROWS])
     return best;
 }
 
-const struct host_strategy *host_strategy_auto(const struct host_task *task)
-{
+const struct host_strategy *host_strategy_auto(const struct host_task *task) {
     double time[ROWS];
     return rows[choose(task, time)];
 }
 
-void host_strategy_why(const struct host_task *task, char text[HOST_WHY_BYTES])
-{
+void host_strategy_why(const struct host_task *task,
+                       char text[HOST_WHY_BYTES]) {
     double time[ROWS];
     unsigned best = choose(task, time);
     int at = snprintf(text, HOST_WHY_BYTES,
@@ -117,8 +109,7 @@ void host_strategy_why(const struct host_task *task, char text[HOST_WHY_BYTES])
 
 enum host_partition
 host_strategy_partition(const struct host_strategy *strategy,
-                        enum host_partition asked)
-{
+                        enum host_partition asked) {
     return asked == HOST_ADAPTIVE && strategy->owner_rule == INCODE_OWNER_LOWEST
                ? HOST_OWNED
                : asked;
@@ -127,8 +118,7 @@ host_strategy_partition(const struct host_strategy *strategy,
 size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
                            const struct node_identity *identity, size_t memory,
                            const struct host_sharing *sharing,
-                           const struct node_setup_message *given)
-{
+                           const struct node_setup_message *given) {
     struct host_work work = {.sharing = *sharing, .nodes = nodes};
     size_t most = 0;
     for (unsigned i = 0; i <= nodes; i++) {
@@ -144,13 +134,11 @@ size_t host_strategy_arena(const struct host_strategy *strategy, unsigned nodes,
     return most;
 }
 
-const char *host_strategy_name(unsigned i)
-{
+const char *host_strategy_name(unsigned i) {
     return i < ROWS ? rows[i]->name : i == ROWS ? "auto" : NULL;
 }
 
-const char *host_strategy_help(unsigned i)
-{
+const char *host_strategy_help(unsigned i) {
     return i < ROWS    ? rows[i]->help
            : i == ROWS ? "the one expected to be done first"
                        : NULL;

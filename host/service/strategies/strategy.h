@@ -66,15 +66,13 @@ struct host_work {
 };
 
 /* Whether a node is not in this generation. */
-static inline bool host_is_lost(const struct host_work *work, unsigned node)
-{
+static inline bool host_is_lost(const struct host_work *work, unsigned node) {
     return work->lost != NULL && work->lost[node];
 }
 
 /* The first one from `node` on that is not lost; there must be one. */
 static inline unsigned host_first_left(const struct host_work *work,
-                                       unsigned node)
-{
+                                       unsigned node) {
     while (host_is_lost(work, node)) {
         node++;
     }

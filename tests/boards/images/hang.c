@@ -6,8 +6,7 @@ enum { GUARD_US = 1000000 };
 /* Volatile, so that a compiler takes it for a loop that may end. */
 static volatile bool hanging = true;
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     bare_uarts_init();
     board_start();
     board_guard(GUARD_US);

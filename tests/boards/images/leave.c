@@ -2,8 +2,7 @@
  * outside ends. */
 #include "boards/bare/bare.h"
 
-_Noreturn void bare_main(void)
-{
+_Noreturn void bare_main(void) {
     board_start();
     board_restart();
 }

@@ -20,8 +20,7 @@ static struct host_liar liar;
 static int told = -1;
 
 static int lie(void *context, struct node_counted *counted, uint16_t dest,
-               uint8_t type, const void *data, size_t size)
-{
+               uint8_t type, const void *data, size_t size) {
     uint64_t before = liar.told;
     int status = host_liar_write(&liar, counted, dest, type, data, size);
     (void)context;
@@ -32,15 +31,13 @@ static int lie(void *context, struct node_counted *counted, uint16_t dest,
     return status;
 }
 
-static _Noreturn void give_up(const char *what)
-{
+static _Noreturn void give_up(const char *what) {
     (void)!write(STDERR_FILENO, what, strlen(what));
     _exit(2);
 }
 
 /* The file that stands beside the program. */
-static int open_beside(const char *extension, int flags)
-{
+static int open_beside(const char *extension, int flags) {
     char path[4096];
     ssize_t size =
         readlink("/proc/self/exe", path, sizeof path - strlen(extension) - 1);
@@ -52,8 +49,7 @@ static int open_beside(const char *extension, int flags)
 }
 
 /* The liar as the file has it; its node. */
-static unsigned long read_orders(void)
-{
+static unsigned long read_orders(void) {
     char text[256], *at = text, *way;
     int file = open_beside(".lie", O_RDONLY);
     ssize_t size = file < 0 ? -1 : read(file, text, sizeof text - 1);
@@ -81,8 +77,8 @@ struct node *__real_node_start(const struct node_board *board,
 struct node *__wrap_node_start(const struct node_board *board,
                                const char **why);
 
-struct node *__wrap_node_start(const struct node_board *board, const char **why)
-{
+struct node *__wrap_node_start(const struct node_board *board,
+                               const char **why) {
     static struct node_board lying;
     lying = *board;
     if (read_orders() == board->identity.self) {

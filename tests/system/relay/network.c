@@ -42,8 +42,7 @@ static struct {
     unsigned long flips, deletions, closes, connections;
 } relay;
 
-static struct sockaddr_in loopback(uint16_t port)
-{
+static struct sockaddr_in loopback(uint16_t port) {
     struct sockaddr_in a;
     memset(&a, 0, sizeof a);
     a.sin_family = AF_INET;
@@ -52,8 +51,7 @@ static struct sockaddr_in loopback(uint16_t port)
     return a;
 }
 
-bool network_add(const char *text)
-{
+bool network_add(const char *text) {
     unsigned from, to;
     int on = 1;
     if (relay.wires == WIRES_MAX || sscanf(text, "%u:%u", &from, &to) != 2) {
@@ -71,8 +69,7 @@ bool network_add(const char *text)
     return true;
 }
 
-static void close_pair(struct pair *p)
-{
+static void close_pair(struct pair *p) {
     for (unsigned i = 0; i < 2; i++) {
         close(p->fd[i]);
         p->fd[i] = -1;
@@ -80,8 +77,7 @@ static void close_pair(struct pair *p)
     }
 }
 
-static void take_connection(unsigned wire)
-{
+static void take_connection(unsigned wire) {
     int on = 1;
     int fd = accept4(relay.listener[wire], NULL, NULL, SOCK_NONBLOCK);
     struct sockaddr_in there = loopback(relay.to[wire]);
@@ -107,8 +103,7 @@ static void take_connection(unsigned wire)
 }
 
 /* Changes a bit or deletes some bytes, by chance. */
-static void damage(struct chunk *c)
-{
+static void damage(struct chunk *c) {
     size_t size = c->end;
     if (relay.bytes_a_fault == 0 ||
         chance_draw(&relay.random) % relay.bytes_a_fault >= size) {
@@ -125,8 +120,7 @@ static void damage(struct chunk *c)
 }
 
 /* False: the connection is over. */
-static bool take(struct pair *p, unsigned from)
-{
+static bool take(struct pair *p, unsigned from) {
     struct lane *lane = &p->lane[from];
     struct chunk *c = &lane->chunk[(lane->first + lane->count) % CHUNKS];
     ssize_t got = read(p->fd[from], c->bytes, CHUNK_BYTES);
@@ -145,8 +139,7 @@ static bool take(struct pair *p, unsigned from)
 }
 
 /* In order: a late chunk holds up the next.  False as above. */
-static bool give(struct pair *p, unsigned from)
-{
+static bool give(struct pair *p, unsigned from) {
     struct lane *lane = &p->lane[from];
     while (lane->count > 0 &&
            lane->chunk[lane->first].due_us <= chance_now_us()) {
@@ -167,8 +160,7 @@ static bool give(struct pair *p, unsigned from)
     return true;
 }
 
-static void serve(struct pair *p)
-{
+static void serve(struct pair *p) {
     for (unsigned from = 0; from < 2 && p->fd[0] >= 0; from++) {
         bool open = give(p, from);
         if (open && p->lane[from].count < CHUNKS) {
@@ -180,8 +172,7 @@ static void serve(struct pair *p)
     }
 }
 
-static void close_one(void)
-{
+static void close_one(void) {
     unsigned i = (unsigned)(chance_draw(&relay.random) % PAIRS_MAX);
     for (unsigned k = 0; k < PAIRS_MAX; k++) {
         struct pair *p = &relay.pair[(i + k) % PAIRS_MAX];
@@ -193,8 +184,7 @@ static void close_one(void)
     }
 }
 
-void network_run(const volatile sig_atomic_t *ended)
-{
+void network_run(const volatile sig_atomic_t *ended) {
     static struct pollfd fds[WIRES_MAX + 2 * PAIRS_MAX];
     while (!*ended) {
         nfds_t used = 0;
@@ -229,8 +219,7 @@ void network_run(const volatile sig_atomic_t *ended)
     }
 }
 
-bool network_open(const struct network_settings *settings)
-{
+bool network_open(const struct network_settings *settings) {
     relay.random = chance_of_seed(settings->seed);
     relay.bytes_a_fault = settings->bytes_a_fault;
     relay.close_us = 1000 * settings->ms_a_close;
@@ -248,8 +237,7 @@ bool network_open(const struct network_settings *settings)
     return true;
 }
 
-void network_print(void)
-{
+void network_print(void) {
     printf("%lu flips, %lu deletions, %lu closes, %lu connections\n",
            relay.flips, relay.deletions, relay.closes, relay.connections);
 }

@@ -16,15 +16,13 @@ enum { BITS_A_BYTE = 10, BYTES_A_LOOK = 4, POLL_MS = 1000 };
 
 /* --- chance --------------------------------------------------------------- */
 
-static uint64_t until(struct uart_lane *lane, uint32_t mean)
-{
+static uint64_t until(struct uart_lane *lane, uint32_t mean) {
     return mean == 0 ? UINT64_MAX
                      : chance_draw(&lane->random) % (2 * (uint64_t)mean) + 1;
 }
 
 static void init_lane(struct uart_lane *lane, const struct uart_settings *s,
-                      unsigned place)
-{
+                      unsigned place) {
     lane->random = chance_of_seed(s->seed * 2 * UART_WIRES_MAX + place);
     for (unsigned i = 0; i < 4; i++) {
         (void)chance_draw(&lane->random);
@@ -35,8 +33,7 @@ static void init_lane(struct uart_lane *lane, const struct uart_settings *s,
 }
 
 /* Counts down to a fault. */
-static bool strikes(struct uart_lane *lane, uint64_t *left, uint32_t mean)
-{
+static bool strikes(struct uart_lane *lane, uint64_t *left, uint32_t mean) {
     if (mean == 0 || --*left > 0) {
         return false;
     }
@@ -46,8 +43,7 @@ static bool strikes(struct uart_lane *lane, uint64_t *left, uint32_t mean)
 
 /* What becomes of some bytes: how many are left of them. */
 static size_t damage(struct uart_wires *wires, struct uart_lane *lane,
-                     uint8_t *bytes, size_t size)
-{
+                     uint8_t *bytes, size_t size) {
     const struct uart_settings *s = &wires->settings;
     size_t left = 0;
     for (size_t i = 0; i < size; i++) {
@@ -80,8 +76,7 @@ static size_t damage(struct uart_wires *wires, struct uart_lane *lane,
 
 /* What a byte that was sent and is not read counts for, as the kernel sees it;
  * 0: it does not say. */
-static uint64_t unread_unit(void)
-{
+static uint64_t unread_unit(void) {
     int pair[2], unread = 0;
     if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0) {
         return 0;
@@ -96,8 +91,7 @@ static uint64_t unread_unit(void)
 }
 
 /* Bytes that were sent there one by one and are not read. */
-static uint64_t unread_at(const struct uart_wires *wires, int fd)
-{
+static uint64_t unread_at(const struct uart_wires *wires, int fd) {
     int unread = 0;
     return ioctl(fd, SIOCOUTQ, &unread) == 0 && unread > 0
                ? (uint64_t)unread / wires->unread_unit
@@ -106,8 +100,7 @@ static uint64_t unread_at(const struct uart_wires *wires, int fd)
 
 /* The end is away: what was under way to it, or from it, is lost. */
 static void leave(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
-                  uint64_t now_us)
-{
+                  uint64_t now_us) {
     wires->counts.unheard += wire->lane[1 - i].held;
     close(wire->end[i].fd);
     wire->end[i].fd = -1;
@@ -117,15 +110,13 @@ static void leave(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
 }
 
 static void take(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
-                 int fd)
-{
+                 int fd) {
     wire->end[i].fd = fd;
     wire->lane[i].busy = false;
     wires->counts.connections++;
 }
 
-static bool call(struct uart_wires *wires, struct uart_wire *wire, unsigned i)
-{
+static bool call(struct uart_wires *wires, struct uart_wire *wire, unsigned i) {
     struct uart_end *end = &wire->end[i];
     struct sockaddr_un there = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -143,8 +134,7 @@ static bool call(struct uart_wires *wires, struct uart_wire *wire, unsigned i)
 
 /* Whoever called last has the wire. */
 static void answer(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
-                   uint64_t now_us)
-{
+                   uint64_t now_us) {
     int fd = accept4(wire->end[i].listener, NULL, NULL,
                      SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) {
@@ -156,8 +146,7 @@ static void answer(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
     take(wires, wire, i, fd);
 }
 
-static bool listen_at(struct uart_end *end)
-{
+static bool listen_at(struct uart_end *end) {
     struct sockaddr_un here = {.sun_family = AF_UNIX};
     memcpy(here.sun_path, end->path, sizeof end->path);
     (void)unlink(end->path);
@@ -172,8 +161,7 @@ static bool listen_at(struct uart_end *end)
 
 /* Sends what there is room for; `size` more at once.  False: that end is gone.
  */
-static bool put(struct uart_lane *lane, int fd, size_t size)
-{
+static bool put(struct uart_lane *lane, int fd, size_t size) {
     size_t gone = 0;
     ssize_t sent = 0;
     while (gone < lane->held && sent >= 0) {
@@ -191,8 +179,7 @@ static bool put(struct uart_lane *lane, int fd, size_t size)
 /* What was read and damaged goes out; without `fifo`, some of it may stay. With
  * it, one by one, so that what is unread can be counted. */
 static void give(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
-                 uint64_t now_us)
-{
+                 uint64_t now_us) {
     struct uart_lane *lane = &wire->lane[i];
     uint32_t fifo = wires->settings.fifo;
     int fd = wire->end[1 - i].fd;
@@ -210,8 +197,7 @@ static void give(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
 
 /* As many bytes as the wire could take by now. */
 static size_t due(const struct uart_wires *wires, struct uart_lane *lane,
-                  uint64_t now_ns)
-{
+                  uint64_t now_ns) {
     uint64_t bytes = (now_ns - lane->free_ns) / wires->byte_ns;
     if (bytes > UART_HELD_BYTES) { /* the relay was kept from its work */
         lane->free_ns = now_ns - UART_HELD_BYTES * wires->byte_ns;
@@ -221,8 +207,7 @@ static size_t due(const struct uart_wires *wires, struct uart_lane *lane,
 }
 
 static void carry(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
-                  uint64_t now_us)
-{
+                  uint64_t now_us) {
     struct uart_lane *lane = &wire->lane[i];
     uint64_t now_ns = now_us * 1000;
     if (lane->held > 0) {
@@ -253,8 +238,7 @@ static void carry(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
 /* --- all of them ---------------------------------------------------------- */
 
 bool uart_wires_init(struct uart_wires *wires,
-                     const struct uart_settings *settings)
-{
+                     const struct uart_settings *settings) {
     memset(wires, 0, sizeof *wires);
     wires->settings = *settings;
     wires->byte_ns = BITS_A_BYTE * UINT64_C(1000000000) / settings->baud;
@@ -266,8 +250,7 @@ bool uart_wires_init(struct uart_wires *wires,
     return wires->unread_unit > 0;
 }
 
-static struct uart_wire *add(struct uart_wires *wires)
-{
+static struct uart_wire *add(struct uart_wires *wires) {
     unsigned place = wires->count;
     if (place == UART_WIRES_MAX) {
         errno = EINVAL;
@@ -282,8 +265,7 @@ static struct uart_wire *add(struct uart_wires *wires)
     return wire;
 }
 
-bool uart_wires_join(struct uart_wires *wires, int fd0, int fd1)
-{
+bool uart_wires_join(struct uart_wires *wires, int fd0, int fd1) {
     struct uart_wire *wire = add(wires);
     if (wire != NULL) {
         take(wires, wire, 0, fd0);
@@ -292,8 +274,7 @@ bool uart_wires_join(struct uart_wires *wires, int fd0, int fd1)
     return wire != NULL;
 }
 
-bool uart_wires_add(struct uart_wires *wires, const char *text)
-{
+bool uart_wires_add(struct uart_wires *wires, const char *text) {
     struct uart_wire *wire = add(wires);
     for (unsigned i = 0; wire != NULL && i < 2; i++) {
         struct uart_end *end = &wire->end[i];
@@ -317,8 +298,7 @@ bool uart_wires_add(struct uart_wires *wires, const char *text)
 /* An end that is away: calls it, if that is due.  When it is, if it stays so.
  */
 static uint64_t reach(struct uart_wires *wires, struct uart_wire *wire,
-                      unsigned i, uint64_t now_us)
-{
+                      unsigned i, uint64_t now_us) {
     struct uart_end *end = &wire->end[i];
     if (end->fd >= 0 || end->path[0] == '\0' || end->listener >= 0) {
         return UINT64_MAX;
@@ -333,8 +313,7 @@ static uint64_t reach(struct uart_wires *wires, struct uart_wire *wire,
 }
 
 /* What is waited for: fds[3 i + ..] of each end. */
-static nfds_t events(const struct uart_wires *wires, struct pollfd *fds)
-{
+static nfds_t events(const struct uart_wires *wires, struct pollfd *fds) {
     nfds_t used = 0;
     for (unsigned k = 0; k < 2 * wires->count; k++) {
         const struct uart_wire *wire = &wires->wire[k / 2];
@@ -346,8 +325,7 @@ static nfds_t events(const struct uart_wires *wires, struct pollfd *fds)
     return used;
 }
 
-static void look(struct uart_wires *wires, uint64_t now_us)
-{
+static void look(struct uart_wires *wires, uint64_t now_us) {
     struct pollfd fds[4 * UART_WIRES_MAX];
     if (poll(fds, events(wires, fds), 0) <= 0) {
         return;
@@ -364,8 +342,7 @@ static void look(struct uart_wires *wires, uint64_t now_us)
     }
 }
 
-uint64_t uart_wires_carry(struct uart_wires *wires, uint64_t now_us)
-{
+uint64_t uart_wires_carry(struct uart_wires *wires, uint64_t now_us) {
     uint64_t next_us = UINT64_MAX;
     look(wires, now_us);
     for (unsigned k = 0; k < 2 * wires->count; k++) {
@@ -382,15 +359,13 @@ uint64_t uart_wires_carry(struct uart_wires *wires, uint64_t now_us)
     return next_us;
 }
 
-static struct timespec time_of(uint64_t us)
-{
+static struct timespec time_of(uint64_t us) {
     return (struct timespec){(time_t)(us / 1000000),
                              (long)(us % 1000000) * 1000};
 }
 
 /* Where bytes go, others that come are looked at together with them. */
-void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us)
-{
+void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us) {
     struct pollfd fds[4 * UART_WIRES_MAX];
     uint64_t now_us = chance_now_us();
     if (until_us <= now_us) {
@@ -406,8 +381,7 @@ void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us)
                left_ms < POLL_MS ? (int)left_ms : POLL_MS);
 }
 
-void uart_wires_close(struct uart_wires *wires)
-{
+void uart_wires_close(struct uart_wires *wires) {
     for (unsigned k = 0; k < 2 * wires->count; k++) {
         struct uart_end *end = &wires->wire[k / 2].end[k % 2];
         if (end->fd >= 0) {

@@ -13,8 +13,7 @@
 enum { SECTORS = 4, BYTES = LOADER_RAM_SECTOR * SECTORS };
 
 /* Half of a byte's bits that were to change have. */
-static uint8_t half_done(uint8_t from, uint8_t to)
-{
+static uint8_t half_done(uint8_t from, uint8_t to) {
     return (uint8_t)(from ^ ((from ^ to) & rand()));
 }
 
@@ -28,8 +27,7 @@ static struct chip {
     jmp_buf lost;
 } chip;
 
-static void change(size_t at, uint8_t to)
-{
+static void change(size_t at, uint8_t to) {
     chip.changed++;
     if (chip.until_loss == 0) {
         chip.bytes[at] = half_done(chip.bytes[at], to);
@@ -39,8 +37,8 @@ static void change(size_t at, uint8_t to)
     chip.bytes[at] = to;
 }
 
-static bool program(void *context, uint32_t at, const void *bytes, size_t size)
-{
+static bool program(void *context, uint32_t at, const void *bytes,
+                    size_t size) {
     const uint8_t *in = bytes;
     (void)context;
     assert_true(size <= LOADER_RAM_PAGE - at % LOADER_RAM_PAGE);
@@ -51,8 +49,7 @@ static bool program(void *context, uint32_t at, const void *bytes, size_t size)
     return true;
 }
 
-static bool erase(void *context, uint32_t sector)
-{
+static bool erase(void *context, uint32_t sector) {
     (void)context;
     for (size_t i = 0; i < LOADER_RAM_SECTOR; i++) {
         change(sector * LOADER_RAM_SECTOR + i, 0xff);
@@ -69,8 +66,7 @@ static const struct loader_flash flash = {.context = chip.bytes,
                                           .erase = erase};
 
 /* 0: power was lost before the number was told. */
-static uint32_t start(long until_loss)
-{
+static uint32_t start(long until_loss) {
     uint32_t boot = 0;
     chip.until_loss = until_loss;
     if (setjmp(chip.lost) == 0) {
@@ -81,8 +77,7 @@ static uint32_t start(long until_loss)
     return 0;
 }
 
-static void test_boots_count(void **state)
-{
+static void test_boots_count(void **state) {
     (void)state;
     for (int blank = 0; blank < 256; blank += 0x55) {
         memset(chip.bytes, blank, BYTES);
@@ -95,8 +90,7 @@ static void test_boots_count(void **state)
 /* At every byte of the starts that matter, but for the midst of an erasure: the
  * first, one in the midst of a
  * sector, those that begin one; and of those behind the first loss. */
-static void test_boots_outlive_every_loss(void **state)
-{
+static void test_boots_outlive_every_loss(void **state) {
     static uint8_t before[BYTES];
     static const uint32_t starts[] = {0, 1, 17, 255, 256, 257, 511, 512, 700};
     (void)state;
@@ -128,8 +122,7 @@ static void test_boots_outlive_every_loss(void **state)
 
 /* A record that was torn may read as whole later: as if its last bits had
  * settled. */
-static void test_boots_pass_over_what_settles(void **state)
-{
+static void test_boots_pass_over_what_settles(void **state) {
     (void)state;
     for (long loss = 0; loss < LOADER_BOOT_BYTES; loss++) {
         memset(chip.bytes, 0xff, BYTES);
@@ -149,8 +142,7 @@ static void test_boots_pass_over_what_settles(void **state)
     }
 }
 
-static void test_boots_at_random(void **state)
-{
+static void test_boots_at_random(void **state) {
     uint32_t last = 0;
     (void)state;
     srand(11);
@@ -163,8 +155,7 @@ static void test_boots_at_random(void **state)
     assert_true(last < 60000);
 }
 
-static void test_boots_tell_of_a_worn_flash(void **state)
-{
+static void test_boots_tell_of_a_worn_flash(void **state) {
     uint32_t boot = 5;
     (void)state;
     memset(chip.bytes, 0xff, BYTES);
@@ -176,8 +167,7 @@ static void test_boots_tell_of_a_worn_flash(void **state)
     assert_true(start(-1) > 1);
 }
 
-static void test_flash_ram_has_a_flash_s_rules(void **state)
-{
+static void test_flash_ram_has_a_flash_s_rules(void **state) {
     enum { ALL = LOADER_RAM_SECTOR * LOADER_RAM_SECTORS };
     static uint8_t memory[ALL];
     const struct loader_flash ram = LOADER_RAM(memory);
@@ -208,8 +198,7 @@ static void test_flash_ram_has_a_flash_s_rules(void **state)
     assert_int_equal(out[1], 0xff);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_boots_count),
         cmocka_unit_test(test_boots_outlive_every_loss),

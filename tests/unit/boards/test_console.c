@@ -21,8 +21,7 @@ static jmp_buf restarted;
 const struct board_facts board_facts = {.name = "none", .ports = 4};
 uint32_t bare_node_stack[BARE_STACK_BYTES / sizeof(uint32_t)];
 
-bool board_console_put(uint8_t byte)
-{
+bool board_console_put(uint8_t byte) {
     if (said_size >= said_max) {
         return false;
     }
@@ -34,18 +33,15 @@ void board_feed(void) {}
 
 static bool locked;
 
-uint32_t board_lock(void)
-{
+uint32_t board_lock(void) {
     return locked = true;
 }
 
-void board_restart(void)
-{
+void board_restart(void) {
     longjmp(restarted, 1);
 }
 
-static int listen(void **state)
-{
+static int listen(void **state) {
     (void)state;
     said_size = 0;
     said_max = sizeof said;
@@ -53,8 +49,7 @@ static int listen(void **state)
     return 0;
 }
 
-static void test_console_record(void **state)
-{
+static void test_console_record(void **state) {
     static const uint8_t record[] = {0, 0xff, 'a', ' ', 'b', 0};
     (void)state;
     bare_console_begin();
@@ -66,8 +61,7 @@ static void test_console_record(void **state)
 }
 
 /* Between the two zeros. */
-static void test_console_record_is_no_frame(void **state)
-{
+static void test_console_record_is_no_frame(void **state) {
     struct frame_reader reader;
     struct frame_header header;
     (void)state;
@@ -87,8 +81,7 @@ static void test_console_record_is_no_frame(void **state)
 }
 
 /* Its end says at least that it ends. */
-static void test_console_gives_up(void **state)
-{
+static void test_console_gives_up(void **state) {
     (void)state;
     said_max = 5;
     bare_console_begin();
@@ -98,8 +91,7 @@ static void test_console_gives_up(void **state)
     assert_memory_equal(said + 2, "abc", 3);
 }
 
-static void test_hex(void **state)
-{
+static void test_hex(void **state) {
     char room[80];
     struct cube_text text = cube_text_in(room, sizeof room);
     struct bare_register registers[] = {{"pc", 0x1234},
@@ -112,8 +104,7 @@ static void test_hex(void **state)
     assert_string_equal(room, "0x0 0x5af pc 0x00001234 x0 0xfedcba9876543210");
 }
 
-static void test_reason_is_kept(void **state)
-{
+static void test_reason_is_kept(void **state) {
     (void)state;
     struct bare_reason reason = bare_reason_take();
     assert_int_equal(reason.kind, BARE_POWER_ON);
@@ -136,8 +127,7 @@ static void test_reason_is_kept(void **state)
     }
 }
 
-static void test_fault_is_told_and_kept(void **state)
-{
+static void test_fault_is_told_and_kept(void **state) {
     struct bare_register pc = {"pc", 0x10};
     (void)state;
     (void)bare_reason_take();
@@ -155,8 +145,7 @@ static void test_fault_is_told_and_kept(void **state)
     assert_string_equal(reason.text, "a thing");
 }
 
-static void test_stack_s_paint(void **state)
-{
+static void test_stack_s_paint(void **state) {
     uint32_t words[16];
     (void)state;
     for (size_t used = 0; used <= 16; used++) {
@@ -169,8 +158,7 @@ static void test_stack_s_paint(void **state)
     assert_int_equal(bare_stack_high_water(), BARE_STACK_BYTES);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_reason_is_kept, listen),
         cmocka_unit_test_setup(test_console_record, listen),

@@ -9,8 +9,7 @@
 #include "boards/bare/handover.h"
 #include "boards/bare/reason.h"
 
-static void test_handover_is_taken_once(void **state)
-{
+static void test_handover_is_taken_once(void **state) {
     struct bare_handover given = {.boot = 7, .slot = 1, .number = 3}, taken;
     (void)state;
     assert_false(bare_handover_take(&taken)); /* power on */
@@ -30,8 +29,7 @@ static void test_handover_is_taken_once(void **state)
     assert_false(bare_handover_take(&taken));
 }
 
-static void test_reason_is_the_loader_s(void **state)
-{
+static void test_reason_is_the_loader_s(void **state) {
     (void)state;
     struct bare_reason reason = bare_reason_take();
     assert_int_equal(reason.kind, BARE_POWER_ON);
@@ -53,8 +51,7 @@ static void test_reason_is_the_loader_s(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_handover_is_taken_once),
         cmocka_unit_test(test_reason_is_the_loader_s),

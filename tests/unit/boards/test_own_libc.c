@@ -17,8 +17,7 @@ void *own_memmove(void *to, const void *from, size_t size);
 void *own_memset(void *to, int value, size_t size);
 int own_memcmp(const void *a, const void *b, size_t size);
 
-static uint64_t random_bits(void)
-{
+static uint64_t random_bits(void) {
     static uint64_t x = 88172645463325252;
     x ^= x << 13;
     x ^= x >> 7;
@@ -26,15 +25,13 @@ static uint64_t random_bits(void)
     return x;
 }
 
-static uint64_t bits_of(double x)
-{
+static uint64_t bits_of(double x) {
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     return bits;
 }
 
-static void check_root(double x)
-{
+static void check_root(double x) {
     double own = own_sqrt(x), theirs = sqrt(x);
     if (isnan(theirs)) {
         assert_true(isnan(own));
@@ -43,8 +40,7 @@ static void check_root(double x)
     }
 }
 
-static void test_own_sqrt_of_what_is_special(void **state)
-{
+static void test_own_sqrt_of_what_is_special(void **state) {
     static const double xs[] = {0.0,       -0.0,      1,        -1,
                                 INFINITY,  -INFINITY, NAN,      0x1p-1074,
                                 0x1p-1073, 0x1p-1022, 0x1p1023, 0x1.fp-1023};
@@ -61,8 +57,7 @@ static void test_own_sqrt_of_what_is_special(void **state)
     }
 }
 
-static void test_own_sqrt_of_squares_and_their_neighbours(void **state)
-{
+static void test_own_sqrt_of_squares_and_their_neighbours(void **state) {
     (void)state;
     for (int i = 0; i < 100000; i++) {
         double root = (double)(random_bits() >> 38), square = root * root;
@@ -72,8 +67,7 @@ static void test_own_sqrt_of_squares_and_their_neighbours(void **state)
     }
 }
 
-static void test_own_sqrt_of_anything(void **state)
-{
+static void test_own_sqrt_of_anything(void **state) {
     (void)state;
     for (int i = 0; i < 1000000; i++) {
         uint64_t bits = random_bits();
@@ -87,15 +81,13 @@ static void test_own_sqrt_of_anything(void **state)
 
 enum { ROOM = 96 };
 
-static void fill(uint8_t bytes[ROOM])
-{
+static void fill(uint8_t bytes[ROOM]) {
     for (int i = 0; i < ROOM; i++) {
         bytes[i] = (uint8_t)random_bits();
     }
 }
 
-static void test_own_memory_moves(void **state)
-{
+static void test_own_memory_moves(void **state) {
     uint8_t own[ROOM], theirs[ROOM], other[ROOM];
     (void)state;
     for (size_t to = 0; to < 20; to++) {
@@ -117,8 +109,7 @@ static void test_own_memory_moves(void **state)
     }
 }
 
-static void test_own_memory_is_set(void **state)
-{
+static void test_own_memory_is_set(void **state) {
     uint8_t own[ROOM], theirs[ROOM];
     (void)state;
     for (size_t at = 0; at < 20; at++) {
@@ -133,13 +124,11 @@ static void test_own_memory_is_set(void **state)
     }
 }
 
-static int sign(int x)
-{
+static int sign(int x) {
     return (x > 0) - (x < 0);
 }
 
-static void test_own_memory_is_compared(void **state)
-{
+static void test_own_memory_is_compared(void **state) {
     uint8_t a[ROOM], b[ROOM];
     (void)state;
     for (size_t at = 0; at < 20; at++) {
@@ -157,8 +146,7 @@ static void test_own_memory_is_compared(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_own_sqrt_of_what_is_special),
         cmocka_unit_test(test_own_sqrt_of_squares_and_their_neighbours),

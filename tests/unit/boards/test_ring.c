@@ -13,36 +13,30 @@ static unsigned kicked;
 
 const struct board_facts board_facts = {.name = "none", .ports = 4};
 
-uint64_t board_now_us(void)
-{
+uint64_t board_now_us(void) {
     return clock_us;
 }
 
-uint32_t board_lock(void)
-{
+uint32_t board_lock(void) {
     return 1;
 }
 
-void board_unlock(uint32_t before)
-{
+void board_unlock(uint32_t before) {
     assert_int_equal(before, 1);
 }
 
-void board_uart_send(unsigned uart)
-{
+void board_uart_send(unsigned uart) {
     kicked |= 1u << uart;
 }
 
 /* A byte of UART 2 leaves. */
-void board_wait(uint64_t wait_us)
-{
+void board_wait(uint64_t wait_us) {
     uint8_t byte;
     clock_us += wait_us;
     (void)bare_ring_take(&bare_uart[2].send, &byte);
 }
 
-static void test_ring_is_a_queue(void **state)
-{
+static void test_ring_is_a_queue(void **state) {
     uint8_t room[8], byte;
     struct bare_ring ring = BARE_RING(room);
     (void)state;
@@ -65,8 +59,7 @@ static void test_ring_is_a_queue(void **state)
 }
 
 /* Against a queue that is shifted. */
-static void test_ring_takes_pieces(void **state)
-{
+static void test_ring_takes_pieces(void **state) {
     uint8_t room[16], queue[16], piece[24], next = 0;
     struct bare_ring ring = BARE_RING(room);
     size_t held = 0;
@@ -94,8 +87,7 @@ static void test_ring_takes_pieces(void **state)
     }
 }
 
-static void test_uart_counts_what_is_lost(void **state)
-{
+static void test_uart_counts_what_is_lost(void **state) {
     uint8_t bytes[BARE_RECEIVE_BYTES];
     (void)state;
     bare_uarts_init();
@@ -116,8 +108,7 @@ static void test_uart_counts_what_is_lost(void **state)
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 0);
 }
 
-static void test_uart_wakes_who_has_more_to_send(void **state)
-{
+static void test_uart_wakes_who_has_more_to_send(void **state) {
     uint8_t bytes[BARE_SEND_BYTES + 1] = {1, 2, 3}, byte = 0;
     (void)state;
     bare_uarts_init();
@@ -136,8 +127,7 @@ static void test_uart_wakes_who_has_more_to_send(void **state)
 }
 
 /* Bytes of a frame wake nobody before its end, unless they are many. */
-static void test_uart_wakes_at_the_end_of_a_frame(void **state)
-{
+static void test_uart_wakes_at_the_end_of_a_frame(void **state) {
     uint8_t bytes[64];
     (void)state;
     bare_uarts_init();
@@ -162,8 +152,7 @@ static void test_uart_wakes_at_the_end_of_a_frame(void **state)
 }
 
 /* A wire that leads nowhere: noise on it keeps no board awake. */
-static void test_uart_without_a_link_wakes_nobody(void **state)
-{
+static void test_uart_without_a_link_wakes_nobody(void **state) {
     (void)state;
     bare_uarts_init();
     bare_uart_leave(4);
@@ -180,8 +169,7 @@ static void test_uart_without_a_link_wakes_nobody(void **state)
     assert_true(bare_uart_ready(&bare_uart[4]));
 }
 
-static void test_uart_flushes(void **state)
-{
+static void test_uart_flushes(void **state) {
     uint8_t bytes[40] = {0};
     (void)state;
     bare_uarts_init();
@@ -198,8 +186,7 @@ static void test_uart_flushes(void **state)
     assert_int_equal(clock_us, 1000000);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ring_is_a_queue),
         cmocka_unit_test(test_ring_takes_pieces),

@@ -15,13 +15,11 @@ enum { WIRE_BYTES = 1 << 20, PAYLOAD_MAX = 500 };
 
 static uint64_t clock_us;
 
-uint64_t board_now_us(void)
-{
+uint64_t board_now_us(void) {
     return clock_us;
 }
 
-bool board_console_put(uint8_t byte)
-{
+bool board_console_put(uint8_t byte) {
     (void)byte;
     return true;
 }
@@ -32,8 +30,7 @@ static struct {
     size_t in_size, in_taken, out_size, room;
 } wire;
 
-static int wire_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int wire_send(void *context, const uint8_t *bytes, size_t size) {
     size_t taken = size < wire.room ? size : wire.room;
     (void)context;
     assert_true(wire.out_size + taken <= WIRE_BYTES);
@@ -42,8 +39,7 @@ static int wire_send(void *context, const uint8_t *bytes, size_t size)
     return (int)taken;
 }
 
-static int wire_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int wire_receive(void *context, uint8_t *bytes, size_t size) {
     size_t left = wire.in_size - wire.in_taken;
     size_t given = left < size ? left : size;
     (void)context;
@@ -52,8 +48,7 @@ static int wire_receive(void *context, uint8_t *bytes, size_t size)
     return (int)given;
 }
 
-static struct bare_shell begin(void)
-{
+static struct bare_shell begin(void) {
     struct bare_shell shell;
     wire.in_size = wire.in_taken = wire.out_size = 0;
     wire.room = WIRE_BYTES;
@@ -62,22 +57,19 @@ static struct bare_shell begin(void)
     return shell;
 }
 
-static void type(const char *text)
-{
+static void type(const char *text) {
     memcpy(wire.in + wire.in_size, text, strlen(text));
     wire.in_size += strlen(text);
 }
 
-static void takes(struct bare_shell *shell, const char *expected)
-{
+static void takes(struct bare_shell *shell, const char *expected) {
     char line[BARE_SHELL_LINE + 1];
     assert_true(bare_shell_line(shell, line, clock_us));
     assert_string_equal(line, expected);
 }
 
 /* As a link may send it: of the kinds that there are, and anything else. */
-static size_t make_frame(uint8_t *out)
-{
+static size_t make_frame(uint8_t *out) {
     uint8_t payload[PAYLOAD_MAX];
     struct frame_header header = {.kind = (uint8_t)(1 + rand() % 5),
                                   .flags = (uint8_t)(rand() % 4),
@@ -95,8 +87,7 @@ static size_t make_frame(uint8_t *out)
 }
 
 /* Reads all there is, in pieces: what the link gets. */
-static size_t read_all(struct bare_shell *shell, uint8_t *bytes)
-{
+static size_t read_all(struct bare_shell *shell, uint8_t *bytes) {
     struct link_pipe pipe = bare_shell_pipe(shell);
     size_t size = 0;
     int got;
@@ -108,8 +99,7 @@ static size_t read_all(struct bare_shell *shell, uint8_t *bytes)
     return size;
 }
 
-static void test_frames_pass_and_lines_are_taken(void **state)
-{
+static void test_frames_pass_and_lines_are_taken(void **state) {
     static const char *const words[] = {"who", "links", "help me", "Fault 3"};
     static uint8_t frames[WIRE_BYTES], got[WIRE_BYTES];
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
@@ -143,8 +133,7 @@ static void test_frames_pass_and_lines_are_taken(void **state)
     assert_memory_equal(got, frames, size);
 }
 
-static void test_a_frame_in_pieces_is_no_line(void **state)
-{
+static void test_a_frame_in_pieces_is_no_line(void **state) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[2 * sizeof frame];
     char line[BARE_SHELL_LINE + 1];
@@ -167,8 +156,7 @@ static void test_a_frame_in_pieces_is_no_line(void **state)
     }
 }
 
-static void test_enter_alone_is_a_line(void **state)
-{
+static void test_enter_alone_is_a_line(void **state) {
     uint8_t bytes[8];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
@@ -184,8 +172,7 @@ static void test_enter_alone_is_a_line(void **state)
 }
 
 /* After noise without an end: a silence ends it. */
-static void test_noise_is_passed_on(void **state)
-{
+static void test_noise_is_passed_on(void **state) {
     uint8_t bytes[100];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
@@ -204,8 +191,7 @@ static void test_noise_is_passed_on(void **state)
 }
 
 /* What is said stands between two frames, whole. */
-static void test_text_goes_between_frames(void **state)
-{
+static void test_text_goes_between_frames(void **state) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     static const char said[] = "\0\xff"
                                "incode: here\0";
@@ -243,8 +229,7 @@ static void test_text_goes_between_frames(void **state)
 }
 
 /* Who types sees no frames; who sends one has them again. */
-static void test_frames_are_kept_back_for_who_types(void **state)
-{
+static void test_frames_are_kept_back_for_who_types(void **state) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[sizeof frame];
     char line[BARE_SHELL_LINE + 1];
@@ -271,8 +256,7 @@ static void test_frames_are_kept_back_for_who_types(void **state)
 
 /* After a restart nobody is known to type: one key, and frames cease; a frame's
  * first byte, with the rest behind it, is no key. */
-static void test_one_key_keeps_frames_back(void **state)
-{
+static void test_one_key_keeps_frames_back(void **state) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[sizeof frame];
     char line[BARE_SHELL_LINE + 1];
@@ -298,8 +282,7 @@ static void test_one_key_keeps_frames_back(void **state)
     }
 }
 
-static void test_lines_wait_for_each_other(void **state)
-{
+static void test_lines_wait_for_each_other(void **state) {
     static const char *const words[] = {"who", "links", "", "memory"};
     uint8_t bytes[8];
     char line[BARE_SHELL_LINE + 1];
@@ -325,8 +308,7 @@ static void test_lines_wait_for_each_other(void **state)
     assert_false(bare_shell_line(&shell, line, clock_us));
 }
 
-static void test_a_uart_without_a_link_is_read(void **state)
-{
+static void test_a_uart_without_a_link_is_read(void **state) {
     struct bare_shell shell = begin();
     (void)state;
     for (unsigned i = 0; i < 1000; i++) {
@@ -338,8 +320,7 @@ static void test_a_uart_without_a_link_is_read(void **state)
     takes(&shell, "links");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_frames_pass_and_lines_are_taken),
         cmocka_unit_test(test_a_frame_in_pieces_is_no_line),

@@ -68,8 +68,7 @@ struct lend {
     uint8_t *committed;
 };
 
-static inline uint32_t lend_draw(struct lend *s, uint32_t below)
-{
+static inline uint32_t lend_draw(struct lend *s, uint32_t below) {
     s->chance ^= s->chance << 13;
     s->chance ^= s->chance >> 7;
     s->chance ^= s->chance << 17;
@@ -77,15 +76,13 @@ static inline uint32_t lend_draw(struct lend *s, uint32_t below)
 }
 
 /* One time in four, if anything is left to chance. */
-static inline bool lend_refuses(struct lend *s)
-{
+static inline bool lend_refuses(struct lend *s) {
     return s->chance != 0 && lend_draw(s, 4) == 0;
 }
 
 /* ---- outside ---- */
 
-static inline bool lend_request(void *context, uint32_t page)
-{
+static inline bool lend_request(void *context, uint32_t page) {
     struct lend_builder *b = context;
     if (b->page_count == LEND_PAGES || lend_refuses(b->lend))
         return false;
@@ -93,8 +90,7 @@ static inline bool lend_request(void *context, uint32_t page)
     return true;
 }
 
-static inline size_t lend_emit_room(void *context)
-{
+static inline size_t lend_emit_room(void *context) {
     struct lend *s = context;
     if (s->chance == 0)
         return 4096;
@@ -102,8 +98,7 @@ static inline size_t lend_emit_room(void *context)
 }
 
 static inline void lend_emit(void *context, uint32_t vertex,
-                             const uint32_t (*apexes)[3], size_t count)
-{
+                             const uint32_t (*apexes)[3], size_t count) {
     struct lend *s = context;
     struct host_error error = {0};
     uint32_t(*v)[4] = host_tetrahedra_room(&s->tets, count, &error);
@@ -115,8 +110,7 @@ static inline void lend_emit(void *context, uint32_t vertex,
     host_tetrahedra_keep(&s->tets, count);
 }
 
-static inline void lend_commit(void *context, uint32_t brick)
-{
+static inline void lend_commit(void *context, uint32_t brick) {
     struct lend *s = context;
     assert_in_range(brick, s->job.first, s->job.last - 1);
     assert_int_equal(s->committed[brick], 0);
@@ -124,8 +118,7 @@ static inline void lend_commit(void *context, uint32_t brick)
 }
 
 static inline bool lend_spill(void *context, const struct incode_face *faces,
-                              size_t count)
-{
+                              size_t count) {
     struct lend *s = context;
     if (lend_refuses(s))
         return false;
@@ -139,8 +132,7 @@ static inline bool lend_spill(void *context, const struct incode_face *faces,
     return true;
 }
 
-static inline bool lend_unspill(void *context, uint32_t brick)
-{
+static inline bool lend_unspill(void *context, uint32_t brick) {
     struct lend *s = context;
     if (lend_refuses(s))
         return false;
@@ -152,8 +144,7 @@ static inline bool lend_unspill(void *context, uint32_t brick)
 /* ---- the world's side ---- */
 
 /* Gives the faces of the wanted brick back, in portions and in their order. */
-static inline void lend_deliver_faces(struct lend *s)
-{
+static inline void lend_deliver_faces(struct lend *s) {
     uint32_t brick = s->wanted;
     size_t kept = 0, portion = s->chance == 0 ? SIZE_MAX : lend_draw(s, 64), i;
     for (i = 0; i < s->face_count && portion > 0; i++) {
@@ -178,8 +169,7 @@ static inline void lend_deliver_faces(struct lend *s)
                      0);
 }
 
-static inline void lend_deliver_page(struct lend_builder *b)
-{
+static inline void lend_deliver_page(struct lend_builder *b) {
     uint8_t page[INCODE_PAGE_BYTES];
     struct lend *s = b->lend;
     if (b->page_count == 0)
@@ -193,8 +183,7 @@ static inline void lend_deliver_page(struct lend_builder *b)
 }
 
 /* The answers of some builder, if the manager takes any. */
-static inline bool lend_answer(struct lend *s)
-{
+static inline bool lend_answer(struct lend *s) {
     uint32_t from = s->chance == 0 ? 0 : lend_draw(s, s->builders);
     for (uint32_t i = 0; i < s->builders && incode_manager_is_free(&s->manager);
          i++) {
@@ -214,8 +203,7 @@ static inline bool lend_answer(struct lend *s)
 }
 
 /* A list to a builder that has room. */
-static inline bool lend_list(struct lend *s)
-{
+static inline bool lend_list(struct lend *s) {
     struct incode_list list;
     uint32_t from = s->chance == 0 ? 0 : lend_draw(s, s->builders);
     for (uint32_t i = 0; i < s->builders; i++) {
@@ -234,8 +222,7 @@ static inline bool lend_list(struct lend *s)
     return false;
 }
 
-static inline bool lend_build(struct lend *s)
-{
+static inline bool lend_build(struct lend *s) {
     bool worked = false;
     for (uint32_t i = 0; i < s->builders; i++) {
         struct lend_builder *b = &s->builder[i];
@@ -252,8 +239,7 @@ static inline bool lend_build(struct lend *s)
     return worked;
 }
 
-static inline void lend_job(struct lend *s, uint32_t region)
-{
+static inline void lend_job(struct lend *s, uint32_t region) {
     const struct host_region *r = &s->order.region[region];
     s->job = (struct incode_job){.first = r->first, .last = r->last};
     incode_manager_start(&s->manager, &s->job);
@@ -288,8 +274,7 @@ static inline void lend_job(struct lend *s, uint32_t region)
     }
 }
 
-static inline void lend_open(struct lend *s, const double *xyz, uint64_t n)
-{
+static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
     struct host_error error = {0};
     s->regions = s->regions == 0 ? 1 : s->regions;
     if (host_order_make(&s->order, "set", xyz, n, HOST_ADAPTIVE, s->regions,
@@ -326,8 +311,7 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n)
     }
 }
 
-static inline void lend_run(struct lend *s, const double *xyz, uint64_t n)
-{
+static inline void lend_run(struct lend *s, const double *xyz, uint64_t n) {
     lend_open(s, xyz, n);
     for (uint32_t r = 0; r < s->regions; r++)
         lend_job(s, r);
@@ -346,8 +330,7 @@ static inline void lend_run(struct lend *s, const double *xyz, uint64_t n)
     host_digest(&s->tets, &s->digest);
 }
 
-static inline void lend_close(struct lend *s)
-{
+static inline void lend_close(struct lend *s) {
     for (uint32_t i = 0; i < s->builders; i++)
         free(s->builder[i].memory);
     host_order_free(&s->order);

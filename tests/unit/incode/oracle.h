@@ -36,8 +36,8 @@ static const uint8_t oracle_faces[4][4] = {
     {0, 1, 2, 3}, {0, 3, 1, 2}, {0, 2, 3, 1}, {1, 3, 2, 0}};
 
 /* The entry of a face, however it is turned, or the free one for it. */
-static inline uint32_t *oracle_find(const struct oracle *o, const uint32_t v[3])
-{
+static inline uint32_t *oracle_find(const struct oracle *o,
+                                    const uint32_t v[3]) {
     unsigned turn = v[1] < v[0];
     turn = v[2] < v[turn] ? 2 : turn;
     const uint32_t f[3] = {v[turn], v[(turn + 1) % 3], v[(turn + 2) % 3]};
@@ -56,16 +56,15 @@ static inline uint32_t *oracle_find(const struct oracle *o, const uint32_t v[3])
 
 /* The vertex p of the tetrahedron beside the face where orient3d(face, p) > 0;
  * INCODE_NONE: the face is of the hull. */
-static inline uint32_t oracle_apex(const struct oracle *o, const uint32_t v[3])
-{
+static inline uint32_t oracle_apex(const struct oracle *o,
+                                   const uint32_t v[3]) {
     return oracle_find(o, v)[3];
 }
 
 /* tets: of positive orientation, of vertices below `vertices`; they stay. */
 static inline void oracle_open(struct oracle *o,
                                const struct host_tetrahedra *tets,
-                               uint32_t vertices)
-{
+                               uint32_t vertices) {
     uint32_t size = 1024;
     while (size < 12 * tets->count)
         size *= 2;
@@ -96,8 +95,7 @@ static inline void oracle_open(struct oracle *o,
     }
 }
 
-static inline void oracle_close(struct oracle *o)
-{
+static inline void oracle_close(struct oracle *o) {
     free(o->entry);
     free(o->at);
 }

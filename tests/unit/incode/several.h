@@ -54,23 +54,20 @@ struct several {
     } loan[SEVERAL_LOANS];
 };
 
-static inline uint32_t several_draw(struct several *all, uint32_t below)
-{
+static inline uint32_t several_draw(struct several *all, uint32_t below) {
     all->seed ^= all->seed << 13;
     all->seed ^= all->seed >> 7;
     all->seed ^= all->seed << 17;
     return (uint32_t)((all->seed >> 32) % below);
 }
 
-static inline size_t several_room(void *context)
-{
+static inline size_t several_room(void *context) {
     struct several_node *node = context;
     return node->all->one_by_one ? several_draw(node->all, 60) : 4096;
 }
 
 static inline void several_put(struct several *all, uint32_t to,
-                               const uint32_t v[4])
-{
+                               const uint32_t v[4]) {
     if (all->share_count == all->share_room) {
         all->share_room = 2 * all->share_room + 1024;
         all->share = realloc(all->share, all->share_room * sizeof *all->share);
@@ -82,8 +79,7 @@ static inline void several_put(struct several *all, uint32_t to,
     all->sent++;
 }
 
-static inline uint32_t several_region(const struct several *all, uint32_t v)
-{
+static inline uint32_t several_region(const struct several *all, uint32_t v) {
     const struct host_order *order = &all->solo.order;
     uint32_t r = 0;
     while (v / INCODE_BRICK_POINTS >= order->region[r].last)
@@ -91,8 +87,7 @@ static inline uint32_t several_region(const struct several *all, uint32_t v)
     return r;
 }
 
-static inline void several_share(void *context, const uint32_t v[4])
-{
+static inline void several_share(void *context, const uint32_t v[4]) {
     struct several_node *node = context;
     struct several *all = node->all;
     uint32_t self = (uint32_t)(node - all->node), to[4];
@@ -107,8 +102,7 @@ static inline void several_share(void *context, const uint32_t v[4])
 }
 
 static inline void several_open(struct several *all, const double *xyz,
-                                uint64_t n)
-{
+                                uint64_t n) {
     assert_in_range(all->solo.regions, 1, SEVERAL_NODES);
     all->solo.owner_rule = INCODE_OWNER_LOWEST;
     solo_order(&all->solo, xyz, n);
@@ -133,8 +127,7 @@ static inline void several_open(struct several *all, const double *xyz,
 }
 
 /* One of those under way arrives. */
-static inline void several_deliver(struct several *all)
-{
+static inline void several_deliver(struct several *all) {
     uint32_t i = several_draw(all, (uint32_t)all->share_count);
     struct several_share share = all->share[i];
     if (!incode_triangulator_may_take(all->node[share.to].solo.t, 1))
@@ -146,8 +139,7 @@ static inline void several_deliver(struct several *all)
 
 /* What is found of a loan: some of it is of the hull, some another's. */
 static inline void several_count_found(struct several *all,
-                                       const struct several_loan *loan)
-{
+                                       const struct several_loan *loan) {
     const struct incode_found *found = &loan->borrower.found;
     for (uint32_t i = 0; i < found->count; i++) {
         const uint32_t *v = found->v[i];
@@ -159,8 +151,8 @@ static inline void several_count_found(struct several *all,
 }
 
 /* Whoever is drawn lends to another, unless that has borrowed already. */
-static inline void several_lend(struct several *all, struct several_loan *loan)
-{
+static inline void several_lend(struct several *all,
+                                struct several_loan *loan) {
     uint32_t n = all->solo.regions;
     loan->lender = several_draw(all, n);
     loan->helper = several_draw(all, n);
@@ -178,8 +170,8 @@ static inline void several_lend(struct several *all, struct several_loan *loan)
 }
 
 /* A step of what is lent, here or there. */
-static inline void several_go_on(struct several *all, struct several_loan *loan)
-{
+static inline void several_go_on(struct several *all,
+                                 struct several_loan *loan) {
     struct solo *helper = &all->node[loan->helper].solo;
     struct incode_triangulator *lender = all->node[loan->lender].solo.t;
     struct incode_borrower *b = &loan->borrower;
@@ -202,8 +194,7 @@ static inline void several_go_on(struct several *all, struct several_loan *loan)
         several_count_found(all, loan);
 }
 
-static inline bool several_is_quiet(const struct several *all)
-{
+static inline bool several_is_quiet(const struct several *all) {
     if (all->share_count > 0)
         return false;
     for (uint32_t i = 0; i < all->solo.regions; i++)
@@ -213,8 +204,7 @@ static inline bool several_is_quiet(const struct several *all)
     return true;
 }
 
-static inline void several_finish(struct several *all, uint32_t i)
-{
+static inline void several_finish(struct several *all, uint32_t i) {
     struct several_node *node = &all->node[i];
     node->finished = true;
     for (uint32_t b = 0; b < all->solo.order.bricks; b++) {
@@ -226,8 +216,7 @@ static inline void several_finish(struct several *all, uint32_t i)
 }
 
 /* Until all are finished. */
-static inline void several_work(struct several *all)
-{
+static inline void several_work(struct several *all) {
     uint32_t left = 0, n = all->solo.regions;
     bool seeded = false;
     for (uint32_t i = 0; i < n; i++)
@@ -259,8 +248,7 @@ static inline void several_work(struct several *all)
         assert_false(all->loan[i].open);
 }
 
-static inline void several_gather(struct several *all)
-{
+static inline void several_gather(struct several *all) {
     struct host_error error = {0};
     for (uint32_t i = 0; i < all->solo.regions; i++) {
         struct solo *s = &all->node[i].solo;
@@ -287,15 +275,13 @@ static inline void several_gather(struct several *all)
 }
 
 static inline void several_run(struct several *all, const double *xyz,
-                               uint64_t n)
-{
+                               uint64_t n) {
     several_open(all, xyz, n);
     several_work(all);
     several_gather(all);
 }
 
-static inline void several_close(struct several *all)
-{
+static inline void several_close(struct several *all) {
     for (uint32_t i = 0; i < all->solo.regions; i++) {
         struct solo *s = &all->node[i].solo;
         for (size_t k = 0; k < SOLO_GUARD; k++)

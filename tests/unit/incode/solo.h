@@ -67,8 +67,7 @@ struct solo {
     uint8_t *committed;
 };
 
-static inline uint32_t solo_draw(struct solo *s, uint32_t below)
-{
+static inline uint32_t solo_draw(struct solo *s, uint32_t below) {
     s->chance ^= s->chance << 13;
     s->chance ^= s->chance >> 7;
     s->chance ^= s->chance << 17;
@@ -76,15 +75,13 @@ static inline uint32_t solo_draw(struct solo *s, uint32_t below)
 }
 
 /* One time in four, if anything is left to chance. */
-static inline bool solo_refuses(struct solo *s)
-{
+static inline bool solo_refuses(struct solo *s) {
     return s->chance != 0 && solo_draw(s, 4) == 0;
 }
 
 /* ---- outside ---- */
 
-static inline bool solo_request(void *context, uint32_t page)
-{
+static inline bool solo_request(void *context, uint32_t page) {
     struct solo *s = context;
     if (s->page_count == SOLO_QUEUE || solo_refuses(s))
         return false;
@@ -94,8 +91,7 @@ static inline bool solo_request(void *context, uint32_t page)
     return true;
 }
 
-static inline size_t solo_emit_room(void *context)
-{
+static inline size_t solo_emit_room(void *context) {
     struct solo *s = context;
     if (s->chance == 0)
         return 4096;
@@ -103,8 +99,7 @@ static inline size_t solo_emit_room(void *context)
 }
 
 static inline void solo_emit(void *context, uint32_t vertex,
-                             const uint32_t (*apexes)[3], size_t count)
-{
+                             const uint32_t (*apexes)[3], size_t count) {
     struct solo *s = context;
     struct host_error error = {0};
     uint32_t(*v)[4] = host_tetrahedra_room(&s->tets, count, &error);
@@ -124,8 +119,7 @@ static inline void solo_emit(void *context, uint32_t vertex,
     host_tetrahedra_keep(&s->tets, count);
 }
 
-static inline void solo_commit(void *context, uint32_t brick)
-{
+static inline void solo_commit(void *context, uint32_t brick) {
     struct solo *s = context;
     assert_in_range(brick, s->job.first, s->job.last - 1);
     assert_int_equal(s->committed[brick], 0);
@@ -133,8 +127,7 @@ static inline void solo_commit(void *context, uint32_t brick)
 }
 
 static inline bool solo_spill(void *context, const struct incode_face *faces,
-                              size_t count)
-{
+                              size_t count) {
     struct solo *s = context;
     if (solo_refuses(s))
         return false;
@@ -148,8 +141,7 @@ static inline bool solo_spill(void *context, const struct incode_face *faces,
     return true;
 }
 
-static inline bool solo_unspill(void *context, uint32_t brick)
-{
+static inline bool solo_unspill(void *context, uint32_t brick) {
     struct solo *s = context;
     if (solo_refuses(s))
         return false;
@@ -160,8 +152,7 @@ static inline bool solo_unspill(void *context, uint32_t brick)
 
 /* ---- the world's side ---- */
 
-static inline void solo_deliver_page(struct solo *s, uint32_t i)
-{
+static inline void solo_deliver_page(struct solo *s, uint32_t i) {
     uint8_t page[INCODE_PAGE_BYTES];
     uint32_t number = s->pages[i];
     s->pages[i] = s->pages[--s->page_count];
@@ -171,8 +162,7 @@ static inline void solo_deliver_page(struct solo *s, uint32_t i)
 }
 
 /* Gives the faces of the wanted brick back, in portions and in their order. */
-static inline void solo_deliver_faces(struct solo *s)
-{
+static inline void solo_deliver_faces(struct solo *s) {
     uint32_t brick = s->wanted;
     size_t kept = 0, portion = s->chance == 0 ? SIZE_MAX : solo_draw(s, 64), i;
     for (i = 0; i < s->face_count && portion > 0; i++) {
@@ -197,8 +187,7 @@ static inline void solo_deliver_faces(struct solo *s)
 }
 
 /* Something of what is under way arrives; false: nothing is. */
-static inline bool solo_deliver(struct solo *s)
-{
+static inline bool solo_deliver(struct solo *s) {
     if (s->wanted != INCODE_NONE && !solo_refuses(s)) {
         solo_deliver_faces(s);
         return true;
@@ -217,8 +206,7 @@ static inline bool solo_deliver(struct solo *s)
     return true;
 }
 
-static inline void solo_start(struct solo *s, uint32_t region)
-{
+static inline void solo_start(struct solo *s, uint32_t region) {
     const struct host_region *r = &s->order.region[region];
     s->job = (struct incode_job){.first = r->first, .last = r->last};
     memcpy(s->job.lo, r->lo, sizeof r->lo);
@@ -234,8 +222,7 @@ static inline void solo_start(struct solo *s, uint32_t region)
 }
 
 /* Steps until the job is done, or `steps` times. */
-static inline bool solo_step(struct solo *s, uint64_t steps)
-{
+static inline bool solo_step(struct solo *s, uint64_t steps) {
     uint32_t idle = 0;
     while (steps-- > 0) {
         enum incode_step r = incode_triangulator_step(s->t);
@@ -254,8 +241,7 @@ static inline bool solo_step(struct solo *s, uint64_t steps)
     return false;
 }
 
-static inline void solo_region(struct solo *s, uint32_t region)
-{
+static inline void solo_region(struct solo *s, uint32_t region) {
     solo_start(s, region);
     if (s->false_start) {
         uint64_t count = s->tets.count;
@@ -274,8 +260,7 @@ static inline void solo_region(struct solo *s, uint32_t region)
     assert_int_equal(s->t->front.afl.count, 0);
 }
 
-static inline void solo_order(struct solo *s, const double *xyz, uint64_t n)
-{
+static inline void solo_order(struct solo *s, const double *xyz, uint64_t n) {
     struct host_error error = {0};
     if (host_order_make(&s->order, "set", xyz, n, s->partition, s->regions,
                         s->index == INCODE_GRID, &error) != 0)
@@ -284,8 +269,7 @@ static inline void solo_order(struct solo *s, const double *xyz, uint64_t n)
 
 /* The triangulator, with the order that is there. */
 static inline void solo_make(struct solo *s,
-                             const struct incode_front_peers *peers)
-{
+                             const struct incode_front_peers *peers) {
     s->setup = (struct incode_setup){.bricks = s->order.bricks,
                                      .index = s->index,
                                      .face_rule = s->face_rule,
@@ -318,16 +302,14 @@ static inline void solo_make(struct solo *s,
         incode_triangulator_allow(s->t, s->units);
 }
 
-static inline void solo_open(struct solo *s, const double *xyz, uint64_t n)
-{
+static inline void solo_open(struct solo *s, const double *xyz, uint64_t n) {
     const struct incode_front_peers none = {0};
     solo_order(s, xyz, n);
     solo_make(s, &none);
 }
 
 /* The whole set, region after region, in one arena. */
-static inline void solo_run(struct solo *s, const double *xyz, uint64_t n)
-{
+static inline void solo_run(struct solo *s, const double *xyz, uint64_t n) {
     solo_open(s, xyz, n);
     for (uint32_t r = 0; r < s->regions; r++)
         solo_region(s, r);
@@ -351,8 +333,7 @@ static inline void solo_run(struct solo *s, const double *xyz, uint64_t n)
     host_digest(&s->tets, &s->digest);
 }
 
-static inline void solo_close(struct solo *s)
-{
+static inline void solo_close(struct solo *s) {
     host_order_free(&s->order);
     host_tetrahedra_free(&s->tets);
     free(s->arena);

@@ -13,16 +13,14 @@
 #include "solo.h"
 #include "tests/unit/emulated.h"
 
-static void made(const char *kind, uint64_t n, struct host_points *points)
-{
+static void made(const char *kind, uint64_t n, struct host_points *points) {
     struct host_error error = {0};
     if (host_gen(kind, n, 5, points, &error) != 0)
         fail_msg("%s", error.text);
 }
 
 /* What a set comes to, face by face. */
-static struct host_digest right(const struct host_points *points)
-{
+static struct host_digest right(const struct host_points *points) {
     struct solo s = {.index = INCODE_KD,
                      .build = INCODE_BUILD_FACES,
                      .regions = 1,
@@ -36,8 +34,7 @@ static struct host_digest right(const struct host_points *points)
 
 /* ---- the choice ---- */
 
-static void what_is_chosen(void **unused)
-{
+static void what_is_chosen(void **unused) {
     static const struct {
         const char *kind;
         unsigned points;
@@ -99,8 +96,7 @@ static void what_is_chosen(void **unused)
 }
 
 /* Any memory, with everything else left to chance. */
-static void each_memory(void **unused)
-{
+static void each_memory(void **unused) {
     struct host_points points = {0};
     (void)unused;
     made("bubbles", 2200, &points);
@@ -130,8 +126,7 @@ static void each_memory(void **unused)
 /* Point by point with so many bytes for the triangulation, and with everything
  * else left to chance.  True: some went by points, and then others by faces. */
 static bool in_room(const struct host_points *points, size_t room, uint32_t k,
-                    const char *expected)
-{
+                    const char *expected) {
     struct solo s = {.index = INCODE_KD,
                      .build = INCODE_BUILD_POINTS,
                      .regions = 1u << k % 7 / 3,
@@ -163,8 +158,7 @@ static bool in_room(const struct host_points *points, size_t room, uint32_t k,
 }
 
 /* Memory of each size, so that it ends at any moment. */
-static void handed_over(void **unused)
-{
+static void handed_over(void **unused) {
     static const struct {
         const char *kind;
         uint32_t points, step, most;
@@ -189,16 +183,15 @@ static void handed_over(void **unused)
 /* ---- one job after another ---- */
 
 /* Begins bricks [first, last). */
-static void begin(struct solo *s, uint32_t first, uint32_t last)
-{
+static void begin(struct solo *s, uint32_t first, uint32_t last) {
     s->order.region[0].first = first;
     s->order.region[0].last = last;
     solo_start(s, 0);
 }
 
 /* Some of a job, which is then forgotten. */
-static void leave(struct solo *s, uint32_t first, uint32_t last, uint64_t steps)
-{
+static void leave(struct solo *s, uint32_t first, uint32_t last,
+                  uint64_t steps) {
     uint64_t count = s->tets.count;
     begin(s, first, last);
     (void)solo_step(s, steps);
@@ -209,8 +202,7 @@ static void leave(struct solo *s, uint32_t first, uint32_t last, uint64_t steps)
 /* A third goes by faces, all that there is by points; whichever is left, at
  * whatever step, with pages and spilled faces on their way, the next comes to
  * the right result. */
-static void job_after_job(void **unused)
-{
+static void job_after_job(void **unused) {
     struct host_points points = {0};
     (void)unused;
     made("uniform", 3000, &points);
@@ -262,8 +254,7 @@ static void job_after_job(void **unused)
 
 /* A spilled list that comes after its job was left is none that was asked for,
  * and what was the list's is another's. */
-static void late_spilled_faces(void **unused)
-{
+static void late_spilled_faces(void **unused) {
     struct host_points points = {0};
     struct solo s = {
         .index = INCODE_KD, .regions = 1, .memory = 4 << 20, .pressure = 350};
@@ -301,8 +292,7 @@ static void late_spilled_faces(void **unused)
 /* ---- memory ---- */
 
 /* As much as the points take, and not what faces would. */
-static void high_water(void **unused)
-{
+static void high_water(void **unused) {
     struct incode_statistics before, after;
     struct host_points points = {0};
     struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 32 << 20};
@@ -330,8 +320,7 @@ static void high_water(void **unused)
     host_points_free(&points);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_chosen),     cmocka_unit_test(each_memory),
         cmocka_unit_test(handed_over),        cmocka_unit_test(job_after_job),

@@ -15,8 +15,7 @@
 #include "tests/unit/reference.h"
 
 static void expect(const struct several *start, const struct host_points *p,
-                   const char *digest, const char *name)
-{
+                   const char *digest, const char *name) {
     static struct several all;
     memcpy(&all, start, sizeof all);
     several_run(&all, p->xyz, p->count);
@@ -27,8 +26,7 @@ static void expect(const struct several *start, const struct host_points *p,
     several_close(&all);
 }
 
-static void expect_all(const struct host_points *points, const char *name)
-{
+static void expect_all(const struct host_points *points, const char *name) {
     static const uint32_t counts[] = {1, 2, 4, 8, 16, 32};
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
@@ -58,8 +56,7 @@ static void expect_all(const struct host_points *points, const char *name)
     }
 }
 
-static void made_sets(void **unused)
-{
+static void made_sets(void **unused) {
     (void)unused;
     static const char *const kinds[] = {
         "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
@@ -73,8 +70,7 @@ static void made_sets(void **unused)
     }
 }
 
-static void degenerate_sets(void **unused)
-{
+static void degenerate_sets(void **unused) {
     (void)unused;
     static const char *const names[] = {
         "deg_cgal_T3_1",           "deg_cgal_grid5",
@@ -96,8 +92,7 @@ static void degenerate_sets(void **unused)
 
 /* A share of what is built in vain, and how evenly it is spread: what the paper
  * repeated 1.34 times at 32 nodes, for 20,000 points. */
-static void little_in_vain(void **unused)
-{
+static void little_in_vain(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -119,8 +114,7 @@ static void little_in_vain(void **unused)
 }
 
 /* What cannot come of another is told so, and changes nothing. */
-static void refusals(void **unused)
-{
+static void refusals(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -150,8 +144,7 @@ static void refusals(void **unused)
 }
 
 /* A tetrahedron that comes twice is noticed. */
-static void twice(void **unused)
-{
+static void twice(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -175,8 +168,7 @@ static void twice(void **unused)
 }
 
 static bool no_room(void *context, const struct incode_face *faces,
-                    size_t count)
-{
+                    size_t count) {
     (void)context, (void)faces, (void)count;
     return false;
 }
@@ -184,8 +176,7 @@ static bool no_room(void *context, const struct incode_face *faces,
 /* Where spilled faces have no room outside, what others send has to wait: it
  * may come later, and who sends it all the same is told that memory is not what
  * is wanting. */
-static void waits_for_room(void **unused)
-{
+static void waits_for_room(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -219,15 +210,13 @@ static void waits_for_room(void **unused)
     host_points_free(&points);
 }
 
-static bool not_now(void *context, uint32_t brick)
-{
+static bool not_now(void *context, uint32_t brick) {
     (void)context, (void)brick;
     return false;
 }
 
 /* A node that cannot ask for what is spilled, however long, is not quiet. */
-static void waits_to_ask(void **unused)
-{
+static void waits_to_ask(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -260,8 +249,7 @@ static void waits_to_ask(void **unused)
 /* Sends the last node what it is to hear of, as long as it has fewer faces than
  * so many: what has the vertex, or, without one, every other one, so that few
  * of the faces close. */
-static void tell_last(struct several *all, uint32_t vertex, uint32_t faces)
-{
+static void tell_last(struct several *all, uint32_t vertex, uint32_t faces) {
     uint32_t last = all->solo.regions - 1;
     struct incode_triangulator *t = all->node[last].solo.t;
     for (size_t i = all->share_count; i-- > 0 && t->front.afl.count < faces;) {
@@ -280,8 +268,7 @@ static void tell_last(struct several *all, uint32_t vertex, uint32_t faces)
 /* A lattice of a plane and a point beside it, which the last node hears of from
  * lower ones.  What they send opens more faces than there is room for, all in
  * bricks before the one at work: those are spilled, too. */
-static void spills_before_work(void **unused)
-{
+static void spills_before_work(void **unused) {
     enum { SIDE = 72, POINTS = SIDE * SIDE + 1, PRESSURE = 300 };
     static double xyz[POINTS][3];
     static struct several all;
@@ -320,8 +307,7 @@ static void spills_before_work(void **unused)
     solo_close(&solo);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),

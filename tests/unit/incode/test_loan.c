@@ -14,8 +14,7 @@
 
 /* One region, or more, of points of that kind. */
 static void open_set(struct several *all, const char *kind, uint64_t points,
-                     uint32_t regions)
-{
+                     uint32_t regions) {
     struct host_points p = {0};
     struct host_error error = {0};
     *all = (struct several){.seed = 11,
@@ -28,8 +27,7 @@ static void open_set(struct several *all, const char *kind, uint64_t points,
 
 /* Steps of the first one, until it can lend. */
 static struct incode_triangulator *until_lent(struct several *all,
-                                              struct incode_loan *loan)
-{
+                                              struct incode_loan *loan) {
     struct incode_triangulator *t = all->node[0].solo.t;
     while (!incode_triangulator_lend(t, loan))
         assert_false(solo_step(&all->node[0].solo, 1));
@@ -39,8 +37,7 @@ static struct incode_triangulator *until_lent(struct several *all,
 /* Whoever has the points finds what is asked, by a triangulator that has no
  * part in it otherwise. */
 static void find(struct several *all, uint32_t helper,
-                 const struct incode_loan *loan, struct incode_borrower *b)
-{
+                 const struct incode_loan *loan, struct incode_borrower *b) {
     struct solo *solo = &all->node[helper].solo;
     enum incode_step r = INCODE_WORKED;
     incode_borrower_begin(b, solo->t, loan);
@@ -54,8 +51,7 @@ static void find(struct several *all, uint32_t helper,
 }
 
 /* All kinds of answers come, most of them in time. */
-static void all_kinds(void **unused)
-{
+static void all_kinds(void **unused) {
     (void)unused;
     static struct several with, without;
     static const char *const kinds[] = {"uniform", "sphere", "bluntfin"};
@@ -82,8 +78,7 @@ static void all_kinds(void **unused)
 }
 
 /* What comes a second time builds nothing. */
-static void too_late(void **unused)
-{
+static void too_late(void **unused) {
     (void)unused;
     static struct several all;
     static struct incode_borrower b;
@@ -109,8 +104,7 @@ static void too_late(void **unused)
 
 /* The faces of the loan's vertices that are open now. */
 static void ask_again(const struct incode_triangulator *t,
-                      struct incode_loan *loan)
-{
+                      struct incode_loan *loan) {
     uint32_t v[INCODE_LOAN_VERTICES], n = 0;
     for (uint32_t i = 0; i < loan->count; i++)
         if (i == 0 || loan->v[i][0] != v[n - 1])
@@ -128,16 +122,14 @@ static void ask_again(const struct incode_triangulator *t,
 }
 
 /* As far as it goes. */
-static void work_on(struct solo *solo)
-{
+static void work_on(struct solo *solo) {
     for (int i = 0; i < 4; i++)
         assert_false(solo_step(solo, 600));
 }
 
 /* Vertices that are lent hold their bricks up, and no longer than they are: not
  * even if nothing is left to do when they come back. */
-static void held_up(void **unused)
-{
+static void held_up(void **unused) {
     (void)unused;
     static struct several all;
     static struct incode_borrower b;
@@ -167,8 +159,7 @@ static void held_up(void **unused)
 
 /* A star with more faces than a loan holds: as many as fit are lent, and the
  * rest is closed at home. */
-static void large_star(void **unused)
-{
+static void large_star(void **unused) {
     (void)unused;
     static struct several all, plain;
     open_set(&plain, "hub", 3000, 2);
@@ -184,8 +175,7 @@ static void large_star(void **unused)
 }
 
 /* What is no loan, and no answer to one. */
-static void unsound(void **unused)
-{
+static void unsound(void **unused) {
     (void)unused;
     struct incode_loan loan = {4, 8, 1, {{256, 300, 9}}};
     assert_true(incode_loan_is_sound(&loan, 8));
@@ -218,8 +208,7 @@ static void unsound(void **unused)
     assert_false(incode_found_is_sound(&found, 2));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_kinds), cmocka_unit_test(too_late),
         cmocka_unit_test(held_up),   cmocka_unit_test(large_star),

@@ -6,8 +6,7 @@
 #include "tests/unit/incode/solo.h"
 #include "tests/unit/reference.h"
 
-static void expect(const double *xyz, uint64_t n, struct host_digest *digest)
-{
+static void expect(const double *xyz, uint64_t n, struct host_digest *digest) {
     struct solo solo = {
         .index = INCODE_KD, .regions = 1, .build = INCODE_BUILD_FACES};
     solo_run(&solo, xyz, n);
@@ -16,14 +15,12 @@ static void expect(const double *xyz, uint64_t n, struct host_digest *digest)
 }
 
 static void run(struct lend *lend, const struct host_points *set,
-                const struct host_digest *digest)
-{
+                const struct host_digest *digest) {
     lend_run(lend, set->xyz, set->count);
     assert_string_equal(lend->digest.text, digest->text);
 }
 
-static void make(const char *kind, uint64_t n, struct host_points *set)
-{
+static void make(const char *kind, uint64_t n, struct host_points *set) {
     struct host_error error = {0};
     if (host_gen(kind, n, 5, set, &error) != 0)
         fail_msg("%s", error.text);
@@ -31,8 +28,7 @@ static void make(const char *kind, uint64_t n, struct host_points *set)
 
 /* Every kind of points, every index, one builder and several, at once and by
  * chance. */
-static void kinds(void **unused)
-{
+static void kinds(void **unused) {
     (void)unused;
     static const char *const names[] = {"uniform", "bluntfin", "rotated",
                                         "sphere",  "grid",     "hub"};
@@ -59,8 +55,7 @@ static void kinds(void **unused)
     }
 }
 
-static void indexes(void **unused)
-{
+static void indexes(void **unused) {
     (void)unused;
     struct host_points set = {0};
     struct host_digest digest;
@@ -81,8 +76,7 @@ static void indexes(void **unused)
 
 /* Faces are lent, then spilled, then lent again: what comes late of them does
  * not count. */
-static void spilled(void **unused)
-{
+static void spilled(void **unused) {
     (void)unused;
     struct host_points set = {0};
     struct host_digest digest;
@@ -102,8 +96,7 @@ static void spilled(void **unused)
 }
 
 /* A list that asks for more faces than there are open ever. */
-static void job_larger_than_the_list(void **unused)
-{
+static void job_larger_than_the_list(void **unused) {
     (void)unused;
     struct host_points set = {0};
     struct host_digest digest;
@@ -122,8 +115,7 @@ static void job_larger_than_the_list(void **unused)
 
 /* A single tetrahedron: all its faces are of the hull, and the list is empty
  * when they are answered. */
-static void all_faces_on_the_hull(void **unused)
-{
+static void all_faces_on_the_hull(void **unused) {
     (void)unused;
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     const struct host_points set = {.xyz = xyz, .count = 4};
@@ -139,8 +131,7 @@ static void all_faces_on_the_hull(void **unused)
 }
 
 /* A job without bricks: nothing is lent, and it is done. */
-static void empty_list(void **unused)
-{
+static void empty_list(void **unused) {
     (void)unused;
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     struct lend lend = {.builders = 1, .faces = 4, .jobs = 1};
@@ -156,8 +147,7 @@ static void empty_list(void **unused)
 }
 
 /* What no builder says, and what no manager asks. */
-static void unsound(void **unused)
-{
+static void unsound(void **unused) {
     (void)unused;
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     static const struct incode_answers wrong[] = {
@@ -210,8 +200,7 @@ static void unsound(void **unused)
 
 enum cheat { MISSING, EMPTY, OTHER_KIND, TWICE, OTHER_VERTEX };
 
-static void cheat_with(struct incode_answers *answers, enum cheat how)
-{
+static void cheat_with(struct incode_answers *answers, enum cheat how) {
     answers->count -= how == MISSING;
     answers->count = how == EMPTY ? 0 : answers->count;
     if (how == OTHER_KIND)
@@ -227,8 +216,7 @@ static void cheat_with(struct incode_answers *answers, enum cheat how)
 /* What the manager says of a builder who has a list of some kind wrong, or all
  * of them where another face may close the one that is left out. */
 static const char *fault_of(enum incode_list_kind kind, uint32_t least,
-                            enum cheat how)
-{
+                            enum cheat how) {
     struct host_points set = {0};
     struct lend lend = {.builders = 1, .faces = 8, .jobs = 1};
     struct incode_builder *b;
@@ -266,8 +254,7 @@ static const char *fault_of(enum incode_list_kind kind, uint32_t least,
 
 /* A builder that leaves something out, or answers what it was not asked, is
  * found, and not waited for. */
-static void wrong_answers(void **unused)
-{
+static void wrong_answers(void **unused) {
     (void)unused;
     static const char unsound_text[] =
         "answers that are none to what was asked";
@@ -293,8 +280,7 @@ static void wrong_answers(void **unused)
             cases[i].said);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kinds),
         cmocka_unit_test(indexes),

@@ -22,8 +22,7 @@ struct looks {
     uint64_t count, at, last, most;
 };
 
-static uint32_t look(void *context)
-{
+static uint32_t look(void *context) {
     struct looks *l = context;
     uint64_t blocks = work_blocks - l->last;
     if (l->count > 0 && blocks > l->most) { /* before the first: the order */
@@ -35,8 +34,7 @@ static uint32_t look(void *context)
     return ASKED;
 }
 
-static void holds(const char *kind, uint64_t n, uint8_t index, uint8_t build)
-{
+static void holds(const char *kind, uint64_t n, uint8_t index, uint8_t build) {
     struct host_points points = {0};
     struct host_error error = {0};
     struct looks l = {.last = work_blocks};
@@ -61,14 +59,12 @@ static void holds(const char *kind, uint64_t n, uint8_t index, uint8_t build)
 }
 
 /* What the function asks is done, whatever it asks; and nobody need look. */
-static uint32_t ask(void *context)
-{
+static uint32_t ask(void *context) {
     uint32_t *asked = context;
     return ++*asked;
 }
 
-static void test_pause_asks(void **state)
-{
+static void test_pause_asks(void **state) {
     uint32_t asked = 0;
     struct incode_pause pause = {ask, &asked, 0}, none = {0};
     (void)state;
@@ -82,8 +78,7 @@ static void test_pause_asks(void **state)
         incode_breathe(&none, INCODE_PAUSE_OVER);
 }
 
-static void test_pause_in_points(void **state)
-{
+static void test_pause_in_points(void **state) {
     (void)state;
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_POINTS);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_POINTS);
@@ -93,8 +88,7 @@ static void test_pause_in_points(void **state)
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_POINTS);
 }
 
-static void test_pause_in_faces(void **state)
-{
+static void test_pause_in_faces(void **state) {
     (void)state;
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_FACES);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_FACES);
@@ -102,16 +96,14 @@ static void test_pause_in_faces(void **state)
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_FACES);
 }
 
-static void test_pause_in_searches(void **state)
-{
+static void test_pause_in_searches(void **state) {
     (void)state;
     holds("uniform", 1000, INCODE_NAIVE, INCODE_BUILD_FACES);
     holds("uniform", 2000, INCODE_GRID, INCODE_BUILD_FACES);
     holds("grid", 1000, INCODE_GRID, INCODE_BUILD_FACES);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_pause_asks),
         cmocka_unit_test(test_pause_in_points),

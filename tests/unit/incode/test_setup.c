@@ -11,8 +11,7 @@
 
 #include "incode/triangulator.h"
 
-static void too_little_memory(void **unused)
-{
+static void too_little_memory(void **unused) {
     (void)unused;
     struct incode_setup setup = {.bricks = 10, .index = INCODE_KD};
     struct incode_outside outside = {0};
@@ -34,8 +33,7 @@ static void too_little_memory(void **unused)
 }
 
 /* Each field of a setup, at its limits and past them. */
-static void setup_limits(void **unused)
-{
+static void setup_limits(void **unused) {
     (void)unused;
     const struct incode_setup good = {
         .bricks = 10, .index = INCODE_KD, .hi = {1, 1, 1}};
@@ -95,8 +93,7 @@ static void setup_limits(void **unused)
     assert_memory_equal(arena, untouched, sizeof arena);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(too_little_memory),
         cmocka_unit_test(setup_limits),

@@ -19,14 +19,12 @@ enum {
 
 static uint64_t state = 1;
 
-static double draw(void)
-{
+static double draw(void) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-53;
 }
 
-static uint64_t count_by_points(const double (*xyz)[3], uint64_t points)
-{
+static uint64_t count_by_points(const double (*xyz)[3], uint64_t points) {
     struct solo solo = {.index = INCODE_KD,
                         .build = INCODE_BUILD_POINTS,
                         .regions = 1,
@@ -40,8 +38,7 @@ static uint64_t count_by_points(const double (*xyz)[3], uint64_t points)
 /* A region by a node of its own, that has learned nothing of others. */
 static struct incode_statistics run(const double (*xyz)[3], uint64_t points,
                                     uint32_t regions, uint32_t region,
-                                    size_t memory)
-{
+                                    size_t memory) {
     struct incode_statistics s;
     struct solo solo = {.index = INCODE_KD,
                         .build = INCODE_BUILD_FACES,
@@ -61,8 +58,7 @@ static struct incode_statistics run(const double (*xyz)[3], uint64_t points,
     return s;
 }
 
-static void plane_and_a_point(void **unused)
-{
+static void plane_and_a_point(void **unused) {
     static double xyz[PLANE][3];
     (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
@@ -87,8 +83,7 @@ static void plane_and_a_point(void **unused)
     }
 }
 
-static void make_mixed(double (*xyz)[3], int points)
-{
+static void make_mixed(double (*xyz)[3], int points) {
     for (int i = 0; i < points; i++) {
         double scale = ldexp(1, (int)(80 * draw()) - 40);
         for (int d = 0; d < 3; d++)
@@ -98,8 +93,7 @@ static void make_mixed(double (*xyz)[3], int points)
 
 /* 66 pages, and 48 frames: a walk over all of them that always went up would
  * find none of them there. */
-static void mixed_exponents(void **unused)
-{
+static void mixed_exponents(void **unused) {
     static double xyz[MIXED][3];
     (void)unused;
     make_mixed(xyz, MIXED);
@@ -111,8 +105,7 @@ static void mixed_exponents(void **unused)
 
 /* 147 pages: with what the active face list and the bricks would take of a
  * larger set, there were 92 frames, and more than 10 requests a tetrahedron. */
-static void frames_before_faces(void **unused)
-{
+static void frames_before_faces(void **unused) {
     static double xyz[MORE_MIXED][3];
     (void)unused;
     make_mixed(xyz, MORE_MIXED);
@@ -124,8 +117,7 @@ static void frames_before_faces(void **unused)
 /* Points of others' bricks are inserted, released, and visited again each time
  * that memory is short: only a look at all cells would tell that no cell holds
  * such a point. */
-static void released_vertices(void **unused)
-{
+static void released_vertices(void **unused) {
     static double xyz[PLANE][3];
     struct solo solo = {.index = INCODE_KD,
                         .build = INCODE_BUILD_POINTS,
@@ -150,8 +142,7 @@ static void released_vertices(void **unused)
     solo_close(&solo);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(plane_and_a_point),
         cmocka_unit_test(mixed_exponents),

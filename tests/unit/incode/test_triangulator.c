@@ -23,8 +23,7 @@ static const char *const build_names[] = {"auto", "faces", "points"};
 
 /* Runs one case and compares the digest. */
 static void expect(struct solo *s, const struct host_points *points,
-                   const char *digest, const char *name)
-{
+                   const char *digest, const char *name) {
     struct solo start = *s;
     solo_run(s, points->xyz, points->count);
     if (strcmp(s->digest.text, digest) != 0) {
@@ -40,8 +39,7 @@ static void expect(struct solo *s, const struct host_points *points,
 }
 
 static void reference_digest(const struct host_points *points,
-                             struct host_digest *digest)
-{
+                             struct host_digest *digest) {
     struct host_tetrahedra tets = {0};
     reference_delaunay(points->xyz, (uint32_t)points->count, &tets);
     host_tetrahedra_sort(&tets);
@@ -51,8 +49,7 @@ static void reference_digest(const struct host_points *points,
 
 /* A case face by face and, where that may be, point by point. */
 static void expect_both(const struct solo *s, const struct host_points *points,
-                        const char *digest, const char *name)
-{
+                        const char *digest, const char *name) {
     static const uint8_t builds[] = {INCODE_BUILD_FACES, INCODE_BUILD_POINTS,
                                      INCODE_BUILD_AUTO};
     bool both = s->index == INCODE_KD && s->face_rule == INCODE_FACE_OWN;
@@ -66,8 +63,7 @@ static void expect_both(const struct solo *s, const struct host_points *points,
 /* Every index, region count, partition and rule, the rest drawn from a seed.
  * Under the sanitizers one of the four pairs of partition and rule. */
 static void expect_all(const struct host_points *points, const char *digest,
-                       const char *name, bool few)
-{
+                       const char *name, bool few) {
     static const uint32_t counts[] = {1, 32, 2, 8};
     uint64_t seed = 1;
     for (unsigned i = 0; i < 3; i++) {
@@ -101,8 +97,7 @@ static const char *const degenerate[] = {
 
 /* Reads a set, or skips the test. */
 static void read_set(const char *name, const char *suffix,
-                     struct host_points *points)
-{
+                     struct host_points *points) {
     char file[96];
     (void)snprintf(file, sizeof file, "%s%s", name, suffix);
     if (!reference_data(file, points)) {
@@ -111,8 +106,7 @@ static void read_set(const char *name, const char *suffix,
     }
 }
 
-static void degenerate_sets(void **unused)
-{
+static void degenerate_sets(void **unused) {
     (void)unused;
     for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
         struct host_points points = {0};
@@ -125,8 +119,7 @@ static void degenerate_sets(void **unused)
 }
 
 /* Scaling by a power of two changes no sign, so the digest stays. */
-static void scaled_sets(void **unused)
-{
+static void scaled_sets(void **unused) {
     (void)unused;
     static const int powers[] = {500, -500};
     for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
@@ -150,8 +143,7 @@ static void scaled_sets(void **unused)
 }
 
 /* Coordinates of 2^1000 beside coordinates of 2^-1074. */
-static void both_ends(void **unused)
-{
+static void both_ends(void **unused) {
     (void)unused;
     uint64_t seed = 3;
     for (int round = 0; round < 8; round += SANITIZED ? 2 : 1) {
@@ -174,15 +166,13 @@ static void both_ends(void **unused)
     }
 }
 
-static double draw(uint64_t *seed)
-{
+static double draw(uint64_t *seed) {
     *seed = *seed * UINT64_C(6364136223846793005) + 1442695040888963;
     return (double)(*seed >> 11) * 0x1p-53;
 }
 
 /* One coordinate anywhere among doubles, each kind in its way. */
-static double anywhere(int kind, uint64_t *seed)
-{
+static double anywhere(int kind, uint64_t *seed) {
     double x = 2 * draw(seed) - 1;
     return kind == 0   ? DBL_MAX * (x < 0 ? 0.7 * x - 0.3 : 0.7 * x + 0.3)
            : kind == 1 ? DBL_MAX * 0.55 * x
@@ -191,8 +181,7 @@ static double anywhere(int kind, uint64_t *seed)
 
 /* Points over the whole range of doubles, where differences, boxes and their
  * sums overflow: they lie as the same points a little nearer. */
-static void whole_range(void **unused)
-{
+static void whole_range(void **unused) {
     (void)unused;
     uint64_t seed = 5;
     for (int round = 0; round < (SANITIZED ? 3 : 9); round++) {
@@ -231,8 +220,7 @@ static void whole_range(void **unused)
  * expense but kd's.  Under the sanitizers as many rounds as take each kind of
  * size, far point and count of them: they look for wrong accesses, not for
  * wrong digests. */
-static void mixed_scales(void **unused)
-{
+static void mixed_scales(void **unused) {
     (void)unused;
     uint64_t seed = 11;
     for (int round = 0; round < (SANITIZED ? 3 : 24); round++) {
@@ -275,8 +263,7 @@ static void mixed_scales(void **unused)
 
 /* Points so near each other that products of what lies between them underflow,
  * beside faces of size 1: found by chance, 9 of 2,040 sets of this kind. */
-static void denormal_neighbours(void **unused)
-{
+static void denormal_neighbours(void **unused) {
     (void)unused;
     static const double p[11][3] = {
         {0.34022349259302698, 0.064774195303455739, 0.2596715618713743},
@@ -300,15 +287,13 @@ static void denormal_neighbours(void **unused)
     host_points_free(&points);
 }
 
-static void made(const char *kind, uint64_t n, struct host_points *points)
-{
+static void made(const char *kind, uint64_t n, struct host_points *points) {
     struct host_error error = {0};
     if (host_gen(kind, n, 5, points, &error) != 0)
         fail_msg("%s", error.text);
 }
 
-static void made_sets(void **unused)
-{
+static void made_sets(void **unused) {
     (void)unused;
     static const char *const kinds[] = {
         "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
@@ -337,8 +322,7 @@ static void made_sets(void **unused)
 /* Two lines, and a curve of the third degree: a tetrahedron for each pair of
  * their segments, and searches in which nearly every point beats the one
  * before. */
-static void curves(void **unused)
-{
+static void curves(void **unused) {
     (void)unused;
     enum { HALF = 30 };
     static double xyz[2][2 * HALF][3];
@@ -360,8 +344,7 @@ static void curves(void **unused)
 }
 
 /* What a made set takes with all of its memory. */
-static struct solo taken_by(const char *kind, uint64_t n)
-{
+static struct solo taken_by(const char *kind, uint64_t n) {
     struct host_points points = {0};
     struct solo s = {.index = INCODE_KD,
                      .build = INCODE_BUILD_FACES,
@@ -377,8 +360,7 @@ static struct solo taken_by(const char *kind, uint64_t n)
 /* Sides that are coplanar up to rounding, where every point is in doubt about
  * every face: hardly more than the facets of the hull may have to look at all.
  */
-static void rough_sides(void **unused)
-{
+static void rough_sides(void **unused) {
     (void)unused;
     struct solo s = taken_by("rotated", 27000);
     assert_in_range(s.far_calls, 1, s.hulls);
@@ -386,8 +368,7 @@ static void rough_sides(void **unused)
 
 /* Points on a sphere up to rounding: not every search that goes through the
  * sphere may look at every point. */
-static void rough_sphere(void **unused)
-{
+static void rough_sphere(void **unused) {
     (void)unused;
     struct solo s = taken_by("sphere", 6000);
     assert_in_range(s.far_calls, 1, 1000);
@@ -395,8 +376,7 @@ static void rough_sphere(void **unused)
 
 /* Two grids up to rounding, the large one 2^1100 times the small one: what is
  * learned of one overflows where it is asked for the other. */
-static void rough_at_both_ends(void **unused)
-{
+static void rough_at_both_ends(void **unused) {
     (void)unused;
     struct host_points small = {0}, both = {0};
     struct host_error error = {0};
@@ -426,8 +406,7 @@ static void rough_at_both_ends(void **unused)
 }
 
 /* A front at one vertex that is far longer than what is kept at hand. */
-static void hub(void **unused)
-{
+static void hub(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_digest digest[2];
@@ -457,8 +436,7 @@ static void hub(void **unused)
 /* ---- larger sets ---- */
 
 /* The digest of a set in INDEX.md beside it; false: it is not there. */
-static bool known_digest(const char *name, char text[72])
-{
+static bool known_digest(const char *name, char text[72]) {
     const char *folder = getenv("INCODE_DATA");
     char path[512], line[4096], hex[65], set[64];
     (void)snprintf(path, sizeof path, "%s/INDEX.md",
@@ -483,8 +461,7 @@ struct real {
     uint32_t pressure;
 };
 
-static void real_sets(void **unused)
-{
+static void real_sets(void **unused) {
     (void)unused;
     static const struct real cases[] = {
         {"cactus", INCODE_NAIVE, 1, 0},  {"pdb_3GQP", INCODE_NAIVE, 8, 0},
@@ -521,8 +498,7 @@ static void real_sets(void **unused)
 
 /* ---- memory and the interface's refusals ---- */
 
-static void smallest_memory(void **unused)
-{
+static void smallest_memory(void **unused) {
     (void)unused;
     struct host_points points = {0};
     made("uniform", 20000, &points);
@@ -545,8 +521,7 @@ static void smallest_memory(void **unused)
     host_points_free(&points);
 }
 
-static void refusals(void **unused)
-{
+static void refusals(void **unused) {
     (void)unused;
     struct host_points points = {0};
     made("uniform", 500, &points);
@@ -575,8 +550,7 @@ static void refusals(void **unused)
     host_points_free(&points);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(degenerate_sets),
         cmocka_unit_test(scaled_sets),

@@ -29,31 +29,26 @@ void *work_memset(void *to, int byte, size_t bytes);
 int work_memcmp(const void *a, const void *b, size_t bytes);
 
 /* NOLINTNEXTLINE(bugprone-reserved-identifier) */
-void __sanitizer_cov_trace_pc(void)
-{
+void __sanitizer_cov_trace_pc(void) {
     work_blocks++;
 }
 
-void *work_memcpy(void *to, const void *from, size_t bytes)
-{
+void *work_memcpy(void *to, const void *from, size_t bytes) {
     work_blocks += bytes / WORK_BYTES;
     return memcpy(to, from, bytes);
 }
 
-void *work_memmove(void *to, const void *from, size_t bytes)
-{
+void *work_memmove(void *to, const void *from, size_t bytes) {
     work_blocks += bytes / WORK_BYTES;
     return memmove(to, from, bytes);
 }
 
-void *work_memset(void *to, int byte, size_t bytes)
-{
+void *work_memset(void *to, int byte, size_t bytes) {
     work_blocks += bytes / WORK_BYTES;
     return memset(to, byte, bytes);
 }
 
-int work_memcmp(const void *a, const void *b, size_t bytes)
-{
+int work_memcmp(const void *a, const void *b, size_t bytes) {
     work_blocks += bytes / WORK_BYTES;
     return memcmp(a, b, bytes);
 }

@@ -37,15 +37,13 @@ struct echo {
 static bool echo_is_worn;
 
 static size_t echo_arena_min(size_t memory,
-                             const struct node_setup_message *setup)
-{
+                             const struct node_setup_message *setup) {
     return memory / 1024 + setup->credits;
 }
 
 static bool echo_start(void *self, size_t bytes,
                        const struct node_setup_message *setup,
-                       struct node_counted *counted, struct node_fault *fault)
-{
+                       struct node_counted *counted, struct node_fault *fault) {
     struct echo *e = self;
     memset(self, 0, bytes);
     e->counted = counted;
@@ -57,8 +55,7 @@ static bool echo_start(void *self, size_t bytes,
 }
 
 static void echo_message(void *self, const struct cube_message *message,
-                         uint64_t now_us)
-{
+                         uint64_t now_us) {
     struct echo *e = self;
     struct node_job_message job;
     (void)now_us;
@@ -75,8 +72,7 @@ static void echo_message(void *self, const struct cube_message *message,
     }
 }
 
-static unsigned echo_work(void *self, struct node_pace *pace)
-{
+static unsigned echo_work(void *self, struct node_pace *pace) {
     struct echo *e = self;
     (void)pace;
     if (e->epoch == ECHO_FAILS) {
@@ -89,8 +85,7 @@ static unsigned echo_work(void *self, struct node_pace *pace)
     return e->epoch != 0 && e->worked < 3 ? ++e->worked : 0;
 }
 
-static unsigned echo_send(void *self)
-{
+static unsigned echo_send(void *self) {
     struct echo *e = self;
     if (e->size == 0 || node_counted_write(e->counted, CUBE_HOST, ECHO_ANSWERS,
                                            e->text, e->size) != 0) {
@@ -100,43 +95,37 @@ static unsigned echo_send(void *self)
     return 1;
 }
 
-static uint32_t echo_done(const void *self)
-{
+static uint32_t echo_done(const void *self) {
     const struct echo *e = self;
     return e->worked == 3 && e->epoch != ECHO_FAILS ? e->epoch : 0;
 }
 
-static void echo_end(void *self, uint64_t now_us)
-{
+static void echo_end(void *self, uint64_t now_us) {
     struct echo *e = self;
     e->epoch = e->worked = 0;
     e->ended_us = now_us;
 }
 
 /* The epoch of its job, as if it were a page. */
-static uint32_t echo_awaited(const void *self)
-{
+static uint32_t echo_awaited(const void *self) {
     const struct echo *e = self;
     return e->epoch == 0 ? INCODE_NONE : e->epoch;
 }
 
-static uint32_t echo_held(const void *self)
-{
+static uint32_t echo_held(const void *self) {
     const struct echo *e = self;
     return e->size > 0;
 }
 
 static void echo_totals(const void *self, struct node_finished_message *totals,
-                        uint64_t now_us)
-{
+                        uint64_t now_us) {
     const struct echo *e = self;
     assert_true(now_us >= e->ended_us);
     totals->pages_held = e->heard;
     totals->memory_high_water = sizeof *e;
 }
 
-static void echo_map(const void *self, struct node_map *map)
-{
+static void echo_map(const void *self, struct node_map *map) {
     (void)self;
     map->tables[0].bytes = ECHO_TABLE;
     map->tables[0].count = 1;

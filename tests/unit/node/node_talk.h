@@ -51,35 +51,30 @@ static struct {
 
 static const uint8_t *talk_next, *talk_end_of;
 
-static inline uint8_t talk_byte(void)
-{
+static inline uint8_t talk_byte(void) {
     return talk_next < talk_end_of ? *talk_next++ : 0;
 }
 
-static inline void talk_demand(bool condition)
-{
+static inline void talk_demand(bool condition) {
     if (!condition) {
         abort();
     }
 }
 
-static inline uint64_t talk_now_us(void *context)
-{
+static inline uint64_t talk_now_us(void *context) {
     (void)context;
     return talk.now_us;
 }
 
 /* ---- the points ---- */
 
-static inline double talk_coordinate(uint32_t vertex, unsigned d)
-{
+static inline double talk_coordinate(uint32_t vertex, unsigned d) {
     unsigned at[3] = {vertex % TALK_SIDE, vertex / TALK_SIDE % TALK_SIDE,
                       vertex / (TALK_SIDE * TALK_SIDE)};
     return at[d] + 0.01 * ((vertex * 7919u + d * 104729u) % 89u) / 89;
 }
 
-static inline uint32_t talk_points_of(uint32_t brick)
-{
+static inline uint32_t talk_points_of(uint32_t brick) {
     uint32_t first = brick * INCODE_BRICK_POINTS;
     return TALK_POINTS - first < INCODE_BRICK_POINTS ? TALK_POINTS - first
                                                      : INCODE_BRICK_POINTS;
@@ -87,8 +82,7 @@ static inline uint32_t talk_points_of(uint32_t brick)
 
 /* Of vertices [first, last). */
 static inline void talk_box(double lo[3], double hi[3], uint32_t first,
-                            uint32_t last)
-{
+                            uint32_t last) {
     for (unsigned d = 0; d < 3; d++) {
         lo[d] = __builtin_inf();
         hi[d] = -lo[d];
@@ -101,8 +95,7 @@ static inline void talk_box(double lo[3], double hi[3], uint32_t first,
 }
 
 /* Bytes of the page: two bricks, and their boxes. */
-static inline size_t talk_page(uint32_t page, uint8_t *bytes)
-{
+static inline size_t talk_page(uint32_t page, uint8_t *bytes) {
     struct incode_boxes boxes;
     if (page < TALK_BRICKS) {
         uint32_t count = talk_points_of(page);
@@ -127,8 +120,7 @@ static inline size_t talk_page(uint32_t page, uint8_t *bytes)
 
 /* ---- who talks ---- */
 
-static inline struct talk_end talk_open(uint16_t self, unsigned place)
-{
+static inline struct talk_end talk_open(uint16_t self, unsigned place) {
     struct cube_config config;
     struct talk_end end;
     memset(&config, 0, sizeof config);
@@ -148,8 +140,7 @@ static inline struct talk_end talk_open(uint16_t self, unsigned place)
     return end;
 }
 
-static inline void talk_begin(void)
-{
+static inline void talk_begin(void) {
     const struct host_sim_cube_options options = {
         .dimension = 1,
         .wire = {.latency_us = 10, .room = 60000, .bytes = 1 << 17}};
@@ -175,8 +166,7 @@ static inline void talk_begin(void)
     talk_demand(talk.node != NULL);
 }
 
-static inline void talk_end_all(void)
-{
+static inline void talk_end_all(void) {
     free(talk.board.arena);
     free(talk.end[0].memory);
     free(talk.end[1].memory);
@@ -185,8 +175,7 @@ static inline void talk_end_all(void)
 
 /* ---- what the node says ---- */
 
-static inline void talk_take_result(const struct cube_message *m)
-{
+static inline void talk_take_result(const struct cube_message *m) {
     struct node_result_reader reader;
     enum node_result_event event;
     uint32_t rows[64][4];
@@ -211,8 +200,7 @@ static inline void talk_take_result(const struct cube_message *m)
     } while (event == NODE_RESULT_ROWS || event == NODE_RESULT_COMMIT);
 }
 
-static inline void talk_hear(const struct cube_message *m)
-{
+static inline void talk_hear(const struct cube_message *m) {
     struct node_spill_header header;
     switch (m->type) {
     case NODE_PAGE_REQUEST:
@@ -236,8 +224,7 @@ static inline void talk_hear(const struct cube_message *m)
 }
 
 /* False: the node has stopped, as it was told. */
-static inline bool talk_step(void)
-{
+static inline bool talk_step(void) {
     struct cube_message message;
     talk.now_us += 40;
     bool goes_on = node_step(talk.node) != NODE_STOPPED;
@@ -252,8 +239,7 @@ static inline bool talk_step(void)
 }
 
 static inline bool talk_say(unsigned who, uint8_t type, const void *data,
-                            size_t size)
-{
+                            size_t size) {
     for (unsigned i = 0; i < 20000; i++) {
         if (cube_write(talk.end[who].cube, TALK_SELF, type, data, size) == 0) {
             return true;
@@ -267,8 +253,7 @@ static inline bool talk_say(unsigned who, uint8_t type, const void *data,
 
 /* ---- right messages ---- */
 
-static inline struct node_setup_message talk_setup(uint8_t role)
-{
+static inline struct node_setup_message talk_setup(uint8_t role) {
     struct node_setup_message setup;
     memset(&setup, 0, sizeof setup);
     setup.protocol = NODE_PROTOCOL;
@@ -283,8 +268,7 @@ static inline struct node_setup_message talk_setup(uint8_t role)
     return setup;
 }
 
-static inline struct node_job_message talk_job(void)
-{
+static inline struct node_job_message talk_job(void) {
     struct node_job_message job;
     memset(&job, 0, sizeof job);
     job.epoch = 1;
@@ -294,16 +278,14 @@ static inline struct node_job_message talk_job(void)
 }
 
 /* The tag of a page of so many bytes, as the host makes it. */
-static inline void talk_seal(uint8_t *data, size_t size)
-{
+static inline void talk_seal(uint8_t *data, size_t size) {
     struct node_page_message page;
     memcpy(&page, data, size);
     (void)node_page_seal(&page, TALK_KEY, size - sizeof page.head);
     memcpy(data, &page.head, sizeof page.head);
 }
 
-static inline size_t talk_compose_page(uint32_t page, uint8_t *data)
-{
+static inline size_t talk_compose_page(uint32_t page, uint8_t *data) {
     const struct node_page_head head = {.page = page};
     memcpy(data, &head, sizeof head);
     size_t size = sizeof head + talk_page(page, data + sizeof head);
@@ -312,8 +294,7 @@ static inline size_t talk_compose_page(uint32_t page, uint8_t *data)
 }
 
 /* A message of that type as it may rightly be; its bytes. */
-static inline size_t talk_compose(uint8_t type, uint8_t *data)
-{
+static inline size_t talk_compose(uint8_t type, uint8_t *data) {
     struct node_setup_message setup = talk_setup(NODE_WORKER);
     struct node_job_message job = talk_job();
     struct node_spill_header header = {1, talk.unspill, 2, 1, 0};
@@ -376,8 +357,7 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data)
 }
 
 /* Other values in places, or another size. */
-static inline size_t talk_mutate(uint8_t *data, size_t size)
-{
+static inline size_t talk_mutate(uint8_t *data, size_t size) {
     static const double odd[] = {
         0,    -0.0,  1e308, -1e308,          5e-324,
         -1.0, 1e300, 2.5,   __builtin_inf(), __builtin_nan("")};
@@ -401,8 +381,7 @@ static inline size_t talk_mutate(uint8_t *data, size_t size)
 /* ---- a talk ---- */
 
 /* Nothing but the right result counts from now on: page for page. */
-static inline void talk_expect_right(void)
-{
+static inline void talk_expect_right(void) {
     struct node_setup_message setup = talk_setup(NODE_WORKER);
     struct node_job_message job = talk_job();
     struct cube_wiring next = *cube_wiring(talk.end[1].cube);
@@ -429,8 +408,7 @@ static inline void talk_expect_right(void)
 }
 
 /* The node without any talk. */
-static inline void talk_learn_expected(void)
-{
+static inline void talk_learn_expected(void) {
     static uint64_t expected;
     if (expected == 0) {
         talk_begin();
@@ -443,15 +421,13 @@ static inline void talk_learn_expected(void)
 }
 
 /* Until the node has taken what was said, and answered, if it does. */
-static inline void talk_listen(void)
-{
+static inline void talk_listen(void) {
     for (unsigned k = 0; k < TALK_STEPS; k++) {
         talk_demand(talk_step());
     }
 }
 
-static inline void talk_run(const uint8_t *bytes, size_t size)
-{
+static inline void talk_run(const uint8_t *bytes, size_t size) {
     static const uint8_t types[] = {
         NODE_SETUP,   NODE_JOB,     NODE_PAGE,         NODE_PAGE,  NODE_CREDIT,
         NODE_UNSPILL, NODE_REPORT,  NODE_PAGE_REQUEST, NODE_PING,  NODE_READY,

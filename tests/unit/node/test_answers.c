@@ -20,8 +20,7 @@ static struct {
 static unsigned heard_count;
 
 /* Steps, and what comes to that end meanwhile; false: the node has stopped. */
-static bool steps(unsigned end, unsigned count)
-{
+static bool steps(unsigned end, unsigned count) {
     struct cube_message message;
     heard_count = 0;
     for (unsigned i = 0; i < count; i++) {
@@ -45,25 +44,21 @@ static bool steps(unsigned end, unsigned count)
     return true;
 }
 
-static void say(unsigned who, uint8_t type, const void *data, size_t size)
-{
+static void say(unsigned who, uint8_t type, const void *data, size_t size) {
     assert_true(talk_say(who, type, data, size));
 }
 
-static void begin(void)
-{
+static void begin(void) {
     talk_begin();
     assert_true(steps(1, 300));
 }
 
-static void ask(uint32_t tag, uint32_t what)
-{
+static void ask(uint32_t tag, uint32_t what) {
     const struct node_question_message question = {tag, what, 0};
     say(1, NODE_QUESTION, &question, sizeof question);
 }
 
-static void answers_are_counted(void **state)
-{
+static void answers_are_counted(void **state) {
     const struct node_ping_message ping = {3};
     struct node_answer_head head;
     struct node_pong_message pong;
@@ -102,8 +97,7 @@ static void answers_are_counted(void **state)
 }
 
 /* More than fit are dropped, and the node goes on. */
-static void questions_without_end(void **state)
-{
+static void questions_without_end(void **state) {
     (void)state;
     begin();
     for (uint32_t i = 0; i < 100; i++) {
@@ -120,8 +114,7 @@ static void questions_without_end(void **state)
     talk_end_all();
 }
 
-static void echoes_come_back(void **state)
-{
+static void echoes_come_back(void **state) {
     const struct node_echo_message echo = {1234};
     struct node_echo_message back;
     (void)state;
@@ -139,8 +132,7 @@ static void echoes_come_back(void **state)
     talk_end_all();
 }
 
-static void what_is_for_loaders_is_passed_over(void **state)
-{
+static void what_is_for_loaders_is_passed_over(void **state) {
     static const uint8_t nothing[300];
     (void)state;
     begin();
@@ -152,8 +144,7 @@ static void what_is_for_loaders_is_passed_over(void **state)
     talk_end_all();
 }
 
-static void an_order_to_restart(void **state)
-{
+static void an_order_to_restart(void **state) {
     const struct node_restart_message stay = {NODE_RESTART_STAY},
                                       plain = {NODE_RESTART_PLAIN},
                                       none = {.what = 77};
@@ -173,8 +164,7 @@ static void an_order_to_restart(void **state)
     talk_end_all();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(answers_are_counted),
         cmocka_unit_test(questions_without_end),

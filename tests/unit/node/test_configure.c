@@ -8,8 +8,7 @@
 
 #include "node/configure.h"
 
-static void test_windows(void **unused)
-{
+static void test_windows(void **unused) {
     (void)unused;
     struct node_identity id = {.epoch = 1};
     struct cube_config config = node_configure(&id, 4u << 20);
@@ -25,8 +24,7 @@ static void test_windows(void **unused)
     assert_int_equal(config.host_window, 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_windows),
     };

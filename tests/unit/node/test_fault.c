@@ -11,8 +11,7 @@
 #include "node/message.h"
 
 /* A text that is too long is cut, and the first fault stays. */
-static void fault_texts(void **unused)
-{
+static void fault_texts(void **unused) {
     static struct node_fault fault;
     char words[NODE_FAULT_TEXT_MAX + 11];
     (void)unused;
@@ -31,8 +30,7 @@ static void fault_texts(void **unused)
     assert_string_equal(fault.text + NODE_FAULT_TEXT_MAX - 3, "x12");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(fault_texts)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,8 +26,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     if (cube->room == 0) {
         return CUBE_AGAIN;
     }
@@ -43,8 +42,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     return 0;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     (void)dest;
     return cube->room;
 }
@@ -60,8 +58,7 @@ static struct {
 
 static const struct node_role *const role = &node_holder_role;
 
-static void begin(size_t bytes)
-{
+static void begin(size_t bytes) {
     const struct node_setup_message setup = {
         .nodes = 2,
         .holders = 1,
@@ -75,22 +72,19 @@ static void begin(size_t bytes)
         role->start(world.arena, bytes, &setup, &world.counted, &world.fault));
 }
 
-static void say(uint16_t source, uint8_t type, const void *data, size_t size)
-{
+static void say(uint16_t source, uint8_t type, const void *data, size_t size) {
     const struct cube_message message = {
         .source = source, .type = type, .data = data, .size = (uint16_t)size};
     role->message(world.arena, &message, 0);
     assert_false(node_fault_is_set(&world.fault));
 }
 
-static void asks(uint16_t source, uint32_t page)
-{
+static void asks(uint16_t source, uint32_t page) {
     say(source, NODE_PAGE_REQUEST, &page, sizeof page);
 }
 
 /* A point, whose first coordinate is about a half. */
-static void page_of(uint16_t source, uint32_t page, bool altered)
-{
+static void page_of(uint16_t source, uint32_t page, bool altered) {
     const uint32_t data[6] = {~page, 0x3fe00000};
     struct node_page_message body = {.head.page = page};
     memcpy(body.data, data, sizeof data);
@@ -99,14 +93,12 @@ static void page_of(uint16_t source, uint32_t page, bool altered)
     say(source, NODE_PAGE, &body, size);
 }
 
-static void page_comes(uint32_t page)
-{
+static void page_comes(uint32_t page) {
     page_of(CUBE_HOST, page, false);
 }
 
 /* What leaves where there is room for so many messages: their number. */
-static unsigned sends(unsigned room)
-{
+static unsigned sends(unsigned room) {
     world.cube.room = room;
     world.cube.count = 0;
     unsigned sent = role->send(world.arena);
@@ -114,8 +106,7 @@ static unsigned sends(unsigned room)
     return sent;
 }
 
-static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t page)
-{
+static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t page) {
     assert_true(i < world.cube.count);
     assert_int_equal(world.cube.sent[i].dest, dest);
     assert_int_equal(world.cube.sent[i].type, type);
@@ -125,8 +116,7 @@ static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t page)
     }
 }
 
-static struct node_finished_message totals(void)
-{
+static struct node_finished_message totals(void) {
     struct node_finished_message sum;
     memset(&sum, 0, sizeof sum);
     role->totals(world.arena, &sum, 0);
@@ -134,8 +124,7 @@ static struct node_finished_message totals(void)
 }
 
 /* Each gets what it has asked for, of the host once. */
-static void two_sources(void **unused)
-{
+static void two_sources(void **unused) {
     (void)unused;
     begin(ARENA);
     asks(0, 4);
@@ -163,8 +152,7 @@ static void two_sources(void **unused)
 
 /* A page that goes out takes the room of a request: what the request was to
  * displace stays there, and nothing is counted until it leaves. */
-static void no_room_for_a_request(void **unused)
-{
+static void no_room_for_a_request(void **unused) {
     const struct node_setup_message setup = {.nodes = 2, .holders = 1};
     struct node_map map;
     (void)unused;
@@ -201,8 +189,7 @@ static void no_room_for_a_request(void **unused)
 
 /* One that came altered is asked for again, and reported; so is a node that
  * sends one: only the host has any for a holder. */
-static void wrong_pages(void **unused)
-{
+static void wrong_pages(void **unused) {
     (void)unused;
     begin(ARENA);
     asks(0, 4);
@@ -225,8 +212,7 @@ static void wrong_pages(void **unused)
     assert_int_equal(role->held(world.arena), 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_sources),
         cmocka_unit_test(no_room_for_a_request),

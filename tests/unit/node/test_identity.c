@@ -15,8 +15,7 @@
 static uint32_t next; /* what the generator gives */
 static unsigned draws;
 
-static bool generate(void *context, uint8_t *bytes, size_t size)
-{
+static bool generate(void *context, uint8_t *bytes, size_t size) {
     (void)context;
     memset(bytes, 0, size);
     memcpy(bytes, &next, size < sizeof next ? size : sizeof next);
@@ -25,15 +24,13 @@ static bool generate(void *context, uint8_t *bytes, size_t size)
     return true;
 }
 
-static bool fail_to(void *context, uint8_t *bytes, size_t size)
-{
+static bool fail_to(void *context, uint8_t *bytes, size_t size) {
     (void)context;
     memset(bytes, 0, size);
     return false;
 }
 
-static void epochs(void **unused)
-{
+static void epochs(void **unused) {
     struct node_identity id = {.self = 3};
     struct secure_source none = {.boot = 0}, counts = {.boot = 1},
                          random = {.random = generate};
@@ -60,15 +57,13 @@ static void epochs(void **unused)
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): a pipe's signature */
-static int deaf(void *context, uint8_t *bytes, size_t size)
-{
+static int deaf(void *context, uint8_t *bytes, size_t size) {
     (void)context, (void)bytes, (void)size;
     return 0;
 }
 
 /* Node 1 of two hears node 0, whose wire may be in the wrong link first. */
-static void a_neighbour_says_it(void **unused)
-{
+static void a_neighbour_says_it(void **unused) {
     uint64_t now_us = 0;
     struct host_sim_cube wires;
     const struct host_sim_cube_options options = {
@@ -136,8 +131,7 @@ static void a_neighbour_says_it(void **unused)
     host_sim_cube_close(&wires);
 }
 
-static void an_epoch_follows_what_neighbours_knew(void **unused)
-{
+static void an_epoch_follows_what_neighbours_knew(void **unused) {
     struct learner learner = {.known = {.epoch = 0}};
     struct node_identity id = {.epoch = 0};
     (void)unused;
@@ -151,8 +145,7 @@ static void an_epoch_follows_what_neighbours_knew(void **unused)
     assert_int_equal(id.epoch, 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(epochs),
         cmocka_unit_test(a_neighbour_says_it),

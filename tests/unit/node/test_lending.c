@@ -32,8 +32,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     if (cube->room == 0) {
         return CUBE_AGAIN;
     }
@@ -45,8 +44,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     return 0;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     (void)dest;
     return cube->room;
 }
@@ -64,23 +62,21 @@ static struct {
     bool unsound;
 } had;
 
-bool incode_triangulator_has(const struct incode_triangulator *t, uint32_t page)
-{
+bool incode_triangulator_has(const struct incode_triangulator *t,
+                             uint32_t page) {
     (void)t;
     return had.place[page] == READY;
 }
 
 size_t incode_triangulator_copy(const struct incode_triangulator *t,
-                                uint32_t page, void *data)
-{
+                                uint32_t page, void *data) {
     (void)t;
     assert_int_equal(had.place[page], READY);
     memset(data, (int)page, 24);
     return 24;
 }
 
-bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
-{
+bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page) {
     (void)t;
     assert_int_not_equal(had.place[page], READY);
     if (had.place[page] == ABSENT && !had.full) {
@@ -91,15 +87,13 @@ bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page)
 }
 
 uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
-                                    uint32_t page)
-{
+                                    uint32_t page) {
     (void)t;
     return had.place[page] == ABSENT ? NULL : &had.label[page];
 }
 
 int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
-                            const void *data, size_t bytes)
-{
+                            const void *data, size_t bytes) {
     (void)t, (void)data;
     assert_int_equal(bytes, 24);
     had.put = page;
@@ -121,8 +115,7 @@ static struct {
     struct incode_page_source source;
 } world;
 
-static void begin(void)
-{
+static void begin(void) {
     const struct node_setup_message setup = {
         .nodes = NODES,
         .page_key = PAGE_KEY,
@@ -152,8 +145,7 @@ static void begin(void)
                                     sizeof regions));
 }
 
-static void asks(uint16_t source, uint32_t page)
-{
+static void asks(uint16_t source, uint32_t page) {
     const struct cube_message message = {.source = source,
                                          .type = NODE_PAGE_REQUEST,
                                          .data = (const uint8_t *)&page,
@@ -161,8 +153,7 @@ static void asks(uint16_t source, uint32_t page)
     node_lending_take(&world.lending, &message);
 }
 
-static unsigned sends(unsigned room)
-{
+static unsigned sends(unsigned room) {
     world.cube.room = room;
     world.cube.count = 0;
     unsigned sent = node_lending_send(&world.lending, NULL);
@@ -171,8 +162,7 @@ static unsigned sends(unsigned room)
 }
 
 static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t first,
-                   uint32_t second)
-{
+                   uint32_t second) {
     assert_true(i < world.cube.count);
     assert_int_equal(world.cube.sent[i].dest, dest);
     assert_int_equal(world.cube.sent[i].type, type);
@@ -181,8 +171,7 @@ static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t first,
 }
 
 /* With the tag that it came with, and its bytes. */
-static void expect_page(unsigned i, uint16_t dest, uint32_t page)
-{
+static void expect_page(unsigned i, uint16_t dest, uint32_t page) {
     expect(i, dest, NODE_PAGE, page, (uint32_t)had.label[page]);
     assert_int_equal(world.cube.sent[i].word[2],
                      (uint32_t)(had.label[page] >> 32));
@@ -191,8 +180,7 @@ static void expect_page(unsigned i, uint16_t dest, uint32_t page)
 
 /* Bricks of who has them, boxes of who has the first brick below: of 40 bricks
  * there are two pages at 40, and the root at 42. */
-static void keepers(void **unused)
-{
+static void keepers(void **unused) {
     static const uint32_t page[] = {0, 9, 10, 19, 20, 39, 40, 41, 42};
     static const uint16_t keeper[] = {0, 0, CUBE_HOST, CUBE_HOST, 2,
                                       3, 0, 3,         0};
@@ -205,8 +193,7 @@ static void keepers(void **unused)
 }
 
 /* A page that is there goes to who asks, as links have room. */
-static void lent(void **unused)
-{
+static void lent(void **unused) {
     (void)unused;
     begin();
     had.place[12] = had.place[13] = READY;
@@ -227,8 +214,7 @@ static void lent(void **unused)
 }
 
 /* One that the node has not had yet it gets itself, and it waits. */
-static void not_there_yet(void **unused)
-{
+static void not_there_yet(void **unused) {
     (void)unused;
     begin();
     had.place[14] = LOADING;
@@ -248,8 +234,7 @@ static void not_there_yet(void **unused)
 }
 
 /* One that it has given up it leaves to the host, once. */
-static void given_up(void **unused)
-{
+static void given_up(void **unused) {
     (void)unused;
     begin();
     had.full = true;
@@ -265,8 +250,7 @@ static void given_up(void **unused)
     assert_int_equal(had.fetched, 0);
 }
 
-static void refused(uint16_t source, uint32_t page, const char *why)
-{
+static void refused(uint16_t source, uint32_t page, const char *why) {
     asks(source, page);
     assert_int_equal(world.fault.size, strlen(why));
     assert_memory_equal(world.fault.text, why, world.fault.size);
@@ -274,8 +258,7 @@ static void refused(uint16_t source, uint32_t page, const char *why)
 }
 
 /* What no sound node asks for. */
-static void wrong_requests(void **unused)
-{
+static void wrong_requests(void **unused) {
     (void)unused;
     begin();
     refused(2, 9, "request for page 9, which node 1 has not");
@@ -289,8 +272,7 @@ static void wrong_requests(void **unused)
     refused(2, 12, "more than 24 pages requested at a time");
 }
 
-static unsigned sends_requests(unsigned room)
-{
+static unsigned sends_requests(unsigned room) {
     world.cube.room = room;
     world.cube.count = 0;
     (void)node_requests_send(&world.requests);
@@ -300,8 +282,7 @@ static unsigned sends_requests(unsigned room)
 /* A page comes of that node, `altered` or as the host made it; whether it is to
  * be used, and if not, which is to be asked for again. */
 static bool sent_by(uint16_t source, uint32_t page, bool altered,
-                    struct node_page *p)
-{
+                    struct node_page *p) {
     struct node_page_message body = {.head.page = page};
     size_t size = node_page_seal(&body, PAGE_KEY, 24);
     body.data[7] ^= altered;
@@ -312,8 +293,7 @@ static bool sent_by(uint16_t source, uint32_t page, bool altered,
     return node_requests_take(&world.requests, &message, p);
 }
 
-static void comes(uint16_t source, uint32_t page)
-{
+static void comes(uint16_t source, uint32_t page) {
     struct node_page p;
     assert_true(sent_by(source, page, false, &p));
     assert_int_equal(p.number, page);
@@ -322,8 +302,7 @@ static void comes(uint16_t source, uint32_t page)
 
 /* A node is asked for so many at a time, and others meanwhile; whoever sends a
  * page makes room for another. */
-static void asked_for(void **unused)
-{
+static void asked_for(void **unused) {
     (void)unused;
     begin();
     for (uint32_t page = 0; page < 10; page++) {
@@ -357,16 +336,14 @@ static void asked_for(void **unused)
     assert_false(node_fault_is_set(&world.fault));
 }
 
-static void expect_report(unsigned i, uint16_t sender, uint32_t page)
-{
+static void expect_report(unsigned i, uint16_t sender, uint32_t page) {
     expect(i, CUBE_HOST, NODE_WRONG_PAGE, page, sender);
     assert_int_equal(world.cube.sent[i].size, 8);
 }
 
 /* A page that its keeper has altered is asked of the host; the keeper is named,
  * and others go on as they were. */
-static void altered(void **unused)
-{
+static void altered(void **unused) {
     struct node_page p;
     (void)unused;
     begin();
@@ -399,8 +376,7 @@ static void altered(void **unused)
 
 /* A node sends what nobody has asked it for: it is named, nothing is used, and
  * nothing is asked for again. */
-static void not_its_to_send(void **unused)
-{
+static void not_its_to_send(void **unused) {
     struct node_page p;
     (void)unused;
     begin();
@@ -425,8 +401,7 @@ static void not_its_to_send(void **unused)
     assert_false(node_fault_is_set(&world.fault));
 }
 
-static uint32_t all_get_altered(uint32_t page, bool altered)
-{
+static uint32_t all_get_altered(uint32_t page, bool altered) {
     struct node_page_message body = {.head.page = page};
     size_t size = node_page_seal(&body, PAGE_KEY, 24);
     body.data[7] ^= altered;
@@ -438,15 +413,13 @@ static uint32_t all_get_altered(uint32_t page, bool altered)
                                     &message);
 }
 
-static void all_get(uint32_t page)
-{
+static void all_get(uint32_t page) {
     assert_int_equal(all_get_altered(page, false), INCODE_NONE);
 }
 
 /* One that comes to all, and came altered, is asked of the host by who waits
  * for it. */
-static void to_all_altered(void **unused)
-{
+static void to_all_altered(void **unused) {
     (void)unused;
     begin();
     node_lending_to_all(&world.lending, 41);
@@ -466,8 +439,7 @@ static void to_all_altered(void **unused)
 }
 
 /* What is to come to all is asked of nobody until it has passed. */
-static void to_all(void **unused)
-{
+static void to_all(void **unused) {
     (void)unused;
     begin();
     node_lending_to_all(&world.lending, 38);
@@ -505,8 +477,7 @@ static void to_all(void **unused)
     assert_true(node_fault_is_set(&world.fault));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(keepers),         cmocka_unit_test(lent),
         cmocka_unit_test(not_there_yet),   cmocka_unit_test(given_up),

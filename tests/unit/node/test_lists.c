@@ -27,8 +27,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     if (cube->room == 0) {
         return CUBE_AGAIN;
     }
@@ -41,8 +40,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     return 0;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     (void)dest;
     return cube->room;
 }
@@ -59,14 +57,12 @@ static struct {
     uint64_t now_us;
 } world;
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return world.now_us++;
 }
 
-static struct node_setup_message setup_of(uint8_t role)
-{
+static struct node_setup_message setup_of(uint8_t role) {
     struct node_setup_message setup = {
         .protocol = NODE_PROTOCOL,
         .nodes = NODES,
@@ -84,8 +80,7 @@ static struct node_setup_message setup_of(uint8_t role)
     return setup;
 }
 
-static bool start(const struct node_setup_message *setup)
-{
+static bool start(const struct node_setup_message *setup) {
     memset(&world, 0, sizeof world);
     world.counted.cube = &world.cube;
     world.counted.self = SELF;
@@ -96,24 +91,21 @@ static bool start(const struct node_setup_message *setup)
                              &world.fault);
 }
 
-static void begin(uint8_t role)
-{
+static void begin(uint8_t role) {
     const struct node_setup_message setup = setup_of(role);
     assert_true(start(&setup));
     assert_false(node_fault_is_set(&world.fault));
     assert_int_equal(world.role->held(world.arena), 0);
 }
 
-static void say(uint16_t source, uint8_t type, const void *data, size_t size)
-{
+static void say(uint16_t source, uint8_t type, const void *data, size_t size) {
     const struct cube_message message = {
         .source = source, .type = type, .data = data, .size = (uint16_t)size};
     world.role->message(world.arena, &message, world.now_us);
 }
 
 /* Works, where links take so many messages: how many leave. */
-static unsigned works(unsigned room)
-{
+static unsigned works(unsigned room) {
     world.cube.room = room;
     world.cube.count = 0;
     node_pace_begin(&world.pace, now_us(NULL));
@@ -122,14 +114,12 @@ static unsigned works(unsigned room)
     return world.cube.count;
 }
 
-static void expect_fault(const char *text)
-{
+static void expect_fault(const char *text) {
     assert_int_equal(world.fault.size, strlen(text));
     assert_memory_equal(world.fault.text, text, world.fault.size);
 }
 
-static void job(uint32_t last)
-{
+static void job(uint32_t last) {
     const struct node_job_message message = {.epoch = 1, .job = {.last = last}};
     say(CUBE_HOST, NODE_JOB, &message, sizeof message);
 }
@@ -138,8 +128,7 @@ static void job(uint32_t last)
 
 /* Bricks are counted before anything else, by one builder after the other, up
  * to the places for their answers. */
-static void lists_go_round(void **unused)
-{
+static void lists_go_round(void **unused) {
     (void)unused;
     begin(NODE_MANAGER);
     assert_int_equal(world.role->owing(world.arena), CUBE_HOST);
@@ -160,8 +149,7 @@ static void lists_go_round(void **unused)
 }
 
 /* Answers come of builders that owe some, once. */
-static void answers_that_are_not_due(void **unused)
-{
+static void answers_that_are_not_due(void **unused) {
     struct incode_answers answers = {INCODE_LIST_COUNT, 0, 1, {{0, 64, 0, 0}}};
     size_t size = incode_answers_bytes(1);
     (void)unused;
@@ -192,8 +180,7 @@ static void answers_that_are_not_due(void **unused)
 }
 
 /* A builder asks for pages, and has room for as many lists as it was told. */
-static void lists_that_are_too_many(void **unused)
-{
+static void lists_that_are_too_many(void **unused) {
     const struct incode_list list = {INCODE_LIST_FACES, 1, {{1, 2, 3}}};
     size_t size = incode_list_bytes(1);
     (void)unused;
@@ -215,8 +202,7 @@ static void lists_that_are_too_many(void **unused)
 }
 
 /* The tables of a role, and what they count, fill its arena. */
-static void maps(void **unused)
-{
+static void maps(void **unused) {
     (void)unused;
     static const uint8_t roles[] = {NODE_MANAGER, NODE_BUILDER};
     for (unsigned i = 0; i < 2; i++) {
@@ -240,14 +226,12 @@ static void maps(void **unused)
 
 /* --- faults --------------------------------------------------------------- */
 
-static void refuses(const struct node_setup_message *setup, const char *text)
-{
+static void refuses(const struct node_setup_message *setup, const char *text) {
     assert_false(start(setup));
     expect_fault(text);
 }
 
-static void invalid_setups(void **unused)
-{
+static void invalid_setups(void **unused) {
     struct node_setup_message manager = setup_of(NODE_MANAGER);
     struct node_setup_message builder = setup_of(NODE_BUILDER), s = manager;
     (void)unused;
@@ -280,8 +264,7 @@ static void invalid_setups(void **unused)
     refuses(&s, "invalid setup: 17 lists a builder, allowed are 1..16");
 }
 
-static void messages_of_others(void **unused)
-{
+static void messages_of_others(void **unused) {
     struct node_page_message page = {.head.page = 1};
     const size_t size = node_page_seal(&page, 0, 24);
     (void)unused;
@@ -302,8 +285,7 @@ static void messages_of_others(void **unused)
     expect_fault("message of type 5 for a builder");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lists_go_round),
         cmocka_unit_test(answers_that_are_not_due),

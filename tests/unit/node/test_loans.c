@@ -26,8 +26,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     if (cube->room == 0) {
         return CUBE_AGAIN;
     }
@@ -55,8 +54,7 @@ static struct one {
 static struct several all;
 static struct solo helper;
 
-static void begin(struct one *n, uint16_t self, struct incode_triangulator *t)
-{
+static void begin(struct one *n, uint16_t self, struct incode_triangulator *t) {
     struct node_setup_message setup = {
         .nodes = NODES, .setup = {.bricks = all.solo.order.bricks}};
     memset(n, 0, sizeof *n);
@@ -68,8 +66,7 @@ static void begin(struct one *n, uint16_t self, struct incode_triangulator *t)
     node_loans_init(&n->loans, n->memory, &setup, &n->counted, &n->fault);
 }
 
-static int open_nodes(void **unused)
-{
+static int open_nodes(void **unused) {
     (void)unused;
     struct host_points p = {0};
     struct host_error error = {0};
@@ -88,8 +85,7 @@ static int open_nodes(void **unused)
     return 0;
 }
 
-static int close_nodes(void **unused)
-{
+static int close_nodes(void **unused) {
     (void)unused;
     several_close(&all);
     solo_close(&helper);
@@ -97,16 +93,14 @@ static int close_nodes(void **unused)
 }
 
 static void say(struct one *n, uint16_t source, uint8_t type, const void *data,
-                size_t size)
-{
+                size_t size) {
     const struct cube_message message = {
         .source = source, .type = type, .data = data, .size = (uint16_t)size};
     node_loans_take(&n->loans, &message);
 }
 
 /* What one has sent to the other arrives; others hear nothing. */
-static void deliver(struct one *from, struct one *to)
-{
+static void deliver(struct one *from, struct one *to) {
     for (; from->cube.from < from->cube.count; from->cube.from++) {
         const struct sent *s = &from->cube.sent[from->cube.from];
         if (s->dest == to->counted.self)
@@ -115,15 +109,13 @@ static void deliver(struct one *from, struct one *to)
     assert_false(node_fault_is_set(&to->fault));
 }
 
-static void send_all(struct one *n)
-{
+static void send_all(struct one *n) {
     while (node_loans_send(&n->loans, n->t) > 0)
         ;
 }
 
 /* Until the lender has lent so many times. */
-static void lend(unsigned loans)
-{
+static void lend(unsigned loans) {
     struct one *l = &one[LENDER];
     for (unsigned lent = 0; lent < loans;) {
         unsigned sent = node_loans_send(&l->loans, l->t);
@@ -133,16 +125,14 @@ static void lend(unsigned loans)
     }
 }
 
-static void help(void)
-{
+static void help(void) {
     struct one *h = &one[HELPER];
     while (h->loans.at_work == NULL || !h->loans.borrower.done)
         if (!node_loans_help(&h->loans, h->t, 10))
             assert_true(solo_deliver(&helper));
 }
 
-static const struct sent *last_of(const struct one *n)
-{
+static const struct sent *last_of(const struct one *n) {
     assert_true(n->cube.count > 0);
     return &n->cube.sent[n->cube.count - 1];
 }
@@ -150,8 +140,7 @@ static const struct sent *last_of(const struct one *n)
 /* --- tests ---------------------------------------------------------------- */
 
 /* Neighbours first, each node once, as the links take it. */
-static void asks(void **unused)
-{
+static void asks(void **unused) {
     (void)unused;
     static const uint16_t order[] = {0, 3, 5, 2, 4, 7, 6};
     struct one *h = &one[HELPER];
@@ -170,8 +159,7 @@ static void asks(void **unused)
 }
 
 /* Who has work of its own asks nobody, and lends to nobody unasked. */
-static void works_by_itself(void **unused)
-{
+static void works_by_itself(void **unused) {
     (void)unused;
     struct one *l = &one[LENDER];
     for (unsigned i = 0; i < 300; i++) {
@@ -182,8 +170,7 @@ static void works_by_itself(void **unused)
 }
 
 /* There and back, again and again, until nothing is left. */
-static void there_and_back(void **unused)
-{
+static void there_and_back(void **unused) {
     (void)unused;
     struct one *l = &one[LENDER], *h = &one[HELPER];
     unsigned loans = 0;
@@ -224,8 +211,7 @@ static void there_and_back(void **unused)
 
 /* A loan for which there is no place goes back as it was, and may be asked for
  * again. */
-static void no_place(void **unused)
-{
+static void no_place(void **unused) {
     (void)unused;
     struct one *l = &one[LENDER], *h = &one[HELPER];
     send_all(h);
@@ -254,8 +240,7 @@ static void no_place(void **unused)
 }
 
 /* So many loans are out at most, each with another node. */
-static void so_many(void **unused)
-{
+static void so_many(void **unused) {
     (void)unused;
     struct one *l = &one[LENDER];
     uint32_t seen = 0;
@@ -272,16 +257,14 @@ static void so_many(void **unused)
 }
 
 static void expect_fault(uint16_t source, uint8_t type, const void *data,
-                         size_t size)
-{
+                         size_t size) {
     struct one *h = &one[HELPER];
     say(h, source, type, data, size);
     assert_true(node_fault_is_set(&h->fault));
     h->fault.size = 0;
 }
 
-static void refusals(void **unused)
-{
+static void refusals(void **unused) {
     (void)unused;
     const struct incode_loan loan = {0, 4, 1, {{70, 80, 90}}};
     struct incode_loan false_count = loan, no_run = loan;
@@ -303,8 +286,7 @@ static void refusals(void **unused)
     expect_fault(0, NODE_LOAN, &loan, incode_loan_bytes(&loan));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(asks, open_nodes, close_nodes),
         cmocka_unit_test_setup_teardown(works_by_itself, open_nodes,

@@ -23,34 +23,29 @@ static struct {
     void *memory[2];
 } world;
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     world.asked++;
     return world.now_ns / 1000;
 }
 
-static uint64_t busy_us(void *context)
-{
+static uint64_t busy_us(void *context) {
     (void)context;
     return 77;
 }
 
-static void gauges(void *context, struct node_gauges *gauges)
-{
+static void gauges(void *context, struct node_gauges *gauges) {
     (void)context;
     *gauges = (struct node_gauges){
         .stack_bytes = 49152, .stack_high_water = 40000, .overruns = 3};
 }
 
-static void pass(uint64_t ns)
-{
+static void pass(uint64_t ns) {
     world.now_ns += ns;
     world.now_us = world.now_ns / 1000;
 }
 
-static void set_up(void)
-{
+static void set_up(void) {
     const struct host_sim_cube_options options = {
         .dimension = 1,
         .wire = {.latency_us = 30, .room = 4000, .bytes = SIM_BYTES_MIN}};
@@ -79,8 +74,7 @@ static void set_up(void)
     node_looks_init(&world.looks, &world.board, world.cube[0]);
 }
 
-static void tear_down(void)
-{
+static void tear_down(void) {
     free(world.memory[0]);
     free(world.memory[1]);
     host_sim_cube_close(&world.wires);
@@ -88,8 +82,7 @@ static void tear_down(void)
 
 /* Works so many units of that length each, without a step's end, in pieces of
  * up to `most`. */
-static void work(uint32_t units, uint64_t unit_ns, uint32_t most)
-{
+static void work(uint32_t units, uint64_t unit_ns, uint32_t most) {
     struct incode_pause pause = node_looks_pause(&world.looks);
     uint64_t random = 5;
     for (uint32_t done = 0; done < units;) {
@@ -101,8 +94,7 @@ static void work(uint32_t units, uint64_t unit_ns, uint32_t most)
     }
 }
 
-static void looks_come_in_time(void **unused)
-{
+static void looks_come_in_time(void **unused) {
     /* A unit of a workstation, of an M7 and of an M3 at 25 MHz. */
     static const struct {
         uint64_t unit_ns;
@@ -132,8 +124,7 @@ static void looks_come_in_time(void **unused)
 
 /* Units that take next to nothing, and then long: the first of these is seen
  * late, the next in time. */
-static void work_that_gets_slower_is_seen(void **unused)
-{
+static void work_that_gets_slower_is_seen(void **unused) {
     (void)unused;
     set_up();
     world.looks.tends = true;
@@ -149,8 +140,7 @@ static void work_that_gets_slower_is_seen(void **unused)
 
 /* Units are not alike: seven times as long as those before are seen in time,
  * as a Cortex-M7 of 25 MHz has them. */
-static void work_that_differs_is_seen_in_time(void **unused)
-{
+static void work_that_differs_is_seen_in_time(void **unused) {
     (void)unused;
     set_up();
     world.looks.tends = true;
@@ -165,8 +155,7 @@ static void work_that_differs_is_seen_in_time(void **unused)
 }
 
 /* A window of messages, each of which takes a while. */
-static void many_messages_are_looked_between(void **unused)
-{
+static void many_messages_are_looked_between(void **unused) {
     (void)unused;
     set_up();
     world.looks.tends = true;
@@ -180,8 +169,7 @@ static void many_messages_are_looked_between(void **unused)
 }
 
 /* Nobody's clock may go on: nothing is tended then. */
-static void who_steps_in_parts_is_not_tended(void **unused)
-{
+static void who_steps_in_parts_is_not_tended(void **unused) {
     (void)unused;
     set_up();
     node_looks_poll(&world.looks, now_us(NULL));
@@ -193,8 +181,7 @@ static void who_steps_in_parts_is_not_tended(void **unused)
     tear_down();
 }
 
-static void what_is_told_of_it(void **unused)
-{
+static void what_is_told_of_it(void **unused) {
     struct node_finished_message finished;
     (void)unused;
     set_up();
@@ -220,8 +207,7 @@ static void what_is_told_of_it(void **unused)
     tear_down();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(looks_come_in_time),
         cmocka_unit_test(work_that_gets_slower_is_seen),

@@ -10,8 +10,7 @@
 #include "node/message.h"
 #include "node/outbox.h"
 
-static void test_layouts(void **unused)
-{
+static void test_layouts(void **unused) {
     (void)unused;
     assert_int_equal(offsetof(struct node_setup_message, role), 12);
     assert_int_equal(offsetof(struct node_setup_message, setup), 16);
@@ -37,8 +36,7 @@ static void test_layouts(void **unused)
     assert_int_equal(sizeof(struct node_ready_message) % 4, 0);
 }
 
-static void test_outbox(void **unused)
-{
+static void test_outbox(void **unused) {
     (void)unused;
     static struct node_outbox_slot slots[3];
     struct node_outbox box;
@@ -68,8 +66,7 @@ static void test_outbox(void **unused)
     assert_int_equal(written - read, box.used);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_layouts),
         cmocka_unit_test(test_outbox),

@@ -50,13 +50,11 @@ static struct {
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&state) >> 32) % below;
 }
 
-static void start(unsigned window, size_t memory)
-{
+static void start(unsigned window, size_t memory) {
     /* Frames are sent in pieces, and some of them arrive so. */
     const struct host_world_options options = {
         .cube = {.dimension = world.dimension,
@@ -90,8 +88,7 @@ static void start(unsigned window, size_t memory)
 
 /* ---- a plain host ---- */
 
-static void take_result(const struct cube_message *m)
-{
+static void take_result(const struct cube_message *m) {
     struct node_result_reader reader;
     struct host_error error = {0};
     enum node_result_event event;
@@ -115,8 +112,7 @@ static void take_result(const struct cube_message *m)
     } while (event != NODE_RESULT_END);
 }
 
-static void take_requests(const struct cube_message *m)
-{
+static void take_requests(const struct cube_message *m) {
     struct waiting *w = &world.waiting[m->source];
     for (uint32_t at = 0; at < m->size; at += 4) {
         assert_true(w->count < QUEUE);
@@ -124,8 +120,7 @@ static void take_requests(const struct cube_message *m)
     }
 }
 
-static void take(const struct cube_message *m)
-{
+static void take(const struct cube_message *m) {
     struct waiting *w = &world.waiting[m->source];
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     struct node_spill_header header = {0};
@@ -166,15 +161,13 @@ static void take(const struct cube_message *m)
 }
 
 /* Messages are counted: they say so themselves, where it matters. */
-static int write_to(uint16_t to, uint8_t type, const void *data, size_t size)
-{
+static int write_to(uint16_t to, uint8_t type, const void *data, size_t size) {
     int status = cube_write(world.cube, to, type, data, size);
     world.waiting[to].sent += status == 0;
     return status;
 }
 
-static void serve(uint16_t to)
-{
+static void serve(uint16_t to) {
     struct waiting *w = &world.waiting[to];
     struct host_error error = {0};
     struct {
@@ -213,8 +206,7 @@ static void serve(uint16_t to)
 }
 
 /* A while of the nodes; the host sometimes looks away. */
-static void step(void)
-{
+static void step(void) {
     struct cube_message message;
     (void)world.machine.now_us(world.machine.context);
     assert_null(world.sim.fault);
@@ -236,8 +228,7 @@ static void step(void)
     }
 }
 
-static void give_jobs(void)
-{
+static void give_jobs(void) {
     for (unsigned i = 0; i < world.workers; i++) {
         const struct host_region *region = &world.order.region[i];
         struct node_job_message job = {0};
@@ -253,8 +244,7 @@ static void give_jobs(void)
     }
 }
 
-static void stop(void)
-{
+static void stop(void) {
     while (cube_write(world.cube, CUBE_ALL, NODE_STOP, NULL, 0) != 0) {
         step();
     }
@@ -278,8 +268,7 @@ struct shape {
 
 /* Runs the cube on the points; the digest of the rows. */
 static void run(const struct host_points *points, struct shape shape,
-                struct host_digest *digest)
-{
+                struct host_digest *digest) {
     struct host_error error = {0};
     memset(&world, 0, sizeof world);
     world.dimension = shape.dimension;
@@ -336,8 +325,7 @@ static void run(const struct host_points *points, struct shape shape,
     host_order_free(&world.order);
 }
 
-static void test_cubes(void **unused)
-{
+static void test_cubes(void **unused) {
     (void)unused;
     static const struct shape shapes[] = {
         {0, 8, false, 4u << 20, 0},  {1, 8, false, 4u << 20, 0},
@@ -370,8 +358,7 @@ static void test_cubes(void **unused)
 }
 
 /* What does not fit is said, not tried. */
-static void test_small(void **unused)
-{
+static void test_small(void **unused) {
     (void)unused;
     static _Alignas(64) uint8_t arena[4096];
     struct sim_end nowhere = {NULL, NULL, NULL};
@@ -386,8 +373,7 @@ static void test_small(void **unused)
     assert_non_null(strstr(why, "memory"));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cubes),
         cmocka_unit_test(test_small),

@@ -14,8 +14,7 @@ enum { MEMORY = 1 << 20, SLOTS = MEMORY / 65536 };
 
 static _Alignas(NODE_ALIGNMENT) uint8_t memory[MEMORY];
 
-static void begin(struct node_outlet *outlet)
-{
+static void begin(struct node_outlet *outlet) {
     static struct node_setup_message setup;
     static struct node_counted counted;
     static struct node_fault fault;
@@ -26,8 +25,7 @@ static void begin(struct node_outlet *outlet)
 }
 
 /* Stars until so many batches are full. */
-static void emit(struct node_outlet *outlet, uint32_t batches)
-{
+static void emit(struct node_outlet *outlet, uint32_t batches) {
     static const uint32_t apexes[2][3] = {{1, 2, 3}, {2, 3, 4}};
     struct incode_front_outside outside = node_outlet_outside(outlet);
     for (uint32_t v = 0; outlet->results.used < batches; v += 100000) {
@@ -35,8 +33,7 @@ static void emit(struct node_outlet *outlet, uint32_t batches)
     }
 }
 
-static void test_few_wait(void **unused)
-{
+static void test_few_wait(void **unused) {
     (void)unused;
     struct node_outlet outlet;
     begin(&outlet);
@@ -48,8 +45,7 @@ static void test_few_wait(void **unused)
     assert_true(node_outlet_has_room(&outlet));
 }
 
-static void test_last_does_not(void **unused)
-{
+static void test_last_does_not(void **unused) {
     (void)unused;
     struct node_outlet outlet;
     begin(&outlet);
@@ -59,8 +55,7 @@ static void test_last_does_not(void **unused)
     assert_false(node_outlet_few(&outlet));
 }
 
-static void test_spilled_do_not(void **unused)
-{
+static void test_spilled_do_not(void **unused) {
     (void)unused;
     struct node_outlet outlet;
     const struct incode_face face = {{1, 2, 3}};
@@ -72,8 +67,7 @@ static void test_spilled_do_not(void **unused)
 
 /* As many as it has room for, of the largest records, each found by another
  * node than the one before. */
-static void test_finders_fit(void **unused)
-{
+static void test_finders_fit(void **unused) {
     (void)unused;
     enum { FAR = INT32_MAX };
     static const uint32_t vertex[2] = {0, FAR};
@@ -91,8 +85,7 @@ static void test_finders_fit(void **unused)
     assert_false(node_fault_is_set(outlet.fault));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_few_wait),
         cmocka_unit_test(test_last_does_not),

@@ -36,8 +36,7 @@ static const struct node_role *const role = &node_worker_role;
 /* --- links, in the place of transport/cube.c ------------------------------ */
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     (void)cube;
     assert_int_equal(dest, CUBE_HOST);
     if (type == NODE_PAGE_REQUEST) {
@@ -48,32 +47,28 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
     return 0;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     (void)cube, (void)dest;
     return 1;
 }
 
 /* --- the clock ------------------------------------------------------------ */
 
-static struct node_finished_message totals(void)
-{
+static struct node_finished_message totals(void) {
     struct node_finished_message sum;
     memset(&sum, 0, sizeof sum);
     role->totals(world.arena, &sum, 0);
     return sum;
 }
 
-static uint64_t now(void)
-{
+static uint64_t now(void) {
     if (world.blocks_a_us != 0)
         return work_blocks / world.blocks_a_us;
     struct incode_statistics s = totals().statistics;
     return world.tick_us * (s.candidates / 64 + s.tetrahedra_built);
 }
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     world.looks++;
     return now();
@@ -82,8 +77,7 @@ static uint64_t now_us(void *context)
 /* --- runs ----------------------------------------------------------------- */
 
 static void open_worker(enum incode_index index, enum incode_build build,
-                        unsigned count)
-{
+                        unsigned count) {
     bool grid = index == INCODE_GRID;
     struct node_setup_message setup = {.nodes = 1, .credits = 1u << 30};
     struct host_points points = {0};
@@ -118,14 +112,12 @@ static void open_worker(enum incode_index index, enum incode_build build,
     role->message(world.arena, &message, 0);
 }
 
-static void close_worker(void)
-{
+static void close_worker(void) {
     host_order_free(&world.order);
     free(world.arena);
 }
 
-static void deliver(void)
-{
+static void deliver(void) {
     struct node_page_message body;
     while (world.count > 0) {
         body.head.page = world.wanted[--world.count];
@@ -141,8 +133,7 @@ static void deliver(void)
 }
 
 /* The longest time between two looks at the links. */
-static uint64_t longest(uint64_t tick_us)
-{
+static uint64_t longest(uint64_t tick_us) {
     struct node_pace pace;
     uint64_t most = 0;
     world.tick_us = tick_us;
@@ -161,8 +152,7 @@ static uint64_t longest(uint64_t tick_us)
 }
 
 /* Where 64 points take 30 us, and where they take next to nothing. */
-static void no_index_works_for_long(void **unused)
-{
+static void no_index_works_for_long(void **unused) {
     static const struct {
         enum incode_index index;
         unsigned points;
@@ -182,8 +172,7 @@ static void no_index_works_for_long(void **unused)
 }
 
 /* Where it is quick, the clock is looked at once for many steps. */
-static void a_quick_processor_looks_seldom(void **unused)
-{
+static void a_quick_processor_looks_seldom(void **unused) {
     (void)unused;
     open_worker(INCODE_KD, INCODE_BUILD_FACES, 3000);
     (void)longest(0);
@@ -193,8 +182,7 @@ static void a_quick_processor_looks_seldom(void **unused)
 
 /* Half of the tetrahedra of 9,000 points are a hundred milliseconds' work,
  * where a microsecond is as many blocks as it is on a processor of 2.5 GHz. */
-static void points_are_inserted_a_few_at_a_time(void **unused)
-{
+static void points_are_inserted_a_few_at_a_time(void **unused) {
     (void)unused;
     open_worker(INCODE_KD, INCODE_BUILD_POINTS, 9000);
     world.blocks_a_us = 500;
@@ -215,14 +203,12 @@ struct slow {
     bool has_work;
 };
 
-static uint64_t slow_now_us(void *context)
-{
+static uint64_t slow_now_us(void *context) {
     const struct slow *slow = context;
     return slow->now_us;
 }
 
-static bool slow_step(void *context, uint32_t units, uint32_t *spent)
-{
+static bool slow_step(void *context, uint32_t units, uint32_t *spent) {
     struct slow *slow = context;
     *spent = slow->has_work ? units : 1;
     slow->now_us += slow->has_work ? units * UINT64_C(10000) : 0;
@@ -233,8 +219,7 @@ static bool slow_step(void *context, uint32_t units, uint32_t *spent)
 
 /* However often a node has looked for work in vain, it does not take work for
  * quick. */
-static void looks_in_vain_teach_nothing(void **unused)
-{
+static void looks_in_vain_teach_nothing(void **unused) {
     (void)unused;
     struct slow slow = {.now_us = 1};
     struct node_pace pace;
@@ -247,8 +232,7 @@ static void looks_in_vain_teach_nothing(void **unused)
     assert_int_equal(slow.most, NODE_PACE_UNITS_MIN);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_index_works_for_long),
         cmocka_unit_test(a_quick_processor_looks_seldom),

@@ -20,8 +20,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     if (cube->room == 0) {
         return CUBE_AGAIN;
     }
@@ -48,8 +47,7 @@ static const struct {
                {12, 0x99c7f5ae9f1fc77b}, {15, 0x02c9814ecb0b7d21},
                {16, 0xb5f37b5fd2aa3673}, {63, 0x876032bf713ca62e}};
 
-static void test_vectors(void **unused)
-{
+static void test_vectors(void **unused) {
     (void)unused;
     const uint64_t key = 0x0706050403020100;
     uint8_t bytes[64];
@@ -81,8 +79,7 @@ static struct {
     struct node_page page;
 } world;
 
-static void begin(uint64_t key)
-{
+static void begin(uint64_t key) {
     const struct node_setup_message setup = {.page_key = key};
     memset(&world, 0, sizeof world);
     world.counted.cube = &world.cube;
@@ -91,8 +88,7 @@ static void begin(uint64_t key)
 }
 
 static bool comes(uint16_t source, const struct node_page_message *page,
-                  size_t size)
-{
+                  size_t size) {
     const struct cube_message message = {.source = source,
                                          .type = NODE_PAGE,
                                          .data = (const uint8_t *)page,
@@ -100,15 +96,13 @@ static bool comes(uint16_t source, const struct node_page_message *page,
     return node_page_check_take(&world.check, &message, &world.page);
 }
 
-static struct node_page_message page_of(uint32_t number)
-{
+static struct node_page_message page_of(uint32_t number) {
     struct node_page_message page = {.head.page = number};
     memset(page.data, (int)number, BYTES);
     return page;
 }
 
-static void expect_report(uint16_t sender, uint32_t page)
-{
+static void expect_report(uint16_t sender, uint32_t page) {
     world.cube.room = 1;
     assert_int_equal(node_page_check_send(&world.check), 1);
     assert_int_equal(world.cube.dest, CUBE_HOST);
@@ -117,8 +111,7 @@ static void expect_report(uint16_t sender, uint32_t page)
     assert_int_equal(world.cube.wrong.page, page);
 }
 
-static void test_right(void **unused)
-{
+static void test_right(void **unused) {
     (void)unused;
     struct node_page_message page = page_of(9);
     size_t size = node_page_seal(&page, 77, BYTES);
@@ -135,8 +128,7 @@ static void test_right(void **unused)
 }
 
 /* The example of transport/PROTOCOL.md. */
-static void test_example(void **unused)
-{
+static void test_example(void **unused) {
     (void)unused;
     static const uint8_t expected[] = {
         0x05, 0x00, 0x00, 0x00, 0x2b, 0x47, 0x2f, 0x1e, 0xa6, 0x63, 0x80, 0x03,
@@ -151,8 +143,7 @@ static void test_example(void **unused)
 }
 
 /* Every bit, one more byte or less, another key. */
-static void test_altered(void **unused)
-{
+static void test_altered(void **unused) {
     (void)unused;
     struct node_page_message page = page_of(9);
     size_t size = node_page_seal(&page, 77, BYTES);
@@ -176,8 +167,7 @@ static void test_altered(void **unused)
 }
 
 /* The first report stays until it has left. */
-static void test_reports(void **unused)
-{
+static void test_reports(void **unused) {
     (void)unused;
     const struct node_page_message page = page_of(9);
     begin(77);
@@ -194,8 +184,7 @@ static void test_reports(void **unused)
     assert_true(node_fault_is_set(&world.fault));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_vectors), cmocka_unit_test(test_right),
         cmocka_unit_test(test_example), cmocka_unit_test(test_altered),

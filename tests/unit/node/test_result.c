@@ -15,8 +15,7 @@ enum { BATCH = 1592, STARS = 4000, APEXES = 40, NODES = 1000, SENDER = 3 };
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(void)
-{
+static uint32_t draw(void) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
@@ -24,8 +23,7 @@ static uint32_t draw(void)
 }
 
 /* A vertex near `v` or anywhere below `vertices`. */
-static uint32_t draw_near(uint32_t v, uint32_t vertices)
-{
+static uint32_t draw_near(uint32_t v, uint32_t vertices) {
     uint32_t bits = draw() % 33;
     uint32_t step = bits == 0 ? 0 : draw() >> (32 - bits);
     return (uint32_t)(((uint64_t)v + step) % vertices);
@@ -46,8 +44,7 @@ struct seen {
 /* Reads a batch and compares it with what was written. */
 static void compare(const struct expected *e, struct seen *seen,
                     const uint8_t *data, size_t size, uint32_t vertices,
-                    size_t rows_max)
-{
+                    size_t rows_max) {
     /* A copy without slack, so that a sanitizer sees reads past the end. */
     uint8_t *copy = malloc(size + 1);
     struct node_result_reader reader;
@@ -75,8 +72,7 @@ static void compare(const struct expected *e, struct seen *seen,
     free(copy);
 }
 
-static void round_trip(uint32_t vertices, size_t rows_max)
-{
+static void round_trip(uint32_t vertices, size_t rows_max) {
     static struct expected e;
     static uint8_t buffer[BATCH + NODE_RESULT_SLACK];
     struct node_result_writer writer;
@@ -122,8 +118,7 @@ static void round_trip(uint32_t vertices, size_t rows_max)
     assert_int_equal(seen.bricks, e.bricks_count);
 }
 
-static void test_round_trip(void **unused)
-{
+static void test_round_trip(void **unused) {
     (void)unused;
     static const uint32_t sizes[] = {1,       64,         1000,
                                      1 << 20, UINT32_MAX, 0x80000001u};
@@ -135,8 +130,7 @@ static void test_round_trip(void **unused)
 }
 
 /* Any bytes: an end, and only vertices in range. */
-static void test_garbage(void **unused)
-{
+static void test_garbage(void **unused) {
     (void)unused;
     for (size_t round = 0; round < 100000; round++) {
         size_t size = draw() % 100;
@@ -171,8 +165,7 @@ static void test_garbage(void **unused)
 }
 
 /* A batch cut short is garbage or a shorter batch, never other tetrahedra. */
-static void test_truncated(void **unused)
-{
+static void test_truncated(void **unused) {
     (void)unused;
     uint8_t buffer[200 + NODE_RESULT_SLACK];
     struct node_result_writer writer;
@@ -201,8 +194,7 @@ static void test_truncated(void **unused)
 
 /* Who found what, as it stands on the wire: a record where that changes, and
  * none for the sender's own. */
-static void test_finders(void **unused)
-{
+static void test_finders(void **unused) {
     (void)unused;
     /* Of the sender, vertex 5 and 6, 7, 8; of node 9, the same, and of the next
      * vertex; of node 1000. */
@@ -247,8 +239,7 @@ static void test_finders(void **unused)
     assert_int_equal(writer.size, 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_garbage),

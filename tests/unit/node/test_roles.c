@@ -23,8 +23,7 @@
 enum { SELF = 1, MEMORY = 1 << 20, FIXED = 65536, ECHO_ROLE = 9 };
 
 /* In the place of node/roles/roles.c. */
-const struct node_role *node_role_named(uint32_t number)
-{
+const struct node_role *node_role_named(uint32_t number) {
     return number == NODE_WORKER   ? &node_worker_role
            : number == NODE_HOLDER ? &node_holder_role
            : number == ECHO_ROLE   ? &echo_role
@@ -45,14 +44,12 @@ static struct {
     uint16_t size;
 } world;
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return world.now_us;
 }
 
-static void start_node(unsigned self)
-{
+static void start_node(unsigned self) {
     struct node_board *board = &world.board[self];
     const char *why = NULL;
     world.memory[self] = aligned_alloc(64, MEMORY - FIXED);
@@ -75,8 +72,7 @@ static void start_node(unsigned self)
     assert_non_null(world.nodes[self]);
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     struct host_sim_cube_options options = {
         .dimension = 1,
         .wire = {.latency_us = 30, .room = 4000, .bytes = SIM_BYTES_MIN}};
@@ -103,8 +99,7 @@ static int set_up(void **unused)
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_sim_cube_close(&world.wires);
     for (unsigned i = 0; i < 3; i++) {
@@ -113,16 +108,14 @@ static int tear_down(void **unused)
     return 0;
 }
 
-static void step(void)
-{
+static void step(void) {
     world.now_us += 50;
     assert_int_not_equal(node_step(world.nodes[0]), NODE_STOPPED);
     assert_int_not_equal(node_step(world.nodes[1]), NODE_STOPPED);
     (void)cube_poll(world.host, world.now_us);
 }
 
-static void say(uint8_t type, const void *data, size_t size)
-{
+static void say(uint8_t type, const void *data, size_t size) {
     for (unsigned i = 0; cube_write(world.host, SELF, type, data, size) != 0;
          i++) {
         assert_true(i < 100000);
@@ -131,8 +124,7 @@ static void say(uint8_t type, const void *data, size_t size)
 }
 
 /* The next message, which must be of that type. */
-static const void *hear(uint8_t type)
-{
+static const void *hear(uint8_t type) {
     struct cube_message message;
     for (unsigned i = 0; !cube_read(world.host, &message); i++) {
         assert_true(i < 100000);
@@ -147,8 +139,7 @@ static const void *hear(uint8_t type)
 }
 
 /* The node has nothing to say for a while. */
-static void hear_nothing(void)
-{
+static void hear_nothing(void) {
     struct cube_message message;
     for (unsigned i = 0; i < 1000; i++) {
         step();
@@ -156,8 +147,7 @@ static void hear_nothing(void)
     }
 }
 
-static struct node_setup_message setup_of(uint8_t role)
-{
+static struct node_setup_message setup_of(uint8_t role) {
     struct node_setup_message setup = {
         .protocol = NODE_PROTOCOL,
         .nodes = 2,
@@ -168,8 +158,7 @@ static struct node_setup_message setup_of(uint8_t role)
     return setup;
 }
 
-static struct node_ready_message begin(uint8_t role)
-{
+static struct node_ready_message begin(uint8_t role) {
     struct node_setup_message setup = setup_of(role);
     struct node_ready_message ready;
     say(NODE_SETUP, &setup, sizeof setup);
@@ -180,8 +169,7 @@ static struct node_ready_message begin(uint8_t role)
     return ready;
 }
 
-static struct node_finished_message report(void)
-{
+static struct node_finished_message report(void) {
     struct node_finished_message finished;
     say(NODE_REPORT, NULL, 0);
     memcpy(&finished, hear(NODE_FINISHED), sizeof finished);
@@ -190,8 +178,7 @@ static struct node_finished_message report(void)
 }
 
 static void refuses(uint8_t type, const void *data, size_t size,
-                    const char *text)
-{
+                    const char *text) {
     say(type, data, size);
     assert_string_equal(hear(NODE_FAULT), text);
     hear_nothing(); /* once */
@@ -199,8 +186,7 @@ static void refuses(uint8_t type, const void *data, size_t size,
 
 /* --- roles ---------------------------------------------------------------- */
 
-static void a_role_of_its_own(void **unused)
-{
+static void a_role_of_its_own(void **unused) {
     struct node_job_message job = {.epoch = 5};
     struct node_setup_message setup = setup_of(ECHO_ROLE);
     struct node_finished_message finished;
@@ -236,8 +222,7 @@ static void a_role_of_its_own(void **unused)
 }
 
 /* The tables of a role and what they count fit what is there. */
-static void roles_map_their_arena(void **unused)
-{
+static void roles_map_their_arena(void **unused) {
     static const uint8_t numbers[] = {NODE_WORKER, NODE_HOLDER};
     (void)unused;
     for (size_t i = 0; i < sizeof numbers; i++) {
@@ -260,8 +245,7 @@ static void roles_map_their_arena(void **unused)
 
 /* Another setup makes another role of it; what the one before did stays
  * counted, and what it had is gone. */
-static void a_second_setup(void **unused)
-{
+static void a_second_setup(void **unused) {
     (void)unused;
     (void)begin(ECHO_ROLE);
     say(ECHO_ASKS, "once", 4);
@@ -287,14 +271,12 @@ static void a_second_setup(void **unused)
 
 /* A pong tells that something was done, what is waited for, and who has not the
  * key. */
-static uint32_t refused_links(void *context)
-{
+static uint32_t refused_links(void *context) {
     (void)context;
     return 5;
 }
 
-static struct node_pong_message pong_of(void)
-{
+static struct node_pong_message pong_of(void) {
     struct node_ping_message ping = {0};
     struct node_pong_message pong;
     say(NODE_PING, &ping, sizeof ping);
@@ -303,8 +285,7 @@ static struct node_pong_message pong_of(void)
     return pong;
 }
 
-static void pongs_tell_of_work(void **unused)
-{
+static void pongs_tell_of_work(void **unused) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
     (void)unused;
     struct node_pong_message none = pong_of();
@@ -327,8 +308,7 @@ static void pongs_tell_of_work(void **unused)
 
 /* --- faults --------------------------------------------------------------- */
 
-static void an_unknown_role(void **unused)
-{
+static void an_unknown_role(void **unused) {
     struct node_setup_message setup = setup_of(7);
     struct node_ping_message ping = {2};
     struct node_pong_message pong;
@@ -351,8 +331,7 @@ static void an_unknown_role(void **unused)
     refuses(NODE_SETUP, &setup, sizeof setup, "nothing to echo");
 }
 
-static void setups_of_other_versions(void **unused)
-{
+static void setups_of_other_versions(void **unused) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
     struct {
         struct node_setup_message setup;
@@ -371,8 +350,7 @@ static void setups_of_other_versions(void **unused)
     refuses(NODE_SETUP, &later, 244, "setup in 244 bytes, expected 240");
 }
 
-static void invalid_setups(void **unused)
-{
+static void invalid_setups(void **unused) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
     (void)unused;
     setup.nodes = 8;
@@ -409,8 +387,7 @@ static void invalid_setups(void **unused)
             "message of type 7 in 3 bytes, expected none");
 }
 
-static void what_a_worker_refuses(void **unused)
-{
+static void what_a_worker_refuses(void **unused) {
     struct node_job_message job = {.epoch = 1, .job = {.first = 5, .last = 3}};
     struct node_page_message page = {.head.page = 17};
     size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
@@ -468,8 +445,7 @@ static void what_a_worker_refuses(void **unused)
 }
 
 /* What it says to a page that it has asked for. */
-static void takes_no_page(const void *data, size_t bytes)
-{
+static void takes_no_page(const void *data, size_t bytes) {
     struct node_page_message page;
     struct node_job_message job = {.epoch = 1, .job = {.last = 7}};
     char text[80];
@@ -483,8 +459,7 @@ static void takes_no_page(const void *data, size_t bytes)
     refuses(NODE_PAGE, &page, node_page_seal(&page, 0, bytes), text);
 }
 
-static void pages_that_a_worker_refuses(void **unused)
-{
+static void pages_that_a_worker_refuses(void **unused) {
     double points[3][INCODE_BRICK_POINTS + 1] = {{0}};
     double *last = &points[2][INCODE_BRICK_POINTS - 3];
     (void)unused;
@@ -499,8 +474,7 @@ static void pages_that_a_worker_refuses(void **unused)
     takes_no_page(points, INCODE_BRICK_BYTES);
 }
 
-static void what_a_holder_refuses(void **unused)
-{
+static void what_a_holder_refuses(void **unused) {
     struct node_job_message job = {.epoch = 1};
     uint32_t pages[NODE_PAGES_IN_FLIGHT_MAX + 1];
     struct node_page_message page = {.head.page = 17};
@@ -536,8 +510,7 @@ static void what_a_holder_refuses(void **unused)
 }
 
 /* Nothing moves when a role finds it, and the board would sleep. */
-static void a_fault_is_told_at_once(void **unused)
-{
+static void a_fault_is_told_at_once(void **unused) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
     (void)unused;
     echo_is_worn = false;
@@ -555,8 +528,7 @@ static void a_fault_is_told_at_once(void **unused)
 }
 
 /* Where a node cannot start, its board learns which limit is broken. */
-static void boards_that_are_refused(void **unused)
-{
+static void boards_that_are_refused(void **unused) {
     struct node_board board = world.board[SELF];
     const char *why = NULL;
     (void)unused;
@@ -574,8 +546,7 @@ static void boards_that_are_refused(void **unused)
 
 #define ON_A_CUBE(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         ON_A_CUBE(a_role_of_its_own),
         ON_A_CUBE(roles_map_their_arena),

@@ -17,8 +17,7 @@ enum { NODES_MAX = 128 };
 
 /* A link that takes nothing, in the place of transport/cube.c. */
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     (void)cube, (void)dest, (void)type, (void)data, (void)size;
     return CUBE_AGAIN;
 }
@@ -32,8 +31,7 @@ struct scene {
 };
 
 /* Node 0 of so many, each with one brick, which all regions are known to. */
-static void begin(struct scene *s, uint32_t nodes)
-{
+static void begin(struct scene *s, uint32_t nodes) {
     uint8_t message[sizeof(struct node_regions_message) +
                     (NODES_MAX + 1) * sizeof(uint32_t)];
     struct node_regions_message regions;
@@ -55,15 +53,13 @@ static void begin(struct scene *s, uint32_t nodes)
     assert_true(node_shares_ready(&s->shares));
 }
 
-static size_t room_of(const struct scene *s)
-{
+static size_t room_of(const struct scene *s) {
     return s->peers.room(s->peers.context);
 }
 
 /* One with vertices of this node and of three that follow `at`, `step` apart.
  */
-static void share(const struct scene *s, uint32_t at, uint32_t step)
-{
+static void share(const struct scene *s, uint32_t at, uint32_t step) {
     uint32_t others = s->shares.nodes - 1, v[4] = {0};
     for (uint32_t i = 1; i < 4; i++) {
         uint32_t node = 1 + (at + (i - 1) * step) % others;
@@ -73,8 +69,7 @@ static void share(const struct scene *s, uint32_t at, uint32_t step)
 }
 
 /* What is told to be there is: it would break off in mid-share. */
-static void test_honest(void **state)
-{
+static void test_honest(void **state) {
     static const uint32_t counts[] = {2, 3, 4, 8, 16, 32, 64, 128};
     (void)state;
     for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
@@ -99,8 +94,7 @@ static void test_honest(void **state)
 
 /* A star, of up to INCODE_STAR_BUILT tetrahedra, is not cut short where it has
  * not to be. */
-static void test_enough(void **state)
-{
+static void test_enough(void **state) {
     struct scene s;
     (void)state;
     begin(&s, 1);
@@ -118,8 +112,7 @@ static void test_enough(void **state)
     free(s.memory);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_honest),
         cmocka_unit_test(test_enough),

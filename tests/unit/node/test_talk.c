@@ -12,14 +12,12 @@
 
 static uint64_t state = 88172645463325252u;
 
-static uint8_t draw(void)
-{
+static uint8_t draw(void) {
     return (uint8_t)(sim_draw(&state) >> 40);
 }
 
 /* TALKS for more than a few, TALK_SEED for others than these. */
-static void random_talks(void **unused)
-{
+static void random_talks(void **unused) {
     const char *wanted = getenv("TALKS"), *seed = getenv("TALK_SEED");
     uint8_t bytes[300] = {0};
     (void)unused;
@@ -39,8 +37,7 @@ static void random_talks(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_talks),
     };

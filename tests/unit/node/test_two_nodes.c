@@ -80,21 +80,18 @@ static struct {
     uint64_t now_us;
 } world;
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return world.now_us++;
 }
 
 /* --- mail ----------------------------------------------------------------- */
 
-static struct box *box_of(uint16_t dest)
-{
+static struct box *box_of(uint16_t dest) {
     return &world.box[dest == CUBE_HOST ? HOST : dest];
 }
 
-static void sort_row(uint32_t v[4])
-{
+static void sort_row(uint32_t v[4]) {
     for (unsigned i = 1; i < 4; i++) {
         for (unsigned k = i; k > 0 && v[k] < v[k - 1]; k--) {
             uint32_t t = v[k];
@@ -104,8 +101,7 @@ static void sort_row(uint32_t v[4])
     }
 }
 
-static void note_found(const struct mail *m)
-{
+static void note_found(const struct mail *m) {
     struct node_found_message found;
     memcpy(&found, m->data, m->size);
     for (uint32_t i = 0; i < found.found.count; i++) {
@@ -119,8 +115,7 @@ static void note_found(const struct mail *m)
 
 /* The number of an altered page stays: what else it might answer is not known.
  */
-static void alter(struct mail *m)
-{
+static void alter(struct mail *m) {
     bool comes = m->type == world.alters_type && m->source == world.alters;
     unsigned at =
         comes && m->size > 4 ? 4 + (7 * world.altered + 1) % (m->size - 4u) : 0;
@@ -136,8 +131,7 @@ static void alter(struct mail *m)
 }
 
 static bool post(uint16_t source, uint16_t dest, uint8_t type, const void *data,
-                 size_t size)
-{
+                 size_t size) {
     struct box *box = box_of(dest);
     if (box->count == MAIL) {
         return false;
@@ -155,27 +149,23 @@ static bool post(uint16_t source, uint16_t dest, uint8_t type, const void *data,
 }
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     return post(cube->self, dest, type, data, size) ? 0 : CUBE_AGAIN;
 }
 
-unsigned cube_room(const struct cube *cube, uint16_t dest)
-{
+unsigned cube_room(const struct cube *cube, uint16_t dest) {
     (void)cube;
     return MAIL - box_of(dest)->count;
 }
 
-static void drop(struct box *box)
-{
+static void drop(struct box *box) {
     box->first = (box->first + 1) % MAIL;
     box->count--;
 }
 
 /* --- the host ------------------------------------------------------------- */
 
-static void want(uint16_t to, const uint8_t *data, size_t size)
-{
+static void want(uint16_t to, const uint8_t *data, size_t size) {
     for (size_t at = 0; at + 4 <= size; at += 4) {
         assert_true(world.wanted_count < WANTED);
         memcpy(&world.wanted[world.wanted_count].page, data + at, 4);
@@ -183,8 +173,7 @@ static void want(uint16_t to, const uint8_t *data, size_t size)
     }
 }
 
-static void send_page(uint16_t to, uint8_t type, uint32_t page)
-{
+static void send_page(uint16_t to, uint8_t type, uint32_t page) {
     struct node_page_message body = {.head.page = page};
     size_t bytes = host_page(&order, page, body.data);
     assert_true(bytes > 0);
@@ -193,8 +182,7 @@ static void send_page(uint16_t to, uint8_t type, uint32_t page)
 }
 
 /* That node has told this one's lender of it. */
-static bool was_found(const uint32_t row[4], uint16_t finder)
-{
+static bool was_found(const uint32_t row[4], uint16_t finder) {
     uint32_t v[4];
     bool was = false;
     memcpy(v, row, sizeof v);
@@ -206,8 +194,7 @@ static bool was_found(const uint32_t row[4], uint16_t finder)
     return was;
 }
 
-static void take_results(const struct mail *m)
-{
+static void take_results(const struct mail *m) {
     struct node_result_reader reader;
     struct host_error error = {0};
     enum node_result_event event;
@@ -230,8 +217,7 @@ static void take_results(const struct mail *m)
     } while (event != NODE_RESULT_END);
 }
 
-static void take_report(const struct mail *m)
-{
+static void take_report(const struct mail *m) {
     struct node_wrong_page_message wrong;
     assert_int_equal(m->size, sizeof wrong);
     memcpy(&wrong, m->data, sizeof wrong);
@@ -240,8 +226,7 @@ static void take_report(const struct mail *m)
     world.reports++;
 }
 
-static void host_takes(const struct mail *m)
-{
+static void host_takes(const struct mail *m) {
     uint32_t node;
     switch (m->type) {
     case NODE_PAGE_REQUEST:
@@ -262,8 +247,7 @@ static void host_takes(const struct mail *m)
     }
 }
 
-static void host_step(void)
-{
+static void host_step(void) {
     struct box *box = &world.box[HOST];
     for (; box->count > 0; drop(box)) {
         host_takes(&box->mail[box->first]);
@@ -278,8 +262,7 @@ static void host_step(void)
 
 /* --- nodes ---------------------------------------------------------------- */
 
-static void node_step(unsigned i, bool works)
-{
+static void node_step(unsigned i, bool works) {
     struct node *n = &world.node[i];
     for (struct box *box = &world.box[i]; box->count > 0; drop(box)) {
         const struct mail *m = &box->mail[box->first];
@@ -305,8 +288,7 @@ static void node_step(unsigned i, bool works)
     }
 }
 
-static struct node_setup_message setup_of(unsigned i)
-{
+static struct node_setup_message setup_of(unsigned i) {
     struct node_setup_message setup = {
         .nodes = NODES,
         .holders = (uint16_t)world.holders,
@@ -330,8 +312,7 @@ static struct node_setup_message setup_of(unsigned i)
 }
 
 static void give_job(unsigned i, uint32_t first, uint32_t last,
-                     const double lo[3], const double hi[3])
-{
+                     const double lo[3], const double hi[3]) {
     struct node_job_message job = {.epoch = i + 1,
                                    .job = {.first = first, .last = last}};
     memcpy(job.job.lo, lo, sizeof job.job.lo);
@@ -340,8 +321,7 @@ static void give_job(unsigned i, uint32_t first, uint32_t last,
 }
 
 /* Of an exchange: regions, and a job each. */
-static void give_regions(void)
-{
+static void give_regions(void) {
     struct {
         struct node_regions_message head;
         uint32_t first[NODES + 1];
@@ -361,8 +341,7 @@ static void give_regions(void)
     }
 }
 
-static void start(void)
-{
+static void start(void) {
     for (unsigned i = 0; i < NODES; i++) {
         struct node *n = &world.node[i];
         const struct node_setup_message setup = setup_of(i);
@@ -385,8 +364,7 @@ static void start(void)
     }
 }
 
-static void run(void)
-{
+static void run(void) {
     uint32_t next = order.tree.pages;
     start();
     for (unsigned round = 0; !world.node[0].done || !world.node[1].done;
@@ -408,8 +386,7 @@ static void run(void)
     }
 }
 
-static void expect_right(void)
-{
+static void expect_right(void) {
     struct host_digest digest;
     host_tetrahedra_map(&world.tets, order.row);
     host_tetrahedra_sort(&world.tets);
@@ -418,8 +395,7 @@ static void expect_right(void)
     host_tetrahedra_free(&world.tets);
 }
 
-static void begin(uint8_t role0, uint8_t role1)
-{
+static void begin(uint8_t role0, uint8_t role1) {
     memset(&world, 0, sizeof world);
     world.role[0] = role0;
     world.role[1] = role1;
@@ -431,8 +407,7 @@ static void begin(uint8_t role0, uint8_t role1)
 /* --- tests ---------------------------------------------------------------- */
 
 /* Of one that works alone, with the host's pages; all others have the same. */
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     struct host_points points = {0};
     struct host_error error = {0};
     (void)unused;
@@ -452,22 +427,19 @@ static int set_up(void **unused)
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_order_free(&order);
     return 0;
 }
 
-static void expect_altered(void)
-{
+static void expect_altered(void) {
     assert_true(world.altered > 3);
     assert_in_range(world.reports, 1, world.altered);
     expect_right();
 }
 
-static void pages_of_a_holder(void **unused)
-{
+static void pages_of_a_holder(void **unused) {
     (void)unused;
     begin(NODE_WORKER, NODE_HOLDER);
     world.alters_every = 5;
@@ -480,8 +452,7 @@ static void pages_of_a_holder(void **unused)
     expect_altered();
 }
 
-static void pages_of_the_host(void **unused)
-{
+static void pages_of_the_host(void **unused) {
     static const uint8_t roles[][2] = {{NODE_WORKER, NODE_WORKER},
                                        {NODE_WORKER, NODE_HOLDER},
                                        {NODE_MANAGER, NODE_BUILDER},
@@ -497,8 +468,7 @@ static void pages_of_the_host(void **unused)
     }
 }
 
-static void pages_that_are_lent(void **unused)
-{
+static void pages_that_are_lent(void **unused) {
     (void)unused;
     for (unsigned every = 2; every > 0; every--) {
         begin(NODE_EXCHANGE, NODE_EXCHANGE);
@@ -508,8 +478,7 @@ static void pages_that_are_lent(void **unused)
     }
 }
 
-static void pages_to_all(void **unused)
-{
+static void pages_to_all(void **unused) {
     (void)unused;
     for (unsigned every = 2; every > 0; every--) {
         begin(NODE_EXCHANGE, NODE_EXCHANGE);
@@ -524,8 +493,7 @@ static void pages_to_all(void **unused)
 }
 
 /* Whatever a list says: the one that it came from.  In a tuple it says so. */
-static void found_by_a_builder(void **unused)
-{
+static void found_by_a_builder(void **unused) {
     static const uint8_t roles[][2] = {
         {NODE_MANAGER, NODE_BUILDER}, {NODE_LINDA_MANAGER, NODE_LINDA_BUILDER}};
     (void)unused;
@@ -540,8 +508,7 @@ static void found_by_a_builder(void **unused)
 }
 
 /* What was found at stars that were lent: take_results. */
-static void found_by_a_borrower(void **unused)
-{
+static void found_by_a_borrower(void **unused) {
     (void)unused;
     begin(NODE_EXCHANGE, NODE_EXCHANGE);
     world.slow = 16;
@@ -561,8 +528,7 @@ static void found_by_a_borrower(void **unused)
     expect_right();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pages_of_a_holder),
         cmocka_unit_test(pages_of_the_host),

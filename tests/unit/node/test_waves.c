@@ -17,8 +17,7 @@ static struct {
     struct node_waves_state state;
 } world;
 
-static void begin(uint64_t sent, uint64_t received)
-{
+static void begin(uint64_t sent, uint64_t received) {
     static const struct node_setup_message setup = {.nodes = 1};
     memset(&world, 0, sizeof world);
     world.state = (struct node_waves_state){.ready = true,
@@ -31,8 +30,7 @@ static void begin(uint64_t sent, uint64_t received)
 }
 
 /* So many waves, one after another, each after so long; the last command. */
-static uint8_t waves(unsigned count, uint64_t step_us)
-{
+static uint8_t waves(unsigned count, uint64_t step_us) {
     uint8_t command = 0;
     while (count-- > 0 && !node_fault_is_set(&world.fault)) {
         world.waves.now_us += step_us;
@@ -41,8 +39,7 @@ static uint8_t waves(unsigned count, uint64_t step_us)
     return command;
 }
 
-static void sums_that_agree(void **unused)
-{
+static void sums_that_agree(void **unused) {
     (void)unused;
     begin(5, 5);
     assert_int_equal(waves(1, 1), NODE_WAVE_COUNT);
@@ -61,8 +58,7 @@ static void sums_that_agree(void **unused)
 
 /* Many waves in a short time, or few in a long one, prove nothing; nor does
  * what comes slowly. */
-static void slow_messages(void **unused)
-{
+static void slow_messages(void **unused) {
     (void)unused;
     begin(5, 4);
     (void)waves(100 * NODE_WAVES_UNCHANGED, 500);
@@ -81,8 +77,7 @@ static void slow_messages(void **unused)
 }
 
 /* What was sent and never comes is a fault that names the sums. */
-static void sums_that_never_agree(void **unused)
-{
+static void sums_that_never_agree(void **unused) {
     (void)unused;
     begin(12, 9);
     (void)waves(NODE_WAVES_UNCHANGED + 2,
@@ -90,8 +85,7 @@ static void sums_that_never_agree(void **unused)
     assert_non_null(strstr(world.fault.text, "of 12 sent to others 9 have"));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sums_that_agree),
         cmocka_unit_test(slow_messages),

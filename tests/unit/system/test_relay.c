@@ -25,8 +25,7 @@ static uint8_t sent[SENT_MAX], heard[SENT_MAX];
 static size_t sent_bytes, heard_bytes;
 
 /* One wire between two sockets of the test's own. */
-static void join(const struct uart_settings *settings)
-{
+static void join(const struct uart_settings *settings) {
     int from[2], to[2];
     int type = SOCK_STREAM | SOCK_NONBLOCK;
     now = 5000000;
@@ -39,16 +38,14 @@ static void join(const struct uart_settings *settings)
     assert_true(uart_wires_join(&wires, from[1], to[1]));
 }
 
-static void part(void)
-{
+static void part(void) {
     uart_wires_close(&wires);
     close(sender);
     close(receiver);
 }
 
 /* As much as the sender's socket takes, of `most` in all. */
-static void send_on(size_t most)
-{
+static void send_on(size_t most) {
     while (sent_bytes < most) {
         size_t left = most - sent_bytes;
         ssize_t put = send(sender, sent + sent_bytes,
@@ -60,8 +57,7 @@ static void send_on(size_t most)
     }
 }
 
-static void hear(void)
-{
+static void hear(void) {
     ssize_t got;
     while ((got = read(receiver, heard + heard_bytes, SENT_MAX - heard_bytes)) >
            0) {
@@ -70,8 +66,7 @@ static void hear(void)
 }
 
 /* As long as there is something to carry, or for so long. */
-static void carry(uint64_t for_us, bool reads)
-{
+static void carry(uint64_t for_us, bool reads) {
     uint64_t until = now + for_us;
     while (now < until) {
         uint64_t next = uart_wires_carry(&wires, now);
@@ -82,15 +77,13 @@ static void carry(uint64_t for_us, bool reads)
     }
 }
 
-static void fill(void)
-{
+static void fill(void) {
     for (size_t i = 0; i < SENT_MAX; i++) {
         sent[i] = (uint8_t)(i * 7 + i / 251);
     }
 }
 
-static void rates(void **unused)
-{
+static void rates(void **unused) {
     static const uint32_t baud[] = {19200, 115200, 921600};
     (void)unused;
     for (size_t i = 0; i < sizeof baud / sizeof baud[0]; i++) {
@@ -108,8 +101,7 @@ static void rates(void **unused)
 }
 
 /* What a fifth of a second of the clock carries, in bits a second. */
-static double rate_now(void)
-{
+static double rate_now(void) {
     join(&(struct uart_settings){.seed = 1, .baud = 115200, .fifo = 4096});
     uint64_t begun = chance_now_us(), at = begun;
     while (at < begun + 200000) {
@@ -126,8 +118,7 @@ static double rate_now(void)
 /* Never faster than the line, and as fast where other work on the machine has
  * not held this program up, once in five minutes.  clock: it is what is meant.
  */
-static void rate_by_the_clock(void **unused)
-{
+static void rate_by_the_clock(void **unused) {
     double rate = 0;
     (void)unused;
     for (int round = 0; round < 1500 && rate < 0.95 * 115200; round++) {
@@ -138,8 +129,7 @@ static void rate_by_the_clock(void **unused)
 }
 
 /* An idle wire saves up no time, and looks are four bytes apart. */
-static void bytes_take_their_time(void **unused)
-{
+static void bytes_take_their_time(void **unused) {
     (void)unused;
     join(&(struct uart_settings){.seed = 1, .baud = 1000});
     carry(1000000, true);
@@ -154,8 +144,7 @@ static void bytes_take_their_time(void **unused)
 }
 
 /* Sends all, and returns how many bytes of equal place differ. */
-static size_t differing(size_t size)
-{
+static size_t differing(size_t size) {
     size_t different = 0;
     while (sent_bytes < size) {
         send_on(size);
@@ -169,8 +158,7 @@ static size_t differing(size_t size)
     return different;
 }
 
-static void flips(void **unused)
-{
+static void flips(void **unused) {
     (void)unused;
     join(&(struct uart_settings){.seed = 3, .baud = 921600, .flip_bytes = 100});
     size_t different = differing(100000);
@@ -180,8 +168,7 @@ static void flips(void **unused)
     part();
 }
 
-static void drops(void **unused)
-{
+static void drops(void **unused) {
     (void)unused;
     join(
         &(struct uart_settings){.seed = 4, .baud = 921600, .drop_bytes = 1000});
@@ -191,8 +178,7 @@ static void drops(void **unused)
     part();
 }
 
-static void bursts(void **unused)
-{
+static void bursts(void **unused) {
     (void)unused;
     join(&(struct uart_settings){
         .seed = 5, .baud = 921600, .burst_bytes = 1000});
@@ -207,8 +193,7 @@ static void bursts(void **unused)
     part();
 }
 
-static void the_same_seed_does_the_same(void **unused)
-{
+static void the_same_seed_does_the_same(void **unused) {
     static uint8_t first[20000];
     (void)unused;
     for (unsigned i = 0; i < 3; i++) {
@@ -227,8 +212,7 @@ static void the_same_seed_does_the_same(void **unused)
 }
 
 /* Without `fifo`, nothing is lost, and the sender waits. */
-static void a_receiver_is_waited_for(void **unused)
-{
+static void a_receiver_is_waited_for(void **unused) {
     (void)unused;
     join(&(struct uart_settings){.seed = 1, .baud = 921600});
     for (unsigned i = 0; i < 500; i++) {
@@ -245,8 +229,7 @@ static void a_receiver_is_waited_for(void **unused)
     part();
 }
 
-static void a_receiver_overruns(void **unused)
-{
+static void a_receiver_overruns(void **unused) {
     (void)unused;
     join(&(struct uart_settings){.seed = 1, .baud = 19200, .fifo = 1});
     send_on(1000);
@@ -264,8 +247,7 @@ static void a_receiver_overruns(void **unused)
     part();
 }
 
-static int connected(const char *path)
-{
+static int connected(const char *path) {
     struct sockaddr_un there = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
     snprintf(there.sun_path, sizeof there.sun_path, "%s", path);
@@ -273,8 +255,7 @@ static int connected(const char *path)
     return fd;
 }
 
-static int listening(const char *path)
-{
+static int listening(const char *path) {
     struct sockaddr_un here = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0);
     snprintf(here.sun_path, sizeof here.sun_path, "%s", path);
@@ -285,8 +266,7 @@ static int listening(const char *path)
 }
 
 /* One end is killed and comes back, twice: the other stays as it is. */
-static void an_end_goes_and_comes(void **unused)
-{
+static void an_end_goes_and_comes(void **unused) {
     char folder[] = "/tmp/relay.XXXXXX", calls[64], text[200], made[64];
     (void)unused;
     assert_non_null(mkdtemp(folder));
@@ -322,8 +302,7 @@ static void an_end_goes_and_comes(void **unused)
     assert_int_equal(rmdir(folder), 0);
 }
 
-static void wrong_texts(void **unused)
-{
+static void wrong_texts(void **unused) {
     static const char *const texts[] = {"",    ",",        "/a",  "/a,",
                                         ",/a", "/a,/b,/c", "@,/b"};
     (void)unused;
@@ -337,8 +316,7 @@ static void wrong_texts(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     fill();
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rates),

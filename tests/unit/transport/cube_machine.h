@@ -54,29 +54,24 @@ struct machine {
     unsigned size_max;
 };
 
-static inline uint32_t draw(struct machine *m)
-{
+static inline uint32_t draw(struct machine *m) {
     return (uint32_t)(sim_draw(&m->random) >> 32);
 }
 
-static inline unsigned place_of(const struct machine *m, uint16_t name)
-{
+static inline unsigned place_of(const struct machine *m, uint16_t name) {
     return name == CUBE_HOST ? m->nodes : name;
 }
 
 static inline unsigned wire_of(const struct machine *m, unsigned i,
-                               unsigned link)
-{
+                               unsigned link) {
     return host_sim_cube_wire(&m->cube, i, link);
 }
 
-static inline void cut_wire(struct machine *m, unsigned i, unsigned link)
-{
+static inline void cut_wire(struct machine *m, unsigned i, unsigned link) {
     host_sim_cube_cut(&m->cube, wire_of(m, i, link), true);
 }
 
-static inline void open_place(struct machine *m, unsigned i)
-{
+static inline void open_place(struct machine *m, unsigned i) {
     struct place *p = &m->places[i];
     size_t bytes = cube_arena_bytes(&p->config);
     p->arena = bytes > 0 ? malloc(bytes) : NULL;
@@ -93,8 +88,7 @@ static inline void open_place(struct machine *m, unsigned i)
 static inline struct machine *build(unsigned dimension,
                                     const struct cube_config *config,
                                     const struct host_sim_cube_options *wires,
-                                    uint64_t seed)
-{
+                                    uint64_t seed) {
     struct machine *m = calloc(1, sizeof *m);
     assert_non_null(m);
     m->random = seed * 77 + 12345;
@@ -129,8 +123,7 @@ static inline struct machine *build(unsigned dimension,
     return m;
 }
 
-static inline void destroy(struct machine *m)
-{
+static inline void destroy(struct machine *m) {
     for (unsigned i = 0; i < m->count; i++) {
         free(m->places[i].arena);
     }
@@ -141,8 +134,7 @@ static inline void destroy(struct machine *m)
 /* --- traffic ------------------------------------------------------------- */
 
 static inline unsigned content(const struct machine *m, uint8_t *bytes,
-                               unsigned from, uint32_t number, bool broadcast)
-{
+                               unsigned from, uint32_t number, bool broadcast) {
     uint32_t h = (number + 1) * 2654435761u ^ from * 40503u;
     unsigned size = h >> 8 & 1 ? m->size_max : 5 + h % (m->size_max - 4);
     for (unsigned i = 0; i < size && i < 25; i++) {
@@ -159,8 +151,7 @@ static inline unsigned content(const struct machine *m, uint8_t *bytes,
 }
 
 static inline void take(struct machine *m, unsigned i,
-                        const struct cube_message *message)
-{
+                        const struct cube_message *message) {
     uint8_t want[CUBE_PAYLOAD_MAX];
     struct place *p = &m->places[i];
     unsigned from = place_of(m, message->source);
@@ -176,8 +167,7 @@ static inline void take(struct machine *m, unsigned i,
 }
 
 /* Writes what the links take, to all others in turn. */
-static inline unsigned give(struct machine *m, unsigned i)
-{
+static inline unsigned give(struct machine *m, unsigned i) {
     uint8_t bytes[CUBE_PAYLOAD_MAX];
     struct place *p = &m->places[i];
     unsigned written = 0;
@@ -208,8 +198,7 @@ static inline unsigned give(struct machine *m, unsigned i)
     return written;
 }
 
-static inline void step(struct machine *m, unsigned i)
-{
+static inline void step(struct machine *m, unsigned i) {
     struct place *p = &m->places[i];
     struct cube_message message;
     if (m->now_us < p->stopped_until_us || p->gone) {
@@ -223,8 +212,7 @@ static inline void step(struct machine *m, unsigned i)
     give(m, i);
 }
 
-static inline bool finished(const struct machine *m)
-{
+static inline bool finished(const struct machine *m) {
     for (unsigned i = 0; i < m->count; i++) {
         const struct place *p = &m->places[i];
         for (unsigned j = 0; j < m->count; j++) {
@@ -245,8 +233,7 @@ static inline bool finished(const struct machine *m)
 }
 
 /* Forgets what was counted: as many messages again are expected. */
-static inline void count_anew(struct machine *m)
-{
+static inline void count_anew(struct machine *m) {
     for (unsigned i = 0; i < m->count; i++) {
         struct place *p = &m->places[i];
         p->broadcasts_sent = 0;
@@ -256,8 +243,7 @@ static inline void count_anew(struct machine *m)
     }
 }
 
-static inline void check_statistics(const struct machine *m, bool clean)
-{
+static inline void check_statistics(const struct machine *m, bool clean) {
     for (unsigned i = 0; i < m->count; i++) {
         const struct place *p = &m->places[i];
         assert_int_equal(cube_statistics(p->cube)->misrouted, 0);
@@ -274,8 +260,7 @@ static inline void check_statistics(const struct machine *m, bool clean)
 }
 
 /* Places in an order drawn anew each round. */
-static inline void run(struct machine *m, uint32_t each, uint64_t most_us)
-{
+static inline void run(struct machine *m, uint32_t each, uint64_t most_us) {
     uint64_t deadline = m->now_us + most_us;
     m->each = each;
     while (!finished(m)) {
@@ -294,13 +279,11 @@ static inline void run(struct machine *m, uint32_t each, uint64_t most_us)
 enum { WRITTEN = 0, READ = 1 };
 
 static inline const struct cube_wiring *wiring_of(const struct machine *m,
-                                                  unsigned i)
-{
+                                                  unsigned i) {
     return cube_wiring(m->places[i].cube);
 }
 
-static inline bool all_in(const struct machine *m, uint32_t generation)
-{
+static inline bool all_in(const struct machine *m, uint32_t generation) {
     for (unsigned i = 0; i < m->count; i++) {
         if (!m->places[i].gone && wiring_of(m, i)->generation != generation) {
             return false;
@@ -309,8 +292,7 @@ static inline bool all_in(const struct machine *m, uint32_t generation)
     return true;
 }
 
-static inline void poll_all(struct machine *m, uint32_t us)
-{
+static inline void poll_all(struct machine *m, uint32_t us) {
     m->now_us += us;
     for (unsigned i = 0; i < m->count; i++) {
         if (!m->places[i].gone) {
@@ -319,8 +301,7 @@ static inline void poll_all(struct machine *m, uint32_t us)
     }
 }
 
-static inline void settle(struct machine *m, uint32_t generation)
-{
+static inline void settle(struct machine *m, uint32_t generation) {
     for (unsigned i = 0; !all_in(m, generation); i++) {
         assert_true(i < 20000);
         poll_all(m, 100);
@@ -329,8 +310,7 @@ static inline void settle(struct machine *m, uint32_t generation)
 
 /* The host begins that generation, from which more than half the circle may be
  * left, and all follow. */
-static inline void renew_to(struct machine *m, uint32_t generation)
-{
+static inline void renew_to(struct machine *m, uint32_t generation) {
     struct cube *host = m->places[m->nodes].cube;
     struct cube_wiring next = *cube_wiring(host);
     if (!wiring_after(generation, next.generation)) {
@@ -344,8 +324,7 @@ static inline void renew_to(struct machine *m, uint32_t generation)
 }
 
 /* A new arena and epoch, as after a reset. */
-static inline void reboot(struct machine *m, unsigned i)
-{
+static inline void reboot(struct machine *m, unsigned i) {
     free(m->places[i].arena);
     m->places[i].config.epoch = draw(m) | 1;
     open_place(m, i);
@@ -353,8 +332,7 @@ static inline void reboot(struct machine *m, unsigned i)
 
 /* Writes to all, the generation again and again; reads and checks that. */
 static inline void chatter(struct machine *m, unsigned i, bool reads,
-                           uint64_t counts[2])
-{
+                           uint64_t counts[2]) {
     enum { WORDS = CUBE_PAYLOAD_MAX / 4 };
     struct cube *cube = m->places[i].cube;
     struct cube_message message;

@@ -44,8 +44,7 @@ struct pair {
     struct end ends[2];
 };
 
-static inline uint32_t mix(uint32_t x)
-{
+static inline uint32_t mix(uint32_t x) {
     x ^= x >> 16;
     x *= 0x7feb352du;
     x ^= x >> 15;
@@ -54,8 +53,7 @@ static inline uint32_t mix(uint32_t x)
 }
 
 static inline size_t size_of(const struct end *end, unsigned who,
-                             uint32_t number)
-{
+                             uint32_t number) {
     uint32_t m = mix(number * 2 + who);
     if (end->size_max == 0) {
         return end->config.message_max;
@@ -65,8 +63,7 @@ static inline size_t size_of(const struct end *end, unsigned who,
 }
 
 static inline void fill(uint8_t *bytes, size_t size, unsigned who,
-                        uint32_t number)
-{
+                        uint32_t number) {
     uint32_t m = mix(number * 2 + who);
     for (size_t i = 0, shift = 0; i < size; i++) {
         bytes[i] = (uint8_t)((m >> shift) + i * (m & 7));
@@ -80,8 +77,7 @@ static inline void fill(uint8_t *bytes, size_t size, unsigned who,
     }
 }
 
-static inline void start(struct pair *p, unsigned who, uint32_t epoch)
-{
+static inline void start(struct pair *p, unsigned who, uint32_t epoch) {
     struct end *end = &p->ends[who];
     end->config.pipe = host_sim_cube_pipe(&p->cube, who, 0);
     end->config.epoch = epoch;
@@ -98,8 +94,7 @@ static inline void start(struct pair *p, unsigned who, uint32_t epoch)
 
 static inline struct pair *new_pair(const struct link_config *config,
                                     const struct host_sim_cube_options *wire,
-                                    uint64_t seed)
-{
+                                    uint64_t seed) {
     struct pair *p = calloc(1, sizeof *p);
     struct host_sim_cube_options options = *wire;
     struct host_error error = {0};
@@ -116,29 +111,25 @@ static inline struct pair *new_pair(const struct link_config *config,
     return p;
 }
 
-static inline void free_pair(struct pair *p)
-{
+static inline void free_pair(struct pair *p) {
     free(p->ends[0].memory);
     free(p->ends[1].memory);
     host_sim_cube_close(&p->cube);
     free(p);
 }
 
-static inline void cut_pair(struct pair *p, bool cut)
-{
+static inline void cut_pair(struct pair *p, bool cut) {
     host_sim_cube_cut(&p->cube, 0, cut);
 }
 
 /* Bytes that nobody sent, on the way from that end. */
 static inline void put_noise(struct pair *p, unsigned who, const uint8_t *bytes,
-                             size_t size)
-{
+                             size_t size) {
     struct link_pipe pipe = host_sim_cube_pipe(&p->cube, who, 0);
     (void)pipe.send(pipe.context, bytes, size);
 }
 
-static inline void write_some(struct end *end, unsigned who)
-{
+static inline void write_some(struct end *end, unsigned who) {
     uint8_t bytes[LINK_MESSAGE_MAX] = {0};
     while (end->written < end->most) {
         size_t size = size_of(end, who, end->written), head = size % 9;
@@ -157,8 +148,7 @@ static inline void write_some(struct end *end, unsigned who)
 }
 
 static inline void read_some(struct end *end, const struct end *from,
-                             unsigned who)
-{
+                             unsigned who) {
     uint8_t want[LINK_MESSAGE_MAX];
     struct link_message message;
     while (!end->lazy && link_read(end->link, &message)) {
@@ -173,8 +163,7 @@ static inline void read_some(struct end *end, const struct end *from,
     }
 }
 
-static inline void step(struct pair *p, uint32_t us)
-{
+static inline void step(struct pair *p, uint32_t us) {
     p->now_us += us;
     for (unsigned who = 0; who < 2; who++) {
         struct end *end = &p->ends[who];
@@ -186,16 +175,14 @@ static inline void step(struct pair *p, uint32_t us)
     }
 }
 
-static inline bool finished(const struct pair *p)
-{
+static inline bool finished(const struct pair *p) {
     return p->ends[0].read == p->ends[1].most &&
            p->ends[1].read == p->ends[0].most && link_idle(p->ends[0].link) &&
            link_idle(p->ends[1].link);
 }
 
 static inline void run(struct pair *p, uint32_t messages, uint32_t step_us,
-                       uint64_t most_us)
-{
+                       uint64_t most_us) {
     uint64_t deadline = p->now_us + most_us;
     p->ends[0].most = p->ends[1].most = messages;
     while (!finished(p)) {

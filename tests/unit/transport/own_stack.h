@@ -23,8 +23,7 @@ enum { STACK_BYTES = 1 << 18 };
 
 static _Alignas(64) uint8_t stack[STACK_BYTES];
 
-static inline void run_on_stack(void (*work)(void))
-{
+static inline void run_on_stack(void (*work)(void)) {
     static ucontext_t here, there;
     memset(stack, 0, sizeof stack);
     assert_int_equal(getcontext(&there), 0);
@@ -37,8 +36,7 @@ static inline void run_on_stack(void (*work)(void))
 
 /* Whether a part of a secret is in the memory. */
 static inline bool holds(const void *memory, size_t size, const uint8_t *secret,
-                         size_t secret_bytes)
-{
+                         size_t secret_bytes) {
     enum { RUN = 8 };
     const uint8_t *bytes = memory;
     for (size_t i = 0; i + RUN <= size; i++) {

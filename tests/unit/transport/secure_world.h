@@ -33,8 +33,7 @@ struct ends {
     struct lane *in, *out;
 };
 
-static inline int lane_send(void *context, const uint8_t *bytes, size_t size)
-{
+static inline int lane_send(void *context, const uint8_t *bytes, size_t size) {
     struct lane *lane = ((struct ends *)context)->out;
     if (lane->most != 0 && size > lane->most) {
         size = lane->most;
@@ -45,8 +44,7 @@ static inline int lane_send(void *context, const uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static inline int lane_receive(void *context, uint8_t *bytes, size_t size)
-{
+static inline int lane_receive(void *context, uint8_t *bytes, size_t size) {
     struct lane *lane = ((struct ends *)context)->in;
     size_t have = lane->end - lane->begin;
     size = size < have ? size : have;
@@ -70,8 +68,7 @@ static const struct secure_ends wire[2] = {{{5, 2}, {1, 2}}, {{1, 2}, {5, 2}}};
 
 /* With `salt` as their nonces, and 0x10 more as their secrets. */
 static inline void open_shake(struct world *w, unsigned who, uint8_t salt,
-                              const struct secure_ends *ends)
-{
+                              const struct secure_ends *ends) {
     struct secure_self self = {&secure_sodium, w->key[who], who == 0, *ends};
     struct secure_seed seed;
     memset(seed.nonce, salt, sizeof seed.nonce);
@@ -80,8 +77,7 @@ static inline void open_shake(struct world *w, unsigned who, uint8_t salt,
 }
 
 /* End 0 calls.  `salt` makes the seeds. */
-static inline struct world *new_world(uint8_t salt, size_t most)
-{
+static inline struct world *new_world(uint8_t salt, size_t most) {
     struct world *w = calloc(1, sizeof *w);
     assert_non_null(w);
     for (unsigned who = 0; who < 2; who++) {
@@ -97,8 +93,7 @@ static inline struct world *new_world(uint8_t salt, size_t most)
     return w;
 }
 
-static inline void shake_hands(struct world *w, int want[2])
-{
+static inline void shake_hands(struct world *w, int want[2]) {
     want[0] = want[1] = 0;
     for (unsigned i = 0; i < 1000; i++) {
         for (unsigned who = 0; who < 2; who++) {
@@ -115,8 +110,7 @@ static inline void shake_hands(struct world *w, int want[2])
     }
 }
 
-static inline struct world *connected(uint8_t salt, size_t most)
-{
+static inline struct world *connected(uint8_t salt, size_t most) {
     int status[2];
     struct world *w = new_world(salt, most);
     shake_hands(w, status);
@@ -126,8 +120,7 @@ static inline struct world *connected(uint8_t salt, size_t most)
 }
 
 /* That these are the bytes, in hexadecimal. */
-static inline void expect_bytes(const uint8_t *bytes, const char *hex)
-{
+static inline void expect_bytes(const uint8_t *bytes, const char *hex) {
     for (size_t i = 0; hex[2 * i] != '\0'; i++) {
         unsigned byte = 0;
         assert_int_equal(sscanf(hex + 2 * i, "%2x", &byte), 1);

@@ -6,8 +6,7 @@
 #include "transport/learn.h"
 
 /* End 1 asks, as one that has only just begun. */
-static void ask(struct pair *p)
-{
+static void ask(struct pair *p) {
     struct learner learner;
     struct link_pipe pipe = host_sim_cube_pipe(&p->cube, 1, 0);
     learner_init(&learner, &pipe, 1);
@@ -16,8 +15,7 @@ static void ask(struct pair *p)
 
 /* Asked ten times a second for a second, end 0 stays in its state and greets
  * each time; asked a hundred times more, it greets 20 times a second. */
-static void stays(struct pair *p, enum link_state state)
-{
+static void stays(struct pair *p, enum link_state state) {
     struct link *link = p->ends[0].link;
     struct link_statistics before = *link_statistics(link);
     struct link_peer peer = *link_peer(link);
@@ -44,8 +42,7 @@ static void stays(struct pair *p, enum link_state state)
     assert_memory_equal(link_peer(link), &peer, sizeof peer);
 }
 
-static struct pair *talking(const struct link_config *config)
-{
+static struct pair *talking(const struct link_config *config) {
     struct pair *p = new_pair(config, &perfect, 5);
     p->ends[0].size_max = p->ends[1].size_max = 300;
     p->ends[0].most = p->ends[1].most = 20;
@@ -56,8 +53,7 @@ static struct pair *talking(const struct link_config *config)
     return p;
 }
 
-static void a_link_that_opens(void **unused)
-{
+static void a_link_that_opens(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
     link_poll(p->ends[0].link, p->now_us);
@@ -66,8 +62,7 @@ static void a_link_that_opens(void **unused)
     free_pair(p);
 }
 
-static void a_link_that_is_up(void **unused)
-{
+static void a_link_that_is_up(void **unused) {
     (void)unused;
     for (unsigned keeps = 0; keeps < 2; keeps++) {
         struct link_config config = small;
@@ -87,8 +82,7 @@ static void a_link_that_is_up(void **unused)
     }
 }
 
-static void a_link_that_refuses(void **unused)
-{
+static void a_link_that_refuses(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.frame_payload = 168;
@@ -103,8 +97,7 @@ static void a_link_that_refuses(void **unused)
 }
 
 /* Its peer has said farewell, and is reset then. */
-static void a_link_that_is_closed(void **unused)
-{
+static void a_link_that_is_closed(void **unused) {
     (void)unused;
     struct pair *p = talking(&small);
     link_close(p->ends[1].link, p->now_us + 1000000);
@@ -121,8 +114,7 @@ static void a_link_that_is_closed(void **unused)
 }
 
 /* This end says farewell, and nobody answers. */
-static void a_link_that_closes(void **unused)
-{
+static void a_link_that_closes(void **unused) {
     (void)unused;
     struct pair *p = talking(&small);
     link_close(p->ends[0].link, p->now_us + 60000000);
@@ -133,8 +125,7 @@ static void a_link_that_closes(void **unused)
 
 /* Nothing comes by a pipe that is closed; what comes when it works again finds
  * a link that greets as ever. */
-static void a_link_that_is_down(void **unused)
-{
+static void a_link_that_is_down(void **unused) {
     (void)unused;
     struct pair *p = talking(&small);
     cut_pair(p, true);
@@ -150,8 +141,7 @@ static void a_link_that_is_down(void **unused)
     free_pair(p);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_link_that_opens),
         cmocka_unit_test(a_link_that_is_up),

@@ -4,8 +4,7 @@
 
 /* --- tests --------------------------------------------------------------- */
 
-static void every_pair_at_once_with_windows_of_one(void **unused)
-{
+static void every_pair_at_once_with_windows_of_one(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct cube_config c = {.window = 1};
@@ -16,8 +15,7 @@ static void every_pair_at_once_with_windows_of_one(void **unused)
     }
 }
 
-static void every_pair_at_once_with_wider_windows(void **unused)
-{
+static void every_pair_at_once_with_wider_windows(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 4; d++) {
         struct cube_config c = {.window = (uint16_t)(2 + 3 * d)};
@@ -29,8 +27,7 @@ static void every_pair_at_once_with_wider_windows(void **unused)
 }
 
 /* A message in four frames, windows of one message. */
-static void every_pair_at_once_in_small_frames(void **unused)
-{
+static void every_pair_at_once_in_small_frames(void **unused) {
     (void)unused;
     for (unsigned d = 1; d <= 4; d++) {
         struct cube_config c = {
@@ -42,8 +39,7 @@ static void every_pair_at_once_in_small_frames(void **unused)
     }
 }
 
-static void every_pair_at_once_on_bad_wires(void **unused)
-{
+static void every_pair_at_once_on_bad_wires(void **unused) {
     struct host_sim_cube_options bad = perfect;
     (void)unused;
     bad.faults.chance[SIM_FLIP] = 1e-5;
@@ -60,8 +56,7 @@ static void every_pair_at_once_on_bad_wires(void **unused)
     }
 }
 
-static void broadcasts_from_everywhere(void **unused)
-{
+static void broadcasts_from_everywhere(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct cube_config c = {.window = 1 + d % 2};
@@ -75,8 +70,7 @@ static void broadcasts_from_everywhere(void **unused)
 
 /* The host is wired to each of the first nodes: no message of it makes a hop in
  * the dimensions in which those differ. */
-static void a_host_with_many_wires(void **unused)
-{
+static void a_host_with_many_wires(void **unused) {
     (void)unused;
     for (unsigned d = 1; d <= 5; d++) {
         for (unsigned wires = 2; wires <= 1u << d && wires <= 8; wires *= 2) {
@@ -91,8 +85,7 @@ static void a_host_with_many_wires(void **unused)
     }
 }
 
-static void a_host_wired_to_all_needs_nobody_between(void **unused)
-{
+static void a_host_wired_to_all_needs_nobody_between(void **unused) {
     struct cube_config c = {.window = 2, .host_ports = 8};
     (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
@@ -130,8 +123,7 @@ static void a_host_wired_to_all_needs_nobody_between(void **unused)
 }
 
 /* Each place stops, or does not read, at random times. */
-static void places_that_stall(void **unused)
-{
+static void places_that_stall(void **unused) {
     (void)unused;
     for (uint64_t seed = 0; seed < 4; seed++) {
         struct cube_config c = {.window = 1};
@@ -158,8 +150,7 @@ static void places_that_stall(void **unused)
 }
 
 /* The host reads a message now and then: all wait, none is lost. */
-static void a_host_that_is_slow(void **unused)
-{
+static void a_host_that_is_slow(void **unused) {
     struct cube_config c = {.window = 2};
     struct cube_message message;
     (void)unused;
@@ -185,8 +176,7 @@ static void a_host_that_is_slow(void **unused)
 
 /* Node 1 does not read what node 0 sent it; messages from 3 to 0 pass through
  * it all the same. */
-static void an_unread_message_holds_its_own_link_alone(void **unused)
-{
+static void an_unread_message_holds_its_own_link_alone(void **unused) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
     unsigned passed = 0;
@@ -218,8 +208,7 @@ static void an_unread_message_holds_its_own_link_alone(void **unused)
 }
 
 /* Node 0 is flooded with messages for the host; its own get through. */
-static void a_flood_does_not_starve_the_node_it_passes(void **unused)
-{
+static void a_flood_does_not_starve_the_node_it_passes(void **unused) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
     unsigned own = 0, others = 0;
@@ -243,8 +232,7 @@ static void a_flood_does_not_starve_the_node_it_passes(void **unused)
 }
 
 /* Nor where its own messages are of four frames, and those that pass of one. */
-static void small_messages_leave_room_for_a_large_one(void **unused)
-{
+static void small_messages_leave_room_for_a_large_one(void **unused) {
     static const uint8_t large[CUBE_PAYLOAD_MAX];
     struct host_sim_cube_options slow = perfect;
     struct cube_config c = {.window = 7, .frame_payload = 408, .staging = 2};
@@ -271,8 +259,7 @@ static void small_messages_leave_room_for_a_large_one(void **unused)
     destroy(m);
 }
 
-static void a_wrong_wire_is_named(void **unused)
-{
+static void a_wrong_wire_is_named(void **unused) {
     struct cube_config c = {.window = 2};
     (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
@@ -317,8 +304,7 @@ static void a_wrong_wire_is_named(void **unused)
     destroy(m);
 }
 
-static void wrong_wires_in_words(void **unused)
-{
+static void wrong_wires_in_words(void **unused) {
     static const struct {
         struct cube_wrong wrong;
         const char *text;
@@ -362,8 +348,7 @@ static void wrong_wires_in_words(void **unused)
                         "the host link 3 is wired to node 2, expected node 3");
 }
 
-static bool starts(const struct cube_config *config)
-{
+static bool starts(const struct cube_config *config) {
     size_t bytes = cube_arena_bytes(config), room = 1 << 21;
     void *arena = aligned_alloc(64, room);
     assert_non_null(arena);
@@ -387,8 +372,7 @@ static bool starts(const struct cube_config *config)
         assert_false(starts(&c_));                                             \
     } while (0)
 
-static void limits_of_a_config(void **unused)
-{
+static void limits_of_a_config(void **unused) {
     struct sim_end nowhere = {NULL, NULL, NULL};
     struct link_pipe pipe = sim_pipe(&nowhere), none = {NULL, NULL, NULL};
     struct cube_config node = {
@@ -436,8 +420,7 @@ static void limits_of_a_config(void **unused)
     assert_true(starts(&node));
 }
 
-static void all_say_farewell(void **unused)
-{
+static void all_say_farewell(void **unused) {
     struct cube_config c = {.window = 2};
     (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
@@ -460,8 +443,7 @@ static void all_say_farewell(void **unused)
     destroy(m);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_pair_at_once_with_windows_of_one),
         cmocka_unit_test(every_pair_at_once_with_wider_windows),

@@ -7,8 +7,7 @@ enum { DEAD_US = 200000 };
 
 static const struct cube_config smallest = {.window = 1, .dead_us = DEAD_US};
 
-static void chatter_for(struct machine *m, unsigned steps)
-{
+static void chatter_for(struct machine *m, unsigned steps) {
     uint64_t counts[2] = {0, 0};
     for (unsigned i = 0; i < steps; i++) {
         m->now_us += 60;
@@ -22,8 +21,7 @@ static void chatter_for(struct machine *m, unsigned steps)
 }
 
 /* Until the host has heard of `dead` dead links more. */
-static void until_reported(struct machine *m, unsigned dead)
-{
+static void until_reported(struct machine *m, unsigned dead) {
     const struct cube_wiring *w = wiring_of(m, m->nodes);
     uint64_t start_us = m->now_us;
     while (w->dead_count < w->settled + dead) {
@@ -38,16 +36,14 @@ static void until_reported(struct machine *m, unsigned dead)
     assert_int_equal(w->dead_count, w->settled + dead);
 }
 
-static void renew(struct machine *m)
-{
+static void renew(struct machine *m) {
     struct cube *host = m->places[m->nodes].cube;
     struct cube_wiring next = *cube_wiring(host);
     cube_renew(host, &next);
     settle(m, next.generation + 1);
 }
 
-static void traffic(struct machine *m, uint32_t each)
-{
+static void traffic(struct machine *m, uint32_t each) {
     count_anew(m);
     m->broadcasts = 1;
     run(m, each, 1000000000);
@@ -58,8 +54,7 @@ static void traffic(struct machine *m, uint32_t each)
     }
 }
 
-static void all_pairs_after_each_single_dead_link(void **unused)
-{
+static void all_pairs_after_each_single_dead_link(void **unused) {
     (void)unused;
     for (unsigned d = 2; d <= 4; d++) {
         for (unsigned i = 0; i < 1u << d; i++) {
@@ -87,8 +82,7 @@ static void all_pairs_after_each_single_dead_link(void **unused)
 }
 
 /* The wires of one node in turn, down to the last. */
-static void links_that_die_one_after_another(void **unused)
-{
+static void links_that_die_one_after_another(void **unused) {
     (void)unused;
     struct machine *m = build(4, &smallest, &perfect, 9);
     settle(m, 1);
@@ -104,8 +98,7 @@ static void links_that_die_one_after_another(void **unused)
 }
 
 /* A wire that takes no byte and brings none, but does not say so. */
-static void a_link_that_falls_silent(void **unused)
-{
+static void a_link_that_falls_silent(void **unused) {
     (void)unused;
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
@@ -119,8 +112,7 @@ static void a_link_that_falls_silent(void **unused)
     destroy(m);
 }
 
-static void a_node_that_dies(void **unused)
-{
+static void a_node_that_dies(void **unused) {
     (void)unused;
     for (unsigned node = 1; node < 8; node++) {
         struct machine *m = build(3, &smallest, &perfect, node);
@@ -151,8 +143,7 @@ static void a_node_that_dies(void **unused)
 
 /* The host's wire to node 0 dies, or node 0 itself: the host goes on by its
  * spare wire. */
-static void the_gateway_is_moved(void **unused)
-{
+static void the_gateway_is_moved(void **unused) {
     (void)unused;
     for (unsigned round = 0; round < 6; round++) {
         struct cube_config c = smallest;
@@ -179,8 +170,7 @@ static void the_gateway_is_moved(void **unused)
 }
 
 /* Its own sleep is nobody's death. */
-static void who_sleeps_does_not_call_others_dead(void **unused)
-{
+static void who_sleeps_does_not_call_others_dead(void **unused) {
     (void)unused;
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
@@ -196,8 +186,7 @@ static void who_sleeps_does_not_call_others_dead(void **unused)
 }
 
 /* As many as are remembered, and more, at random, in larger cubes. */
-static void many_dead_links(void **unused)
-{
+static void many_dead_links(void **unused) {
     (void)unused;
     for (unsigned seed = 0; seed < 3; seed++) {
         struct machine *m = build(seed == 0 ? 5 : 4, &smallest, &perfect, seed);
@@ -221,8 +210,7 @@ static void many_dead_links(void **unused)
 }
 
 /* Nodes start late, in any order: each joins when it does. */
-static void nodes_start_late(void **unused)
-{
+static void nodes_start_late(void **unused) {
     (void)unused;
     for (unsigned seed = 0; seed < 5; seed++) {
         struct machine *m = build(4, &smallest, &perfect, seed);
@@ -244,8 +232,7 @@ static void nodes_start_late(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_pairs_after_each_single_dead_link),
         cmocka_unit_test(links_that_die_one_after_another),

@@ -12,14 +12,12 @@ enum { TYPE = 77, FORGED_BYTES = 4 };
  * destination (one more of those: all). */
 static bool seen[ENDS_MAX][ENDS_MAX][ENDS_MAX + 1];
 
-static uint16_t name_of(const struct machine *m, unsigned place)
-{
+static uint16_t name_of(const struct machine *m, unsigned place) {
     return place == m->nodes ? CUBE_HOST : (uint16_t)place;
 }
 
 /* The node by which the host and that node reach each other. */
-static unsigned port_for(const struct machine *m, unsigned node)
-{
+static unsigned port_for(const struct machine *m, unsigned node) {
     const struct cube *cube = m->places[node].cube;
     bool many = cube->config.host_ports > 1 && !cube->routes.tree;
     return many ? node & (cube->config.host_ports - 1u) : cube->wiring.gateway;
@@ -28,8 +26,7 @@ static unsigned port_for(const struct machine *m, unsigned node)
 /* Whether the way from `from` to `to` leads out of node `by` by that link: hop
  * by hop, as each node sends. */
 static bool leads_over(const struct machine *m, unsigned from, unsigned to,
-                       unsigned by, unsigned link)
-{
+                       unsigned by, unsigned link) {
     unsigned end = to == m->nodes ? port_for(m, from) : to;
     unsigned at = from == m->nodes ? port_for(m, to) : from;
     while (at != end) {
@@ -43,8 +40,7 @@ static bool leads_over(const struct machine *m, unsigned from, unsigned to,
     return to == m->nodes && at == by && link == m->dimension;
 }
 
-static void read_all(struct machine *m)
-{
+static void read_all(struct machine *m) {
     struct cube_message message;
     for (unsigned i = 0; i < m->count; i++) {
         while (!m->places[i].gone && cube_read(m->places[i].cube, &message)) {
@@ -60,8 +56,7 @@ static void read_all(struct machine *m)
 
 /* Node `by` writes to a link, under a number of its choice. */
 static void forge(struct machine *m, unsigned by, unsigned link, unsigned from,
-                  unsigned to)
-{
+                  unsigned to) {
     struct cube *cube = m->places[by].cube;
     uint8_t head[CUBE_HEAD] = {0}, data[FORGED_BYTES];
     bytes_put16(head, to == m->count ? CUBE_ALL : name_of(m, to));
@@ -81,8 +76,7 @@ static void forge(struct machine *m, unsigned by, unsigned link, unsigned from,
 
 /* Whatever it says by a link arrives where the way from its source leads by
  * that link, and nowhere else. */
-static void speak_by(struct machine *m, unsigned by, unsigned link)
-{
+static void speak_by(struct machine *m, unsigned by, unsigned link) {
     memset(seen, 0, sizeof seen);
     for (unsigned from = 0; from < m->count; from++) {
         for (unsigned to = 0; to <= m->count; to++) {
@@ -111,8 +105,7 @@ static void speak_by(struct machine *m, unsigned by, unsigned link)
     }
 }
 
-static void speak(struct machine *m)
-{
+static void speak(struct machine *m) {
     for (unsigned by = 0; by < m->nodes; by++) {
         for (unsigned d = 0;
              !m->places[by].gone && d < cube_links(m->places[by].cube); d++) {
@@ -123,8 +116,7 @@ static void speak(struct machine *m)
     }
 }
 
-static void no_node_speaks_as_another_end(void **unused)
-{
+static void no_node_speaks_as_another_end(void **unused) {
     (void)unused;
     for (unsigned d = 1; d <= 4; d++) {
         struct cube_config c = {.window = 8};
@@ -135,8 +127,7 @@ static void no_node_speaks_as_another_end(void **unused)
     }
 }
 
-static void nor_where_the_host_has_many_wires(void **unused)
-{
+static void nor_where_the_host_has_many_wires(void **unused) {
     (void)unused;
     for (unsigned ports = 2; ports <= 8; ports *= 2) {
         struct cube_config c = {.window = 8, .host_ports = (uint8_t)ports};
@@ -148,8 +139,7 @@ static void nor_where_the_host_has_many_wires(void **unused)
 }
 
 /* A dead wire, a dead node, a gateway that has moved. */
-static void nor_off_the_e_cube_path(void **unused)
-{
+static void nor_off_the_e_cube_path(void **unused) {
     (void)unused;
     for (unsigned round = 0; round < 12; round++) {
         struct cube_config c = {.window = 8,
@@ -182,8 +172,7 @@ static void nor_off_the_e_cube_path(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_node_speaks_as_another_end),
         cmocka_unit_test(nor_where_the_host_has_many_wires),

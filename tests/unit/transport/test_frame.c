@@ -16,8 +16,7 @@ enum { PAYLOAD_MAX = 1616 };
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(void)
-{
+static uint32_t draw(void) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
@@ -25,8 +24,7 @@ static uint32_t draw(void)
 }
 
 /* With many zeros among its bytes. */
-static uint32_t draw_sparse(void)
-{
+static uint32_t draw_sparse(void) {
     uint32_t mask = draw();
     return mask & draw();
 }
@@ -35,8 +33,7 @@ static uint32_t draw_sparse(void)
  */
 
 static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
-                         uint32_t start)
-{
+                         uint32_t start) {
     uint32_t crc = start;
     for (size_t i = 0; i < size; i++) {
         crc ^= p[i];
@@ -47,8 +44,7 @@ static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
     return crc;
 }
 
-static void checks_have_their_published_values(void **unused)
-{
+static void checks_have_their_published_values(void **unused) {
     uint8_t bytes[32];
     (void)unused;
     /* CRC catalogue, "123456789". */
@@ -67,8 +63,7 @@ static void checks_have_their_published_values(void **unused)
     assert_int_equal(frame_crc32c_table(0, bytes, 32), 0x46dd794e);
 }
 
-static void checks_follow_their_definition(void **unused)
-{
+static void checks_follow_their_definition(void **unused) {
     uint8_t bytes[300];
     (void)unused;
     for (unsigned round = 0; round < 2000; round++) {
@@ -89,8 +84,7 @@ static void checks_follow_their_definition(void **unused)
     }
 }
 
-static void zeros_are_found(void **unused)
-{
+static void zeros_are_found(void **unused) {
     uint8_t bytes[80];
     (void)unused;
     for (size_t from = 0; from < 9; from++) {
@@ -111,8 +105,7 @@ static void zeros_are_found(void **unused)
 /* --- encoding ------------------------------------------------------------ */
 
 /* COBS as its authors define it, a byte at a time. */
-static size_t slow_cobs(uint8_t *out, const uint8_t *in, size_t size)
-{
+static size_t slow_cobs(uint8_t *out, const uint8_t *in, size_t size) {
     size_t at = 1, code_at = 0;
     unsigned code = 1;
     for (size_t i = 0; i < size; i++) {
@@ -138,8 +131,7 @@ struct sample {
     size_t size;
 };
 
-static void encode(struct sample *s, size_t size)
-{
+static void encode(struct sample *s, size_t size) {
     s->header = (struct frame_header){.kind = draw() & 15,
                                       .flags = draw() & 15,
                                       .credit = (uint8_t)draw(),
@@ -152,8 +144,7 @@ static void encode(struct sample *s, size_t size)
 }
 
 /* The bytes as PROTOCOL.md gives them, put together anew. */
-static void expect_bytes(const struct sample *s)
-{
+static void expect_bytes(const struct sample *s) {
     uint8_t plain[PAYLOAD_MAX + FRAME_HEADER + FRAME_TRAILER];
     uint8_t want[FRAME_ENCODED(PAYLOAD_MAX)];
     const struct frame_header *h = &s->header;
@@ -187,8 +178,7 @@ static void expect_bytes(const struct sample *s)
  * many, and from a copy without slack. */
 static enum frame_result decode(const uint8_t *encoded, size_t size,
                                 struct frame_header *header,
-                                const struct sample *want)
-{
+                                const struct sample *want) {
     struct frame_reader reader;
     uint8_t *copy = malloc(size + 1);
     assert_non_null(copy);
@@ -215,8 +205,7 @@ static enum frame_result decode(const uint8_t *encoded, size_t size,
     return result;
 }
 
-static void round_trip(struct sample *s, size_t size)
-{
+static void round_trip(struct sample *s, size_t size) {
     struct frame_header header;
     encode(s, size);
     expect_bytes(s);
@@ -229,8 +218,7 @@ static void round_trip(struct sample *s, size_t size)
     assert_int_equal(header.acknowledge, s->header.acknowledge);
 }
 
-static void every_size_and_density_of_zeros(void **unused)
-{
+static void every_size_and_density_of_zeros(void **unused) {
     static struct sample s;
     const unsigned one_in[] = {1, 2, 3, 8, 40, 254, 0};
     (void)unused;
@@ -247,8 +235,7 @@ static void every_size_and_density_of_zeros(void **unused)
 }
 
 /* A single zero at each place around the length of a full run. */
-static void runs_of_253_to_256(void **unused)
-{
+static void runs_of_253_to_256(void **unused) {
     static struct sample s;
     (void)unused;
     for (size_t size = 225; size < 275; size++) {
@@ -267,8 +254,7 @@ static void runs_of_253_to_256(void **unused)
 }
 
 /* Whether the last run but an empty one is full. */
-static bool ends_full(const struct sample *s)
-{
+static bool ends_full(const struct sample *s) {
     size_t at = 0, last = 0;
     while (at + s->encoded[at] < s->size - 1) {
         last = at;
@@ -279,8 +265,7 @@ static bool ends_full(const struct sample *s)
 
 /* A frame that ends with a full run may be closed with the code 1 or without:
  * encoders differ. */
-static void both_ends_of_a_full_run(void **unused)
-{
+static void both_ends_of_a_full_run(void **unused) {
     static struct sample s;
     struct frame_header header;
     unsigned seen = 0;
@@ -302,8 +287,7 @@ static void both_ends_of_a_full_run(void **unused)
 
 /* --- damage -------------------------------------------------------------- */
 
-static void each_wrong_bit_is_found(void **unused)
-{
+static void each_wrong_bit_is_found(void **unused) {
     static struct sample s;
     const size_t sizes[] = {0, 1, 24, 240, 500};
     (void)unused;
@@ -324,8 +308,7 @@ static void each_wrong_bit_is_found(void **unused)
     }
 }
 
-static void lost_and_inserted_bytes_are_found(void **unused)
-{
+static void lost_and_inserted_bytes_are_found(void **unused) {
     static struct sample s;
     uint8_t damaged[FRAME_ENCODED(PAYLOAD_MAX) + 1];
     struct frame_header header;
@@ -351,8 +334,7 @@ static void lost_and_inserted_bytes_are_found(void **unused)
     }
 }
 
-static void garbage_is_no_frame(void **unused)
-{
+static void garbage_is_no_frame(void **unused) {
     uint8_t garbage[700] = {0};
     struct frame_header header;
     unsigned opened = 0;
@@ -370,8 +352,7 @@ static void garbage_is_no_frame(void **unused)
     assert_true(opened < 30);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(checks_have_their_published_values),
         cmocka_unit_test(checks_follow_their_definition),

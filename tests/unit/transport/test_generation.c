@@ -9,8 +9,7 @@ static const uint32_t leaps[] = {0,      0x7fff,  0x8000,  0x8001,
 enum { LEAPS = sizeof leaps / sizeof leaps[0] };
 
 /* The host begins anew while windows are full and nobody reads. */
-static void nothing_of_an_old_generation_is_read(void **unused)
-{
+static void nothing_of_an_old_generation_is_read(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 4; d++) {
         struct cube_config c = {.window = (uint16_t)(d % 2 == 0 ? 1 : 4)};
@@ -42,8 +41,7 @@ static void nothing_of_an_old_generation_is_read(void **unused)
 }
 
 /* On lines that lose every third frame or so. */
-static void datagrams_that_are_lost_are_told_again(void **unused)
-{
+static void datagrams_that_are_lost_are_told_again(void **unused) {
     struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 2};
     (void)unused;
@@ -61,8 +59,7 @@ static void datagrams_that_are_lost_are_told_again(void **unused)
 
 /* Who is told first writes at once; what comes to those who are told later
  * waits until they are. */
-static void nothing_of_the_new_generation_is_lost(void **unused)
-{
+static void nothing_of_the_new_generation_is_lost(void **unused) {
     struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 4};
     uint32_t written = 0, read = 0;
@@ -100,8 +97,7 @@ static void nothing_of_the_new_generation_is_lost(void **unused)
 }
 
 /* State datagrams cost nothing once all agree. */
-static void all_is_quiet_when_all_agree(void **unused)
-{
+static void all_is_quiet_when_all_agree(void **unused) {
     struct cube_config c = {.window = 2};
     uint64_t datagrams[2] = {0, 0};
     (void)unused;
@@ -123,8 +119,7 @@ static void all_is_quiet_when_all_agree(void **unused)
     destroy(m);
 }
 
-static void a_node_that_restarts_is_told(void **unused)
-{
+static void a_node_that_restarts_is_told(void **unused) {
     struct cube_config c = {.window = 2};
     uint8_t byte = 1;
     (void)unused;
@@ -150,8 +145,7 @@ static void a_node_that_restarts_is_told(void **unused)
 /* A host that starts again finds the nodes in generations of its former self,
  * and its own is the later one: at once, or as it outdoes theirs.  After the
  * 3 s in which a node keeps to the host that it has. */
-static void a_host_that_restarts_is_in_charge(void **unused)
-{
+static void a_host_that_restarts_is_in_charge(void **unused) {
     static const uint32_t generations[] = {2,          4,          0xffff,
                                            0x7fffffff, 0x80000001, 0x80000002,
                                            0xfffffffe, 0xffffffff};
@@ -187,8 +181,7 @@ static void a_host_that_restarts_is_in_charge(void **unused)
 
 /* What is unread when a generation begins is no hindrance, however far that is
  * from the last: another host's may be anywhere. */
-static void an_unread_message_outlives_no_leap(void **unused)
-{
+static void an_unread_message_outlives_no_leap(void **unused) {
     struct cube_config c = {.window = 2};
     uint8_t bytes[CUBE_PAYLOAD_MAX] = {0};
     (void)unused;
@@ -215,8 +208,7 @@ static void an_unread_message_outlives_no_leap(void **unused)
 }
 
 /* The message in hand stays until it is released. */
-static void a_message_being_read_outlives_its_generation(void **unused)
-{
+static void a_message_being_read_outlives_its_generation(void **unused) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
     (void)unused;
@@ -237,8 +229,7 @@ static void a_message_being_read_outlives_its_generation(void **unused)
     destroy(m);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nothing_of_an_old_generation_is_read),
         cmocka_unit_test(datagrams_that_are_lost_are_told_again),

@@ -6,8 +6,7 @@
 #include "transport/learn.h"
 
 /* Only the host knows what it is. */
-static void forget(struct machine *m, struct learner *learners)
-{
+static void forget(struct machine *m, struct learner *learners) {
     for (unsigned i = 0; i < m->nodes; i++) {
         struct place *p = &m->places[i];
         bool host_port = i == 0 || p->config.host_port;
@@ -18,8 +17,7 @@ static void forget(struct machine *m, struct learner *learners)
 }
 
 static void learn_all(struct machine *m, struct learner *learners,
-                      unsigned *heard_host)
-{
+                      unsigned *heard_host) {
     struct learned learned;
     unsigned known = 0;
     for (unsigned round = 0; known < m->nodes; round++) {
@@ -42,8 +40,7 @@ static void learn_all(struct machine *m, struct learner *learners,
     }
 }
 
-static void a_cube_learns_from_its_host(void **unused)
-{
+static void a_cube_learns_from_its_host(void **unused) {
     struct learner learners[ENDS_MAX];
     unsigned heard_host = 0;
     (void)unused;
@@ -66,8 +63,7 @@ static void a_cube_learns_from_its_host(void **unused)
     assert_int_equal(heard_host, 1);
 }
 
-static void a_wire_in_another_socket_teaches_nothing(void **unused)
-{
+static void a_wire_in_another_socket_teaches_nothing(void **unused) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
@@ -93,8 +89,7 @@ static void a_wire_in_another_socket_teaches_nothing(void **unused)
 
 /* A node of a cube of 8 hears a node of a cube of 2 on the same link first: it
  * passes that over, and hears its own neighbours. */
-static void a_greeting_to_another_is_passed_over(void **unused)
-{
+static void a_greeting_to_another_is_passed_over(void **unused) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
@@ -123,8 +118,7 @@ static void a_greeting_to_another_is_passed_over(void **unused)
     destroy(m);
 }
 
-static void noise_teaches_nothing(void **unused)
-{
+static void noise_teaches_nothing(void **unused) {
     struct learner learner;
     struct learned learned;
     struct host_sim_cube cube;
@@ -162,8 +156,7 @@ struct nowhere {
     bool is_shut; /* and takes none */
 };
 
-static int lose(void *context, const uint8_t *bytes, size_t size)
-{
+static int lose(void *context, const uint8_t *bytes, size_t size) {
     struct nowhere *n = context;
     if (n->is_shut) {
         return LINK_PIPE_CLOSED;
@@ -176,8 +169,7 @@ static int lose(void *context, const uint8_t *bytes, size_t size)
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): a pipe's signature */
-static int bring_none(void *context, uint8_t *bytes, size_t size)
-{
+static int bring_none(void *context, uint8_t *bytes, size_t size) {
     (void)context, (void)bytes, (void)size;
     return 0;
 }
@@ -185,8 +177,7 @@ static int bring_none(void *context, uint8_t *bytes, size_t size)
 static struct nowhere unused_socket;
 
 /* Node i of the cube on a board with SOCKETS sockets and one for a host. */
-static void sit_down(struct machine *m, unsigned i, struct learner *learner)
-{
+static void sit_down(struct machine *m, unsigned i, struct learner *learner) {
     struct link_pipe pipes[SOCKETS + 1];
     struct place *p = &m->places[i];
     unused_socket.size = 0;
@@ -206,8 +197,7 @@ static void sit_down(struct machine *m, unsigned i, struct learner *learner)
 }
 
 /* One who knows starts, as that one, with that epoch. */
-static void stand_up(struct machine *m, unsigned i, uint32_t epoch)
-{
+static void stand_up(struct machine *m, unsigned i, uint32_t epoch) {
     struct place *p = &m->places[i];
     free(p->arena);
     p->config.epoch = epoch;
@@ -217,8 +207,7 @@ static void stand_up(struct machine *m, unsigned i, uint32_t epoch)
 
 /* Asks until it knows; how long that took. */
 static uint64_t ask_until(struct machine *m, unsigned i,
-                          struct learner *learner, uint64_t most_us)
-{
+                          struct learner *learner, uint64_t most_us) {
     struct learned learned = {.self = UINT16_MAX};
     uint64_t begin_us = m->now_us;
     while (!learner_poll(learner, &learned)) {
@@ -236,8 +225,7 @@ static uint64_t ask_until(struct machine *m, unsigned i,
 
 /* All on boards of four sockets, and the host's wire to node 0 alone, or to a
  * spare node as well. */
-static void boards_of_four_sockets_learn(void **unused)
-{
+static void boards_of_four_sockets_learn(void **unused) {
     struct learner learners[NODES_MAX];
     struct learned learned;
     (void)unused;
@@ -282,8 +270,7 @@ static void boards_of_four_sockets_learn(void **unused)
 }
 
 /* That all links but those of one place never were anything but up. */
-static void check_others(const struct machine *m, unsigned besides)
-{
+static void check_others(const struct machine *m, unsigned besides) {
     for (unsigned i = 0; i < m->count; i++) {
         for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++) {
             unsigned peer = host_sim_cube_port(&m->cube, i, d)->peer;
@@ -299,8 +286,7 @@ static void check_others(const struct machine *m, unsigned besides)
 }
 
 /* Reset, while its neighbours are up: they would never greet again. */
-static void a_node_that_was_reset_asks(void **unused)
-{
+static void a_node_that_was_reset_asks(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < 12; k++) {
         struct cube_config c = {.window = 2};
@@ -340,8 +326,7 @@ static void a_node_that_was_reset_asks(void **unused)
 /* Neighbours that have met different starts of a node, one of which does not
  * answer at first: the largest counts, and who is silent is not waited for for
  * ever. */
-static void the_largest_epoch_counts(void **unused)
-{
+static void the_largest_epoch_counts(void **unused) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     (void)unused;
@@ -382,8 +367,7 @@ static void the_largest_epoch_counts(void **unused)
 }
 
 /* The questions among bytes that went over a wire. */
-static unsigned count_questions(const struct nowhere *n)
-{
+static unsigned count_questions(const struct nowhere *n) {
     unsigned count = 0;
     size_t begin = 0;
     for (size_t i = 0; i < n->size; i++) {
@@ -406,8 +390,7 @@ static unsigned count_questions(const struct nowhere *n)
     return count;
 }
 
-static void questions_are_few_and_whole(void **unused)
-{
+static void questions_are_few_and_whole(void **unused) {
     static struct nowhere wires[4];
     struct link_pipe pipes[4];
     struct learner learner;
@@ -441,8 +424,7 @@ static void questions_are_few_and_whole(void **unused)
 
 /* Questions in the midst of traffic, by all wires: all arrives, and no link is
  * ever anything but up. */
-static void questions_do_no_harm(void **unused)
-{
+static void questions_do_no_harm(void **unused) {
     struct cube_config c = {.window = 3};
     struct learner learner;
     uint64_t stale = 0;
@@ -477,8 +459,7 @@ static void questions_do_no_harm(void **unused)
 
 /* Who has found who it is hears what strangers say, and takes nothing from it;
  * a host at a neighbour's socket, and a neighbour at the host's, are found. */
-static void strangers_are_not_believed(void **unused)
-{
+static void strangers_are_not_believed(void **unused) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
@@ -526,8 +507,7 @@ static void strangers_are_not_believed(void **unused)
     destroy(m);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_cube_learns_from_its_host),
         cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),

@@ -6,8 +6,7 @@
 
 /* --- clean wires --------------------------------------------------------- */
 
-static void messages_of_every_size(void **unused)
-{
+static void messages_of_every_size(void **unused) {
     (void)unused;
     unsigned messages = emulated() ? 400 : 2000;
     for (unsigned window = 1; window <= LINK_WINDOW_MAX; window *= 2) {
@@ -29,8 +28,7 @@ static void messages_of_every_size(void **unused)
     }
 }
 
-static void messages_of_many_frames(void **unused)
-{
+static void messages_of_many_frames(void **unused) {
     (void)unused;
     for (unsigned payload = 32; payload <= 1608; payload += 8) {
         struct link_config c = {.window = (uint16_t)(1607 / payload + 1),
@@ -49,8 +47,7 @@ static void messages_of_many_frames(void **unused)
 }
 
 /* More than twice around all sequence numbers. */
-static void sequence_numbers_wrap(void **unused)
-{
+static void sequence_numbers_wrap(void **unused) {
     struct link_config c = {
         .window = 64, .frame_payload = 32, .message_max = 32};
     (void)unused;
@@ -69,8 +66,7 @@ static void sequence_numbers_wrap(void **unused)
     free_pair(p);
 }
 
-static void a_reader_that_does_not_read_holds_the_writer(void **unused)
-{
+static void a_reader_that_does_not_read_holds_the_writer(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 5);
     p->ends[1].lazy = true;
@@ -92,8 +88,7 @@ static void a_reader_that_does_not_read_holds_the_writer(void **unused)
 }
 
 /* The last window of credits gets lost: the sender asks for it. */
-static void lost_credits_are_asked_for(void **unused)
-{
+static void lost_credits_are_asked_for(void **unused) {
     struct link_config c = {.window = 1};
     (void)unused;
     struct pair *p = new_pair(&c, &perfect, 6);
@@ -117,8 +112,7 @@ static void lost_credits_are_asked_for(void **unused)
 /* --- bad wires ----------------------------------------------------------- */
 
 /* Everything at once, each seed another mix. */
-static void every_kind_of_damage(void **unused)
-{
+static void every_kind_of_damage(void **unused) {
     const double chances[] = {0, 1e-5, 1e-4, 1e-3};
     uint64_t damaged = 0, again = 0, duplicates = 0;
     (void)unused;
@@ -152,8 +146,7 @@ static void every_kind_of_damage(void **unused)
     assert_true(damaged > 5000 && again > 1500 && duplicates > 20);
 }
 
-static void garbage_between_frames(void **unused)
-{
+static void garbage_between_frames(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 9);
     uint64_t random = 99;
@@ -183,8 +176,7 @@ static void garbage_between_frames(void **unused)
 /* --- time ---------------------------------------------------------------- */
 
 /* An end that sleeps until its next due time, or a byte, misses nothing. */
-static void sleeping_until_due_is_enough(void **unused)
-{
+static void sleeping_until_due_is_enough(void **unused) {
     struct host_sim_cube_options bad = perfect;
     (void)unused;
     bad.faults.chance[SIM_DELETE] = 3e-4;
@@ -212,8 +204,7 @@ static void sleeping_until_due_is_enough(void **unused)
 
 /* Share of the wire's rate, both directions at once, in 64 KB transfers. */
 static double share(double baud, double bit_error, uint32_t step_us,
-                    size_t *bytes)
-{
+                    size_t *bytes) {
     struct host_sim_cube_options q = {
         .wire = {(uint32_t)(baud / 10), 1000, 512, PAIR_BYTES},
         .faults = {.chance = {[SIM_FLIP] = bit_error}}};
@@ -229,8 +220,7 @@ static double share(double baud, double bit_error, uint32_t step_us,
     return ideal / took;
 }
 
-static void throughput_on_serial_wires(void **unused)
-{
+static void throughput_on_serial_wires(void **unused) {
     const double bauds[] = {115200, 921600, 3000000};
     (void)unused;
     for (unsigned i = 0; i < 3; i++) {
@@ -249,8 +239,7 @@ static void throughput_on_serial_wires(void **unused)
 
 /* --- limits -------------------------------------------------------------- */
 
-static bool starts(const struct link_config *config)
-{
+static bool starts(const struct link_config *config) {
     size_t bytes = link_bytes(config), room = 1 << 20;
     void *memory = aligned_alloc(64, room);
     assert_non_null(memory);
@@ -274,8 +263,7 @@ static bool starts(const struct link_config *config)
         assert_false(starts(&c_));                                             \
     } while (0)
 
-static void limits_of_a_config(void **unused)
-{
+static void limits_of_a_config(void **unused) {
     struct sim_end nowhere = {NULL, NULL, NULL};
     struct link_config c = {
         .pipe = sim_pipe(&nowhere), .epoch = 1, .window = 4};
@@ -297,8 +285,7 @@ static void limits_of_a_config(void **unused)
     limit(c, timeout_max_us, 100000, 99999);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(messages_of_every_size),
         cmocka_unit_test(messages_of_many_frames),

@@ -40,14 +40,12 @@ struct world {
     uint32_t struck[KINDS];
 };
 
-static uint32_t draw(struct world *w)
-{
+static uint32_t draw(struct world *w) {
     return (uint32_t)(sim_draw(&w->random) >> 32);
 }
 
 /* A start of the end: another life, another epoch. */
-static void start(struct world *w, unsigned who)
-{
+static void start(struct world *w, unsigned who) {
     struct end *end = &w->ends[who];
     end->life++;
     end->number = 0;
@@ -62,8 +60,7 @@ static void start(struct world *w, unsigned who)
     assert_non_null(end->link);
 }
 
-static void begin(struct world *w, uint64_t seed)
-{
+static void begin(struct world *w, uint64_t seed) {
     memset(w, 0, sizeof *w);
     w->seed = seed;
     w->random = seed * 7919 + 1;
@@ -89,8 +86,7 @@ static void begin(struct world *w, uint64_t seed)
     }
 }
 
-static void expect(const struct world *w, bool right, const char *what)
-{
+static void expect(const struct world *w, bool right, const char *what) {
     if (!right) {
         fail_msg("seed %llu, %llu us: %s", (unsigned long long)w->seed,
                  (unsigned long long)w->now_us, what);
@@ -98,8 +94,7 @@ static void expect(const struct world *w, bool right, const char *what)
 }
 
 /* Life and number, then bytes that follow from them. */
-static size_t content(uint8_t *bytes, uint32_t life, uint32_t number)
-{
+static size_t content(uint8_t *bytes, uint32_t life, uint32_t number) {
     size_t size = HEAD + (number * 2654435761u >> 8) % (MESSAGE_MAX - HEAD + 1);
     memcpy(bytes, &life, 4);
     memcpy(bytes + 4, &number, 4);
@@ -110,8 +105,7 @@ static size_t content(uint8_t *bytes, uint32_t life, uint32_t number)
 }
 
 static void take(struct world *w, struct end *end,
-                 const struct link_message *message)
-{
+                 const struct link_message *message) {
     uint8_t want[MESSAGE_MAX];
     uint32_t life, number;
     expect(w, message->size >= HEAD, "a message of the right size");
@@ -132,8 +126,7 @@ static void take(struct world *w, struct end *end,
     end->count++;
 }
 
-static void step(struct world *w, uint32_t us, bool writing)
-{
+static void step(struct world *w, uint32_t us, bool writing) {
     uint8_t bytes[MESSAGE_MAX];
     struct link_message message;
     w->now_us += us;
@@ -159,16 +152,14 @@ static void step(struct world *w, uint32_t us, bool writing)
 }
 
 /* NULL: no more faults of chance. */
-static void befall(struct world *w, const struct sim_faults *faults)
-{
+static void befall(struct world *w, const struct sim_faults *faults) {
     for (unsigned i = 0; i < 2; i++) {
         sim_direction_faults(&w->wire.direction[i], faults);
         sim_direction_deaf(&w->wire.direction[i], false);
     }
 }
 
-static void spoil(struct world *w)
-{
+static void spoil(struct world *w) {
     const double chances[] = {0, 1e-5, 1e-4, 1e-3, 1e-2};
     struct sim_faults bad = {.stall_us = 0};
     bad.chance[SIM_FLIP] = chances[draw(w) % 5] / 8;
@@ -178,8 +169,7 @@ static void spoil(struct world *w)
     befall(w, &bad);
 }
 
-static void strike(struct world *w)
-{
+static void strike(struct world *w) {
     unsigned kind = draw(w) % 400;
     struct sim_direction *direction = &w->wire.direction[draw(w) % 2];
     if (kind < KINDS) {
@@ -219,8 +209,7 @@ static void strike(struct world *w)
 }
 
 /* The faults are over: both directions must carry messages again. */
-static void recover(struct world *w, uint32_t step_us)
-{
+static void recover(struct world *w, uint32_t step_us) {
     struct end *a = &w->ends[0], *b = &w->ends[1];
     befall(w, NULL);
     sim_wire_cut(&w->wire, false);
@@ -237,8 +226,7 @@ static void recover(struct world *w, uint32_t step_us)
     }
 }
 
-static void everything_at_once_then_quiet(void **unused)
-{
+static void everything_at_once_then_quiet(void **unused) {
     static struct world w;
     uint32_t struck[KINDS] = {0};
     (void)unused;
@@ -261,8 +249,7 @@ static void everything_at_once_then_quiet(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(everything_at_once_then_quiet),
     };

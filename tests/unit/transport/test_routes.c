@@ -24,22 +24,19 @@ struct cut_cube {
     unsigned path_max, altered_max;
 };
 
-static uint32_t draw(struct cut_cube *c)
-{
+static uint32_t draw(struct cut_cube *c) {
     c->random ^= c->random << 13;
     c->random ^= c->random >> 7;
     c->random ^= c->random << 17;
     return (uint32_t)(c->random >> 32);
 }
 
-static bool live(const struct cut_cube *c, unsigned node, unsigned d)
-{
+static bool live(const struct cut_cube *c, unsigned node, unsigned d) {
     return !wiring_is_dead(&c->wiring, c->wiring.settled, node, d,
                            c->dimension);
 }
 
-static void search(struct cut_cube *c)
-{
+static void search(struct cut_cube *c) {
     unsigned queue[NODES_MAX], first = 0, end = 0;
     memset(c->linked, 0, sizeof c->linked);
     queue[end++] = c->wiring.gateway;
@@ -56,8 +53,8 @@ static void search(struct cut_cube *c)
     }
 }
 
-static void open_cube(struct cut_cube *c, unsigned dimension, unsigned gateway)
-{
+static void open_cube(struct cut_cube *c, unsigned dimension,
+                      unsigned gateway) {
     memset(c, 0, sizeof *c);
     c->dimension = dimension;
     c->nodes = 1u << dimension;
@@ -68,22 +65,19 @@ static void open_cube(struct cut_cube *c, unsigned dimension, unsigned gateway)
     routes_init(&c->routes, c->memory, dimension);
 }
 
-static void cut(struct cut_cube *c, unsigned node, unsigned dimension)
-{
+static void cut(struct cut_cube *c, unsigned node, unsigned dimension) {
     struct cube_dead dead = {(uint16_t)node, (uint8_t)dimension};
     (void)wiring_add_dead(&c->wiring, dead, c->dimension);
     wiring_settle(&c->wiring, c->dimension);
 }
 
-static void mend(struct cut_cube *c)
-{
+static void mend(struct cut_cube *c) {
     c->wiring.settled = c->wiring.dead_count = 0;
 }
 
 /* Up the tree and then down, never up again: `up` and `down` are what one sees
  * of the direction on the way. */
-static unsigned walk(const struct cut_cube *c, unsigned from, unsigned to)
-{
+static unsigned walk(const struct cut_cube *c, unsigned from, unsigned to) {
     unsigned node = from, steps = 0;
     bool down = false;
     while (node != to) {
@@ -103,8 +97,7 @@ static unsigned walk(const struct cut_cube *c, unsigned from, unsigned to)
     return steps;
 }
 
-static void check_to_all(struct cut_cube *c, unsigned root)
-{
+static void check_to_all(struct cut_cube *c, unsigned root) {
     static unsigned queue[NODES_MAX], from[NODES_MAX];
     unsigned first = 0, end = 0;
     unsigned copies[NODES_MAX] = {0};
@@ -128,8 +121,7 @@ static void check_to_all(struct cut_cube *c, unsigned root)
 }
 
 /* All pairs, or as many as `pairs` drawn. */
-static void check(struct cut_cube *c, unsigned pairs)
-{
+static void check(struct cut_cube *c, unsigned pairs) {
     unsigned all = c->nodes * c->nodes;
     routes_find(&c->routes, &c->wiring);
     search(c);
@@ -160,8 +152,7 @@ static void check(struct cut_cube *c, unsigned pairs)
     check_to_all(c, c->wiring.gateway);
 }
 
-static void while_nothing_is_dead_e_cube(void **unused)
-{
+static void while_nothing_is_dead_e_cube(void **unused) {
     struct cut_cube c;
     (void)unused;
     open_cube(&c, 6, 0);
@@ -183,8 +174,7 @@ static void while_nothing_is_dead_e_cube(void **unused)
     free(c.memory);
 }
 
-static void each_single_dead_link_and_node(void **unused)
-{
+static void each_single_dead_link_and_node(void **unused) {
     struct cut_cube c;
     (void)unused;
     for (unsigned dimension = 1; dimension <= 6; dimension++) {
@@ -211,8 +201,7 @@ static void each_single_dead_link_and_node(void **unused)
     }
 }
 
-static void random_sets_of_dead_links_and_nodes(void **unused)
-{
+static void random_sets_of_dead_links_and_nodes(void **unused) {
     struct cut_cube c;
     (void)unused;
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
@@ -239,8 +228,7 @@ static void random_sets_of_dead_links_and_nodes(void **unused)
 }
 
 /* The nodes with the largest subtrees are dead: no set alters more parents. */
-static void the_table_holds_the_worst(void **unused)
-{
+static void the_table_holds_the_worst(void **unused) {
     struct cut_cube c;
     (void)unused;
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
@@ -260,8 +248,7 @@ static void the_table_holds_the_worst(void **unused)
     assert_true(routes_bytes(CUBE_DIMENSION_MAX) <= 2048);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(while_nothing_is_dead_e_cube),
         cmocka_unit_test(each_single_dead_link_and_node),

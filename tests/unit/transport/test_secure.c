@@ -3,8 +3,7 @@
 #include "secure_world.h"
 
 static int send_all(struct world *w, unsigned who, const uint8_t *bytes,
-                    size_t size)
-{
+                    size_t size) {
     struct link_pipe p = secure_records_pipe(&w->records[who]);
     size_t done = 0;
     for (unsigned i = 0; i < 100000 && done < size; i++) {
@@ -24,8 +23,7 @@ static int send_all(struct world *w, unsigned who, const uint8_t *bytes,
 
 /* Bytes until none come, or LINK_PIPE_CLOSED. */
 static int receive_all(struct world *w, unsigned who, uint8_t *bytes,
-                       size_t size)
-{
+                       size_t size) {
     struct link_pipe p = secure_records_pipe(&w->records[who]);
     size_t done = 0;
     for (unsigned idle = 0; idle < 4000;) {
@@ -39,8 +37,7 @@ static int receive_all(struct world *w, unsigned who, uint8_t *bytes,
     return (int)done;
 }
 
-static void what_is_said_arrives(void **unused)
-{
+static void what_is_said_arrives(void **unused) {
     static uint8_t said[20000], heard[20001];
     static const size_t mosts[] = {0, 1, 7, 100};
     (void)unused;
@@ -65,8 +62,7 @@ static void what_is_said_arrives(void **unused)
 
 /* A pipe that has room is given all: what it does not take, the link holds back
  * until it hears of room. */
-static void all_that_fits_is_taken(void **unused)
-{
+static void all_that_fits_is_taken(void **unused) {
     static uint8_t said[3 * SECURE_RECORD_MAX], heard[sizeof said];
     struct world *w = connected(2, 0);
     struct link_pipe p = secure_records_pipe(&w->records[0]);
@@ -79,8 +75,7 @@ static void all_that_fits_is_taken(void **unused)
 }
 
 /* What is heard of three records, the first of which was lost. */
-static void expect_two(struct world *w, const uint8_t *said, int size)
-{
+static void expect_two(struct world *w, const uint8_t *said, int size) {
     uint8_t heard[256];
     assert_int_equal(receive_all(w, 1, heard, sizeof heard), 1 + 2 * size);
     assert_int_equal(heard[0], 0);
@@ -90,8 +85,7 @@ static void expect_two(struct world *w, const uint8_t *said, int size)
 }
 
 /* Each byte of a record changed, or cut out, or twice there. */
-static void a_changed_byte_loses_a_record(void **unused)
-{
+static void a_changed_byte_loses_a_record(void **unused) {
     uint8_t said[40] = "forty bytes that nobody may change";
     enum { RECORD = SECURE_HEAD_BYTES + sizeof said + 16 };
     (void)unused;
@@ -123,8 +117,7 @@ static void a_changed_byte_loses_a_record(void **unused)
 }
 
 /* What is missing of a record is not waited for where another one begins. */
-static void a_record_cut_short_holds_up_none(void **unused)
-{
+static void a_record_cut_short_holds_up_none(void **unused) {
     static uint8_t said[2000], heard[64];
     (void)unused;
     for (size_t left = 1; left < sizeof said; left += 99) {
@@ -142,8 +135,7 @@ static void a_record_cut_short_holds_up_none(void **unused)
 
 /* The record again, the next one first, one's own back, an earlier connection's
  * whole side. */
-static void a_repeated_record_is_not_heard(void **unused)
-{
+static void a_repeated_record_is_not_heard(void **unused) {
     static uint8_t kept[ROOM];
     uint8_t said[16] = "once", heard[64];
     (void)unused;
@@ -200,14 +192,12 @@ static void a_repeated_record_is_not_heard(void **unused)
     free(w);
 }
 
-static uint8_t draw(uint32_t *random)
-{
+static uint8_t draw(uint32_t *random) {
     *random = *random * 1664525u + 1013904223u;
     return (uint8_t)(*random >> 24);
 }
 
-static void noise_is_passed_over(void **unused)
-{
+static void noise_is_passed_over(void **unused) {
     uint32_t random = 1;
     uint8_t said[8] = "silence", heard[64];
     (void)unused;
@@ -234,8 +224,7 @@ static void noise_is_passed_over(void **unused)
 
 /* Noise without end, and heads of records that are none: the work is bounded,
  * and then the connection is over. */
-static void noise_without_end_ends_it(void **unused)
-{
+static void noise_without_end_ends_it(void **unused) {
     static const uint8_t heads[SECURE_HEAD_BYTES] = {0, 8, 0xff, 0xf7, 9};
     uint8_t byte;
     (void)unused;
@@ -269,8 +258,7 @@ static void noise_without_end_ends_it(void **unused)
 }
 
 /* A record of some number, free of zeros: how long it is. */
-static size_t make_record(uint8_t *bytes, unsigned number)
-{
+static size_t make_record(uint8_t *bytes, unsigned number) {
     size_t size = 4 + number * 37 % 900;
     for (size_t i = 0; i < size; i++) {
         bytes[i] = (uint8_t)(1 + (number * 7 + i) % 255);
@@ -281,8 +269,7 @@ static size_t make_record(uint8_t *bytes, unsigned number)
 
 /* Bytes that are damaged by chance: whole records are heard and no others, in
  * order, with a zero for each gap, and when it is over nothing is missing. */
-static void damage_costs_what_it_touches(void **unused)
-{
+static void damage_costs_what_it_touches(void **unused) {
     enum { RECORDS = 200, CLEAN = 8 };
     static uint8_t said[1024], heard[1 << 18];
     (void)unused;
@@ -343,8 +330,7 @@ static void damage_costs_what_it_touches(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_said_arrives),
         cmocka_unit_test(all_that_fits_is_taken),

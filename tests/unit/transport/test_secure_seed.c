@@ -5,14 +5,12 @@
 
 static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key";
 
-static int by_bytes(const void *a, const void *b)
-{
+static int by_bytes(const void *a, const void *b) {
     return memcmp(a, b, SECURE_NONCE_BYTES);
 }
 
 /* Of 10 devices, the first 20 draws of each of 20 starts. */
-static void no_seed_comes_twice(void **unused)
-{
+static void no_seed_comes_twice(void **unused) {
     enum { DEVICES = 10, STARTS = 20, DRAWS = 20 };
     enum { SEEDS = DEVICES * STARTS * DRAWS };
     static uint8_t parts[2 * SEEDS][SECURE_NONCE_BYTES];
@@ -40,8 +38,7 @@ static void no_seed_comes_twice(void **unused)
 }
 
 /* Every part of what a seed is made of makes another, to the last byte. */
-static void every_byte_of_the_source_counts(void **unused)
-{
+static void every_byte_of_the_source_counts(void **unused) {
     struct secure_source source = {.boot = 1};
     struct secure_seed first, other;
     uint8_t other_key[SECURE_KEY_BYTES];
@@ -69,14 +66,12 @@ static void every_byte_of_the_source_counts(void **unused)
     assert_memory_not_equal(&first, &other, sizeof first);
 }
 
-static bool constant_bytes(void *context, uint8_t *bytes, size_t size)
-{
+static bool constant_bytes(void *context, uint8_t *bytes, size_t size) {
     memset(bytes, *(const uint8_t *)context, size);
     return *(const uint8_t *)context != 0;
 }
 
-static void random_bytes_count_and_may_fail(void **unused)
-{
+static void random_bytes_count_and_may_fail(void **unused) {
     static const struct secure_seed none;
     struct secure_seed first, other;
     uint8_t byte = 1;
@@ -98,8 +93,7 @@ static void random_bytes_count_and_may_fail(void **unused)
 }
 
 /* The vector of PROTOCOL.md. */
-static void the_vector(void **unused)
-{
+static void the_vector(void **unused) {
     struct secure_source source = {.device = "board 17", .boot = 3};
     struct secure_seed seed;
     uint8_t counted[SECURE_KEY_BYTES];
@@ -114,8 +108,7 @@ static void the_vector(void **unused)
                               "bf6357611d7cc7e8a16a6f8ca5b45702");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_seed_comes_twice),
         cmocka_unit_test(every_byte_of_the_source_counts),

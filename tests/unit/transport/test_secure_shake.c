@@ -3,8 +3,7 @@
  * PROTOCOL.md holds. */
 #include "secure_world.h"
 
-static void another_key_is_refused(void **unused)
-{
+static void another_key_is_refused(void **unused) {
     (void)unused;
     for (unsigned bit = 0; bit < 256; bit += 17) {
         int status[2];
@@ -21,8 +20,7 @@ static void another_key_is_refused(void **unused)
 }
 
 /* What else may be at the other end, and how it is told. */
-static void what_is_no_greeting_is_told(void **unused)
-{
+static void what_is_no_greeting_is_told(void **unused) {
     static const uint8_t link[] = {
         3, 1, 8, 1,    1, 1,    3, 0x44, 0x33, 1,    2,    0x18, 6,    2, 0x23,
         1, 2, 5, 2,    1, 7,    2, 4,    0x44, 0x33, 0x22, 0x11, 1,    1, 1,
@@ -54,8 +52,7 @@ static void what_is_no_greeting_is_told(void **unused)
 
 /* Each of the two says which wire it takes this for, and the other hears it:
  * one that somebody has joined to another is found. */
-static void a_wire_that_leads_elsewhere_is_told(void **unused)
-{
+static void a_wire_that_leads_elsewhere_is_told(void **unused) {
     static const struct {
         struct secure_ends caller;
         bool misled;
@@ -95,16 +92,14 @@ static unsigned multiplied;
 
 static void counted_x25519(uint8_t out[SECURE_KEY_BYTES],
                            const uint8_t secret[SECURE_KEY_BYTES],
-                           const uint8_t point[SECURE_KEY_BYTES])
-{
+                           const uint8_t point[SECURE_KEY_BYTES]) {
     multiplied++;
     secure_sodium.x25519(out, secret, point);
 }
 
 /* Points of a small order, which leave no secret, said by one who has the key;
  * and a listener multiplies for no stranger. */
-static void a_point_without_a_secret_is_refused(void **unused)
-{
+static void a_point_without_a_secret_is_refused(void **unused) {
     static const uint8_t points[][SECURE_KEY_BYTES] = {
         {0}, {1}, {0xe0, 0xeb, 0x7a, 0x7c, 0x3b, 0x41, 0xb8, 0xae,
                    0x16, 0x56, 0xe3, 0xfa, 0xf1, 0x9f, 0xc4, 0x6a,
@@ -138,8 +133,7 @@ static void a_point_without_a_secret_is_refused(void **unused)
 
 /* Whose key is known later: the records' keys need the exchange as well; and
  * who can undo that needs the key. */
-static void keys_need_the_key_and_the_exchange(void **unused)
-{
+static void keys_need_the_key_and_the_exchange(void **unused) {
     static const uint8_t zero[SECURE_KEY_BYTES];
     struct secure_keys keys[3];
     (void)unused;
@@ -173,8 +167,7 @@ static void keys_need_the_key_and_the_exchange(void **unused)
 }
 
 /* Each byte of it in turn. */
-static void a_changed_opening_is_refused(void **unused)
-{
+static void a_changed_opening_is_refused(void **unused) {
     (void)unused;
     for (size_t at = 0; at < SECURE_OPENING_BYTES; at++) {
         int status[2] = {0, 0};
@@ -197,8 +190,7 @@ static void a_changed_opening_is_refused(void **unused)
 }
 
 /* The vector of PROTOCOL.md. */
-static void the_vector(void **unused)
-{
+static void the_vector(void **unused) {
     struct world *w = connected(0xa0, 0);
     struct link_pipe p = secure_records_pipe(&w->records[0]);
     (void)unused;
@@ -227,8 +219,7 @@ static void the_vector(void **unused)
     free(w);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(another_key_is_refused),
         cmocka_unit_test(what_is_no_greeting_is_told),

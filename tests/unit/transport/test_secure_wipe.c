@@ -12,23 +12,20 @@ enum { SECRET_BYTES = 64 };
 
 static uint8_t secret[SECRET_BYTES];
 
-static void use_and_leave(void)
-{
+static void use_and_leave(void) {
     uint8_t copy[SECRET_BYTES];
     memcpy(copy, secret, sizeof copy);
     __asm__ volatile("" : : "r"(copy) : "memory"); /* it is used */
 }
 
-static void use_and_wipe(void)
-{
+static void use_and_wipe(void) {
     uint8_t copy[SECRET_BYTES];
     memcpy(copy, secret, sizeof copy);
     __asm__ volatile("" : : "r"(copy) : "memory");
     secure_wipe(copy, sizeof copy);
 }
 
-static void a_wipe_stays(void **unused)
-{
+static void a_wipe_stays(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < SECRET_BYTES; i++) {
         secret[i] = (uint8_t)(0x81 + 3 * i);
@@ -49,8 +46,7 @@ static unsigned turns;
 static uint8_t found[FOUND_MAX][SECURE_KEY_BYTES]; /* secrets that were made */
 static unsigned found_count;
 
-static void keep(const uint8_t made[SECURE_KEY_BYTES])
-{
+static void keep(const uint8_t made[SECURE_KEY_BYTES]) {
     assert_true(found_count < FOUND_MAX);
     memcpy(found[found_count++], made, SECURE_KEY_BYTES);
 }
@@ -58,8 +54,7 @@ static void keep(const uint8_t made[SECURE_KEY_BYTES])
 /* A suite that leaves nothing on the stack: what is there is the layer's. */
 static void toy_hash(uint8_t out[SECURE_KEY_BYTES],
                      const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
-                     size_t size)
-{
+                     size_t size) {
     for (size_t i = 0; i < SECURE_KEY_BYTES; i++) {
         out[i] = (uint8_t)(key[i] * 7u + in[i % size] * 11u + 5 * i + size);
     }
@@ -70,8 +65,7 @@ static void toy_hash(uint8_t out[SECURE_KEY_BYTES],
 
 static void toy_x25519(uint8_t out[SECURE_KEY_BYTES],
                        const uint8_t mine[SECURE_KEY_BYTES],
-                       const uint8_t point[SECURE_KEY_BYTES])
-{
+                       const uint8_t point[SECURE_KEY_BYTES]) {
     for (size_t i = 0; i < SECURE_KEY_BYTES; i++) {
         out[i] = (uint8_t)(mine[i] + point[i] + i);
     }
@@ -82,16 +76,14 @@ static void toy_x25519(uint8_t out[SECURE_KEY_BYTES],
 
 static void toy_seal(uint8_t *out, const uint8_t *in, size_t size,
                      const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
-                     const uint8_t key[SECURE_KEY_BYTES])
-{
+                     const uint8_t key[SECURE_KEY_BYTES]) {
     (void)in, (void)ad, (void)key;
     memset(out, (int)(counter + 1), size + SECURE_TAG_BYTES);
 }
 
 static bool toy_open(uint8_t *out, const uint8_t *in, size_t size,
                      const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
-                     const uint8_t key[SECURE_KEY_BYTES])
-{
+                     const uint8_t key[SECURE_KEY_BYTES]) {
     (void)ad, (void)key;
     memmove(out, in, size);
     return in[size] == counter + 1;
@@ -100,8 +92,7 @@ static bool toy_open(uint8_t *out, const uint8_t *in, size_t size,
 static const struct secure_suite toy = {toy_hash, toy_x25519, toy_seal,
                                         toy_open};
 
-static void take_turn(void)
-{
+static void take_turn(void) {
     unsigned who = turns % 2;
     int status = secure_shake(&world->shake[who], &world->pipes[who]);
     assert_int_equal(status, turns / 2);
@@ -109,8 +100,7 @@ static void take_turn(void)
 }
 
 /* Turns of both until both are proven; none of them leaves a secret behind. */
-static void shake_on_stack(const struct secure_suite *suite, bool looks)
-{
+static void shake_on_stack(const struct secure_suite *suite, bool looks) {
     for (turns = 0; turns < 4;) {
         world->shake[turns % 2].self.suite = suite;
         run_on_stack(take_turn);
@@ -120,8 +110,7 @@ static void shake_on_stack(const struct secure_suite *suite, bool looks)
     }
 }
 
-static struct world *same_world(const struct secure_suite *suite)
-{
+static struct world *same_world(const struct secure_suite *suite) {
     static const uint8_t seed[2] = {0x30, 0x31};
     struct world *w = new_world(seed[0], 0);
     for (unsigned who = 0; who < 2; who++) {
@@ -136,8 +125,7 @@ static struct world *same_world(const struct secure_suite *suite)
 }
 
 /* All that a connection's keys are made of, and they. */
-static void no_turn_leaves_a_secret(void **unused)
-{
+static void no_turn_leaves_a_secret(void **unused) {
     (void)unused;
     /* Once before, as a library's function that is called for the first time
      * is looked for, and all registers are saved on the stack. */
@@ -168,8 +156,7 @@ static void no_turn_leaves_a_secret(void **unused)
 }
 
 /* In the structs, as soon as they are not needed. */
-static void a_connection_that_ends_leaves_no_keys(void **unused)
-{
+static void a_connection_that_ends_leaves_no_keys(void **unused) {
     uint8_t said[40] = "what is secret while it is not said";
     struct world *w = same_world(&secure_sodium);
     int status[2];
@@ -207,8 +194,7 @@ static void a_connection_that_ends_leaves_no_keys(void **unused)
 }
 
 /* One that fails, and one that is given up, too. */
-static void a_shake_that_ends_leaves_none(void **unused)
-{
+static void a_shake_that_ends_leaves_none(void **unused) {
     static const uint8_t noise[SECURE_GREETING_BYTES] = "noise";
     (void)unused;
     for (unsigned given_up = 0; given_up < 2; given_up++) {
@@ -227,8 +213,7 @@ static void a_shake_that_ends_leaves_none(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_wipe_stays),
         cmocka_unit_test(no_turn_leaves_a_secret),

@@ -4,8 +4,7 @@
 
 /* --- peers that come, go and come again ---------------------------------- */
 
-static void a_cut_wire_goes_on_where_it_was(void **unused)
-{
+static void a_cut_wire_goes_on_where_it_was(void **unused) {
     (void)unused;
     for (uint64_t seed = 0; seed < 20; seed++) {
         struct pair *p = new_pair(&small, &perfect, seed);
@@ -33,8 +32,7 @@ static void a_cut_wire_goes_on_where_it_was(void **unused)
     }
 }
 
-static void a_peer_that_stops_for_long_is_called_silent(void **unused)
-{
+static void a_peer_that_stops_for_long_is_called_silent(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 2);
     for (unsigned i = 0; i < 200; i++) {
@@ -54,8 +52,8 @@ static void a_peer_that_stops_for_long_is_called_silent(void **unused)
 
 /* End 1 starts again; the other must notice and begin a session without
  * anything of the old one. */
-static void restart(struct pair *p, uint32_t epoch, struct link_statistics *sum)
-{
+static void restart(struct pair *p, uint32_t epoch,
+                    struct link_statistics *sum) {
     struct end *peer = &p->ends[0], *reborn = &p->ends[1];
     uint64_t sessions = link_statistics(peer->link)->sessions;
     start(p, 1, epoch);
@@ -87,8 +85,7 @@ static void restart(struct pair *p, uint32_t epoch, struct link_statistics *sum)
     reborn->most = UINT32_MAX;
 }
 
-static void a_restarted_peer_is_noticed(void **unused)
-{
+static void a_restarted_peer_is_noticed(void **unused) {
     struct host_sim_cube_options bad = perfect;
     (void)unused;
     bad.wire.latency_us = 3000;
@@ -110,8 +107,7 @@ static void a_restarted_peer_is_noticed(void **unused)
     }
 }
 
-static void greet_only(struct pair *p)
-{
+static void greet_only(struct pair *p) {
     for (unsigned i = 0; i < 50; i++) {
         p->now_us += 10000;
         for (unsigned who = 0; who < 2; who++) {
@@ -121,8 +117,7 @@ static void greet_only(struct pair *p)
 }
 
 /* One end keeps to its peer, and both are up. */
-static struct pair *new_loyal_pair(void)
-{
+static struct pair *new_loyal_pair(void) {
     struct link_config loyal = small;
     loyal.keeps_peer = true;
     struct pair *p = new_pair(&small, &perfect, 3);
@@ -133,8 +128,7 @@ static struct pair *new_loyal_pair(void)
 }
 
 /* Three ends: a third one in the place of the second. */
-static void an_end_may_keep_to_its_peer(void **unused)
-{
+static void an_end_may_keep_to_its_peer(void **unused) {
     (void)unused;
     struct pair *p = new_loyal_pair();
     struct end other = p->ends[1];
@@ -176,8 +170,7 @@ static void an_end_may_keep_to_its_peer(void **unused)
 
 /* One that was told so does not slip in when that end starts again: whom it
  * kept to has time to come back. */
-static void who_is_sent_away_waits_for_the_other(void **unused)
-{
+static void who_is_sent_away_waits_for_the_other(void **unused) {
     (void)unused;
     struct pair *p = new_loyal_pair();
     struct end first = p->ends[1];
@@ -201,8 +194,7 @@ static void who_is_sent_away_waits_for_the_other(void **unused)
     free_pair(p);
 }
 
-static void a_wrong_wire_is_named(void **unused)
-{
+static void a_wrong_wire_is_named(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.node = 99;
@@ -224,8 +216,7 @@ static void a_wrong_wire_is_named(void **unused)
     free_pair(p);
 }
 
-static void sizes_that_do_not_fit_are_refused(void **unused)
-{
+static void sizes_that_do_not_fit_are_refused(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.frame_payload = 168;
@@ -237,8 +228,7 @@ static void sizes_that_do_not_fit_are_refused(void **unused)
 }
 
 /* Its own bytes come back: the plug is in both sockets of one port. */
-static void a_wire_to_itself_is_refused(void **unused)
-{
+static void a_wire_to_itself_is_refused(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 1);
     struct sim_end *end = host_sim_cube_port(&p->cube, 0, 0)->end;
@@ -249,8 +239,7 @@ static void a_wire_to_itself_is_refused(void **unused)
     free_pair(p);
 }
 
-static void farewell(void **unused)
-{
+static void farewell(void **unused) {
     (void)unused;
     for (uint64_t seed = 0; seed < 20; seed++) {
         struct host_sim_cube_options bad = perfect;
@@ -282,8 +271,7 @@ static void farewell(void **unused)
 
 /* The other end's farewell comes before this one has begun its own, on a wire
  * with room for it, or for less than the answer. */
-static void farewells_that_cross_are_answered(void **unused)
-{
+static void farewells_that_cross_are_answered(void **unused) {
     (void)unused;
     for (unsigned held = 0; held < 2; held++) {
         struct pair *p = new_pair(&small, &perfect, 1);
@@ -314,8 +302,7 @@ static void farewells_that_cross_are_answered(void **unused)
     }
 }
 
-static void farewell_to_the_dead_ends_in_time(void **unused)
-{
+static void farewell_to_the_dead_ends_in_time(void **unused) {
     (void)unused;
     for (unsigned cut = 0; cut < 2; cut++) {
         struct pair *p = new_pair(&small, &perfect, 1);
@@ -341,8 +328,7 @@ static void farewell_to_the_dead_ends_in_time(void **unused)
 
 /* End 0 forgets what it has not begun to send; what arrives is whole, and the
  * count is right. */
-static void what_is_unsent_is_forgotten(void **unused)
-{
+static void what_is_unsent_is_forgotten(void **unused) {
     struct host_sim_cube_options slow = perfect;
     struct link_message message;
     (void)unused;
@@ -389,8 +375,7 @@ struct script {
     size_t size;
 };
 
-static int script_receive(void *context, uint8_t *bytes, size_t size)
-{
+static int script_receive(void *context, uint8_t *bytes, size_t size) {
     struct script *s = context;
     size = size < s->left ? size : s->left;
     if (size == 0) {
@@ -402,8 +387,7 @@ static int script_receive(void *context, uint8_t *bytes, size_t size)
     return (int)size;
 }
 
-static int script_send(void *context, const uint8_t *bytes, size_t size)
-{
+static int script_send(void *context, const uint8_t *bytes, size_t size) {
     struct script *s = context;
     assert_true(s->size + size <= sizeof s->said);
     memcpy(s->said + s->size, bytes, size);
@@ -412,8 +396,7 @@ static int script_send(void *context, const uint8_t *bytes, size_t size)
 }
 
 static void hear(struct script *s, struct link *link, const uint8_t *bytes,
-                 size_t size)
-{
+                 size_t size) {
     s->hear = bytes;
     s->left = size;
     s->size = 0;
@@ -466,8 +449,7 @@ static const uint8_t bye_1[] = {0x00, 0x07, 0x24, 0x08, 0x8f, 0x87, 0x96,
                                 0xb6, 0xaf, 0x77, 0x35, 0x4c, 0x98, 0x00};
 
 /* Node 1 of epoch 0xfffe answers node 5 of epoch 0x11223344 on port 2. */
-static void test_vectors(void **unused)
-{
+static void test_vectors(void **unused) {
     const uint8_t head[8] = {5, 0, 1, 0, 34, 0, 0xe7, 0x3f};
     struct link_message datagram;
     bool ask;
@@ -518,8 +500,7 @@ static void test_vectors(void **unused)
     free(memory);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_unsent_is_forgotten),
         cmocka_unit_test(test_vectors),

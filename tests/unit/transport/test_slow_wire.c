@@ -10,8 +10,7 @@ enum {
 
 /* Both directions at once; what share of the wire the messages had. */
 static double share(uint32_t baud, uint32_t told, uint32_t look_us, bool bad,
-                    uint64_t seed)
-{
+                    uint64_t seed) {
     struct host_sim_cube_options wire = perfect;
     struct link_config config = {.window = 14, .message_max = 1608};
     link_for_serial(&config, told);
@@ -41,8 +40,7 @@ static double share(uint32_t baud, uint32_t told, uint32_t look_us, bool bad,
     return bytes * 1e6 / us / (baud / 10.0);
 }
 
-static void slow_wires_carry(void **unused)
-{
+static void slow_wires_carry(void **unused) {
     static const struct {
         uint32_t baud, told, look_us;
     } cases[] = {{19200, 19200, 1000},   {19200, 19200, 50000},
@@ -65,8 +63,7 @@ static void slow_wires_carry(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(slow_wires_carry),
     };

@@ -6,8 +6,7 @@
 enum { TENDED = 3 }; /* times, while a message is held */
 
 /* Which ways this end has room for a message. */
-static uint64_t rooms(const struct machine *m, unsigned i)
-{
+static uint64_t rooms(const struct machine *m, unsigned i) {
     uint64_t bits = 0;
     for (unsigned to = 0; to < m->count; to++) {
         const struct place *p = &m->places[to];
@@ -20,8 +19,7 @@ static uint64_t rooms(const struct machine *m, unsigned i)
 
 /* The others go on, and this one's links are tended in the midst. */
 static void tend(struct machine *m, unsigned i,
-                 void (*others)(struct machine *m, unsigned i))
-{
+                 void (*others)(struct machine *m, unsigned i)) {
     struct cube *cube = m->places[i].cube;
     for (unsigned k = 0; k < TENDED; k++) {
         uint32_t generation = cube_wiring(cube)->generation;
@@ -34,8 +32,7 @@ static void tend(struct machine *m, unsigned i,
     }
 }
 
-static void others_step(struct machine *m, unsigned i)
-{
+static void others_step(struct machine *m, unsigned i) {
     for (unsigned k = 0; k < m->count; k++) {
         unsigned j = draw(m) % m->count;
         if (j != i) {
@@ -44,8 +41,7 @@ static void others_step(struct machine *m, unsigned i)
     }
 }
 
-static void read_slowly(struct machine *m, unsigned i)
-{
+static void read_slowly(struct machine *m, unsigned i) {
     uint8_t bytes[CUBE_PAYLOAD_MAX];
     struct cube_message message;
     struct cube *cube = m->places[i].cube;
@@ -61,8 +57,7 @@ static void read_slowly(struct machine *m, unsigned i)
     give(m, i);
 }
 
-static void messages_being_read_stay(void **unused)
-{
+static void messages_being_read_stay(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < 24; k++) {
         struct cube_config c = {.window = (uint16_t)(k % 2 ? 2 : 5)};
@@ -98,8 +93,7 @@ static void messages_being_read_stay(void **unused)
 
 static uint64_t counts[2];
 
-static void others_chatter(struct machine *m, unsigned i)
-{
+static void others_chatter(struct machine *m, unsigned i) {
     for (unsigned k = 0; k < m->count; k++) {
         unsigned j = draw(m) % m->count;
         if (j != i && !m->places[j].gone) {
@@ -119,8 +113,7 @@ static void others_chatter(struct machine *m, unsigned i)
 }
 
 /* What was decided in a generation is written in it, and read in no other. */
-static void work_stays_in_its_generation(void **unused)
-{
+static void work_stays_in_its_generation(void **unused) {
     uint32_t words[8];
     uint64_t late = 0;
     (void)unused;
@@ -159,8 +152,7 @@ static void work_stays_in_its_generation(void **unused)
 
 /* The peer has said farewell: who has looked for room has it, until it polls.
  */
-static void a_farewell_waits(void **unused)
-{
+static void a_farewell_waits(void **unused) {
     struct cube_config c = {.window = 2};
     (void)unused;
     struct machine *m = build(1, &c, &perfect, 1);
@@ -187,8 +179,7 @@ static void a_farewell_waits(void **unused)
     destroy(m);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(messages_being_read_stay),
         cmocka_unit_test(work_stays_in_its_generation),

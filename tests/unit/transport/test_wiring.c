@@ -14,16 +14,14 @@ enum { DIMENSION = 4, NODES = 16 };
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
     return (uint32_t)(state >> 32) % below;
 }
 
-static void find_something(struct cube_wiring *w)
-{
+static void find_something(struct cube_wiring *w) {
     struct cube_dead dead = {(uint16_t)draw(NODES),
                              (uint8_t)draw(DIMENSION + 1)};
     struct cube_wrong wrong = {(uint16_t)draw(NODES), (uint16_t)draw(NODES),
@@ -38,8 +36,7 @@ static void find_something(struct cube_wiring *w)
 
 /* Ends that find things and tell each other at random agree in the end, on
  * what one would know that had been told all at once. */
-static void all_come_to_the_same(void **unused)
-{
+static void all_come_to_the_same(void **unused) {
     enum { ENDS = 6 };
     (void)unused;
     for (unsigned round = 0; round < 500; round++) {
@@ -71,8 +68,7 @@ static void all_come_to_the_same(void **unused)
     }
 }
 
-static void what_is_newer_wins_entirely(void **unused)
-{
+static void what_is_newer_wins_entirely(void **unused) {
     (void)unused;
     for (unsigned round = 0; round < 500; round++) {
         struct cube_wiring a, b;
@@ -99,8 +95,7 @@ static void what_is_newer_wins_entirely(void **unused)
 }
 
 /* Around the circle: what follows is later, whatever its number. */
-static void generations_go_round(void **unused)
-{
+static void generations_go_round(void **unused) {
     static const uint32_t far[] = {
         1,          2,          0x7fff,     0x8000,     0xffff,    0x10000,
         0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, 0xffffffff};
@@ -121,8 +116,7 @@ static void generations_go_round(void **unused)
 }
 
 /* Of PROTOCOL.md's message. */
-static void a_stamp_stands_for_generation_and_host(void **unused)
-{
+static void a_stamp_stands_for_generation_and_host(void **unused) {
     struct cube_wiring a = {.generation = 1, .host_epoch = 0x0badcafe}, b = a;
     (void)unused;
     assert_int_equal(wiring_stamp(&a), 0x3fe7);
@@ -133,8 +127,7 @@ static void a_stamp_stands_for_generation_and_host(void **unused)
     assert_int_not_equal(wiring_stamp(&b), 0x3fe7);
 }
 
-static void a_node_whose_links_are_dead_is_one_entry(void **unused)
-{
+static void a_node_whose_links_are_dead_is_one_entry(void **unused) {
     struct cube_wiring w;
     (void)unused;
     memset(&w, 0, sizeof w);
@@ -170,8 +163,7 @@ static const uint8_t vector[] = {3, 0, 0, 0, 0xfe, 0xca, 0xad, 0x0b, 0,
 
 /* The gateway may lose every link between nodes and still have its host's wire.
  */
-static void a_gateway_lives_while_its_hosts_wire_does(void **unused)
-{
+static void a_gateway_lives_while_its_hosts_wire_does(void **unused) {
     struct cube_wiring w = {.generation = 2, .gateway = 4};
     (void)unused;
     for (unsigned d = 0; d < DIMENSION; d++) {
@@ -189,8 +181,7 @@ static void a_gateway_lives_while_its_hosts_wire_does(void **unused)
     assert_int_equal(w.dead[0].dimension, CUBE_WHOLE_NODE);
 }
 
-static void its_bytes(void **unused)
-{
+static void its_bytes(void **unused) {
     struct cube_wiring w, again;
     uint8_t bytes[WIRING_BYTES_MAX + 1];
     (void)unused;
@@ -231,8 +222,7 @@ static void its_bytes(void **unused)
     assert_false(wiring_unpack(&again, bytes, sizeof vector, 3));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_come_to_the_same),
         cmocka_unit_test(what_is_newer_wins_entirely),

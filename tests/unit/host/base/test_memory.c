@@ -16,30 +16,26 @@
 
 static char directory[] = "/tmp/incode-memory-XXXXXX";
 
-static int enter(void **unused)
-{
+static int enter(void **unused) {
     (void)unused;
     return mkdtemp(directory) != NULL && chdir(directory) == 0 ? 0 : -1;
 }
 
-static int leave(void **unused)
-{
+static int leave(void **unused) {
     (void)unused;
     char command[64];
     (void)snprintf(command, sizeof command, "rm -r %s", directory);
     return chdir("/") == 0 && system(command) == 0 ? 0 : -1;
 }
 
-static void put(const char *name, const char *text)
-{
+static void put(const char *name, const char *text) {
     FILE *file = fopen(name, "w");
     assert_non_null(file);
     assert_true(fputs(text, file) >= 0);
     assert_int_equal(fclose(file), 0);
 }
 
-static void a_group_of_the_second_version(void **unused)
-{
+static void a_group_of_the_second_version(void **unused) {
     (void)unused;
     assert_int_equal(mkdir("two", 0777), 0);
     assert_int_equal(mkdir("two/a", 0777), 0);
@@ -58,8 +54,7 @@ static void a_group_of_the_second_version(void **unused)
     assert_int_equal(host_memory_in_groups("list", "two"), 0);
 }
 
-static void a_group_of_the_first_version(void **unused)
-{
+static void a_group_of_the_first_version(void **unused) {
     (void)unused;
     assert_int_equal(mkdir("one", 0777), 0);
     assert_int_equal(mkdir("one/memory", 0777), 0);
@@ -73,8 +68,7 @@ static void a_group_of_the_first_version(void **unused)
     assert_true(host_memory_in_groups("list", "one") == UINT64_MAX);
 }
 
-static uint64_t mapped(const char *name)
-{
+static uint64_t mapped(const char *name) {
     char line[128];
     unsigned long long kib = 0;
     FILE *status = fopen("/proc/self/status", "r");
@@ -91,13 +85,11 @@ static uint64_t mapped(const char *name)
 /* A limit leaves what it is above that which is mapped already. */
 static const uint64_t room = (uint64_t)48 << 20;
 
-static void expect_room(uint64_t available)
-{
+static void expect_room(uint64_t available) {
     assert_in_range(available, room - ((uint64_t)4 << 20), room);
 }
 
-static void a_limit(void **unused)
-{
+static void a_limit(void **unused) {
     (void)unused;
     struct rlimit limit, before;
     assert_true(host_memory_available() > room); /* or nothing is built here */
@@ -117,8 +109,7 @@ static void a_limit(void **unused)
     expect_room(available);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_group_of_the_second_version),
         cmocka_unit_test(a_group_of_the_first_version),

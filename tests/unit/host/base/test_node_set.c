@@ -9,8 +9,7 @@
 
 #include "host/base/node_set.h"
 
-static void test_written(void **unused)
-{
+static void test_written(void **unused) {
     (void)unused;
     static const struct {
         const char *text, *printed;
@@ -39,8 +38,7 @@ static void test_written(void **unused)
     }
 }
 
-static void test_refused(void **unused)
-{
+static void test_refused(void **unused) {
     (void)unused;
     static const char *const bad[] = {"",
                                       ",",
@@ -77,8 +75,7 @@ static void test_refused(void **unused)
 }
 
 /* Whatever room there is: a whole part, or two dots in place of the rest. */
-static void test_cut(void **unused)
-{
+static void test_cut(void **unused) {
     (void)unused;
     struct host_error error = {0};
     struct host_node_set set;
@@ -99,8 +96,7 @@ static void test_cut(void **unused)
     assert_string_equal(text, "");
 }
 
-static void test_named(void **unused)
-{
+static void test_named(void **unused) {
     (void)unused;
     struct host_node_set set = {{0}};
     char text[24];
@@ -112,8 +108,7 @@ static void test_named(void **unused)
     assert_string_equal(text, "nodes 3-4");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_written), cmocka_unit_test(test_refused),
         cmocka_unit_test(test_cut), cmocka_unit_test(test_named)};

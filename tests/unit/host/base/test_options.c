@@ -17,8 +17,7 @@ struct seen {
     char seed[8], window[8];
 };
 
-static error_t take(int key, char *value, struct argp_state *state)
-{
+static error_t take(int key, char *value, struct argp_state *state) {
     struct seen *seen = state->input;
     switch (key) {
     case 'q':
@@ -53,8 +52,7 @@ static const struct argp_option options[] = {
 static const struct argp argp = {options, take, "", "", NULL, NULL, NULL};
 
 static int parse(const char *const words[], struct seen *seen,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     char text[WORDS_MAX + 2][40] = {"incode try"};
     char *argv[WORDS_MAX + 2] = {text[0]};
     int argc = 1;
@@ -67,8 +65,7 @@ static int parse(const char *const words[], struct seen *seen,
     return host_options_parse(&argp, argc, argv, ARGP_NO_HELP, seen, error);
 }
 
-static void test_taken(void **unused)
-{
+static void test_taken(void **unused) {
     struct seen seen;
     struct host_error error;
     static const char *const words[] = {"a",        "-qs4", "b",
@@ -85,8 +82,7 @@ static void test_taken(void **unused)
 }
 
 /* Its value is in the same word; the next one is for itself. */
-static void test_optional(void **unused)
-{
+static void test_optional(void **unused) {
     struct seen seen;
     struct host_error error;
     static const char *const words[] = {"--dry", "--seed=5", "-d",
@@ -100,8 +96,7 @@ static void test_optional(void **unused)
     assert_non_null(strstr(error.text, "--seed: wants a value; "));
 }
 
-static void test_refused(void **unused)
-{
+static void test_refused(void **unused) {
     static const struct {
         const char *word, *said;
     } wrong[] = {
@@ -136,8 +131,7 @@ static void test_refused(void **unused)
     }
 }
 
-static void test_numbers(void **unused)
-{
+static void test_numbers(void **unused) {
     uint64_t number = 7;
     struct host_error error = {0};
     (void)unused;
@@ -157,8 +151,7 @@ static void test_numbers(void **unused)
     assert_string_equal(error.text, "--seed -1: not a number; give 1 or more");
 }
 
-static void test_the_one_argument(void **unused)
-{
+static void test_the_one_argument(void **unused) {
     const char *argument = NULL;
     struct host_error error = {0};
     (void)unused;
@@ -181,8 +174,7 @@ static void test_the_one_argument(void **unused)
 }
 
 /* -h ends a command that has done nothing, and is no error. */
-static void test_help(void **unused)
-{
+static void test_help(void **unused) {
     static const char *const words[] = {"-h", "--zzz", NULL};
     struct seen seen;
     struct host_error error;
@@ -191,8 +183,7 @@ static void test_help(void **unused)
     assert_int_equal(error.code, 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_taken),
                                        cmocka_unit_test(test_optional),
                                        cmocka_unit_test(test_refused),

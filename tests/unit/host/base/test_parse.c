@@ -9,8 +9,7 @@
 
 #include "host/base/parse.h"
 
-static void test_bytes(void **unused)
-{
+static void test_bytes(void **unused) {
     (void)unused;
     static const struct {
         const char *text;
@@ -52,8 +51,7 @@ static void test_bytes(void **unused)
     }
 }
 
-static void test_numbers(void **unused)
-{
+static void test_numbers(void **unused) {
     (void)unused;
     uint64_t n;
     assert_int_equal(host_parse_number("7", 1, 7, &n), 0);
@@ -70,8 +68,7 @@ static void test_numbers(void **unused)
 }
 
 /* Whole numbers in exponent form, and no others. */
-static void test_exponents(void **unused)
-{
+static void test_exponents(void **unused) {
     static const struct {
         const char *text;
         uint64_t number;
@@ -112,8 +109,7 @@ static void test_exponents(void **unused)
 }
 
 /* What is wrong with a number of nodes, and which ones there are. */
-static void test_nodes(void **unused)
-{
+static void test_nodes(void **unused) {
     static const struct {
         const char *text, *said;
     } wrong[] = {{"3", "--nodes 3: not a power of two"},
@@ -138,8 +134,7 @@ static void test_nodes(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bytes), cmocka_unit_test(test_numbers),
         cmocka_unit_test(test_exponents), cmocka_unit_test(test_nodes)};

@@ -14,8 +14,7 @@
 
 enum { TEXT = 400, RANDOM_WORDS = 200, WORDS = 256 + RANDOM_WORDS };
 
-static void test_printable(void **unused)
-{
+static void test_printable(void **unused) {
     static const struct {
         const char *text, *printed;
     } cases[] = {
@@ -49,8 +48,7 @@ static void test_printable(void **unused)
 }
 
 /* Whole characters, and nothing past the end. */
-static void test_bounds(void **unused)
-{
+static void test_bounds(void **unused) {
     static const char text[] = "a\xe2\x82\xac\x1b";
     static const char *const cut[] = {
         "", "a", "a", "a", "a\xe2\x82\xac", "a\xe2\x82\xac"};
@@ -71,8 +69,7 @@ static void test_bounds(void **unused)
     }
 }
 
-static void test_quoted_where_needed(void **unused)
-{
+static void test_quoted_where_needed(void **unused) {
     static const struct {
         const char *text, *quoted;
     } cases[] = {{"/dev/ttyUSB0", "/dev/ttyUSB0"},
@@ -96,8 +93,7 @@ static void test_quoted_where_needed(void **unused)
 
 /* Every byte alone and between others, and words drawn from those that mean
  * something to a shell. */
-static void make_word(unsigned i, char word[TEXT / 20])
-{
+static void make_word(unsigned i, char word[TEXT / 20]) {
     static const char hard[] = "'\"\\$`\n !*?[]{}~#&;|<>()\t\r\x1b\x80\xff%=a";
     static uint32_t state = 1;
     if (i < 256) {
@@ -112,8 +108,7 @@ static void make_word(unsigned i, char word[TEXT / 20])
     word[length] = '\0';
 }
 
-static void test_what_a_shell_reads(void **unused)
-{
+static void test_what_a_shell_reads(void **unused) {
     static char said[WORDS * 20];
     char quoted[TEXT], printable[TEXT], word[TEXT / 20];
     char path[] = "/tmp/incode-quoted-XXXXXX", command[64];
@@ -148,13 +143,11 @@ static void test_what_a_shell_reads(void **unused)
     assert_int_equal(at, size);
 }
 
-static const char *name_of(const void *names, unsigned i)
-{
+static const char *name_of(const void *names, unsigned i) {
     return ((const char *const *)names)[i];
 }
 
-static void test_nearest(void **unused)
-{
+static void test_nearest(void **unused) {
     static const char *const names[] = {"run",    "gen",     "verify",
                                         "digest", "convert", NULL};
     static const struct {
@@ -183,8 +176,7 @@ static void test_nearest(void **unused)
 }
 
 /* A line of an error, and one that is said. */
-static void test_said(void **unused)
-{
+static void test_said(void **unused) {
     char line[80] = "";
     struct host_error error = {0};
     (void)unused;
@@ -200,8 +192,7 @@ static void test_said(void **unused)
     assert_string_equal(line, "a\\x0a\\x1b is here\nb\\x0a");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_printable),
         cmocka_unit_test(test_bounds),

@@ -29,8 +29,7 @@ static struct screen {
     unsigned drawn; /* times that a line began anew */
 } screen;
 
-static void open_screen(unsigned short columns)
-{
+static void open_screen(unsigned short columns) {
     struct winsize size = {.ws_row = ROWS, .ws_col = columns};
     memset(&screen, 0, sizeof screen);
     screen.columns = columns;
@@ -40,21 +39,18 @@ static void open_screen(unsigned short columns)
     assert_true(dup2(screen.slave, STDERR_FILENO) >= 0);
 }
 
-static void close_screen(void)
-{
+static void close_screen(void) {
     assert_true(dup2(screen.before, STDERR_FILENO) >= 0);
     (void)close(screen.before);
     (void)close(screen.slave);
     (void)close(screen.master);
 }
 
-static void erase(char *row, unsigned from)
-{
+static void erase(char *row, unsigned from) {
     memset(row + from, 0, COLUMNS - from);
 }
 
-static void take(char c)
-{
+static void take(char c) {
     char *row = screen.text[screen.row];
     if (c == '\r') {
         screen.column = 0;
@@ -70,8 +66,7 @@ static void take(char c)
 }
 
 /* Rows up; from here to the row's end; and to the screen's. */
-static void obey(char what, unsigned number)
-{
+static void obey(char what, unsigned number) {
     if (what == 'A') {
         assert_true(number > 0 && number <= screen.row);
         screen.row -= number;
@@ -87,8 +82,7 @@ static void obey(char what, unsigned number)
 
 /* Takes what has come.  A terminal delivers in its own time: a bell of ours
  * rings when all before it is here.  clock: within a minute. */
-static void look(void)
-{
+static void look(void) {
     static unsigned in, number;
     assert_int_equal(write(screen.slave, "\a", 1), 1);
     for (char c = 0; c != '\a';) {
@@ -114,8 +108,7 @@ static void look(void)
 
 /* Shows until a line is drawn, which takes a tenth of a second.  clock: or no
  * more than minutes. */
-static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
-{
+static const char *shown(uint64_t done, uint64_t total, uint64_t amount) {
     look();
     unsigned before = screen.drawn;
     for (int i = 0; i < 6000 && screen.drawn == before; i++) {
@@ -127,8 +120,7 @@ static const char *shown(uint64_t done, uint64_t total, uint64_t amount)
     return screen.text[screen.row];
 }
 
-static void test_fits(void **unused)
-{
+static void test_fits(void **unused) {
     static const unsigned short widths[] = {30, 12, 5, 80, 160};
     (void)unused;
     for (size_t i = 0; i < sizeof widths / sizeof widths[0]; i++) {
@@ -161,8 +153,7 @@ static void test_fits(void **unused)
     }
 }
 
-static void test_follows_the_width(void **unused)
-{
+static void test_follows_the_width(void **unused) {
     struct winsize narrow = {.ws_row = ROWS, .ws_col = 30};
     (void)unused;
     open_screen(100);
@@ -178,8 +169,7 @@ static void test_follows_the_width(void **unused)
 }
 
 /* Of what has no total, the amount is shown. */
-static void test_counts(void **unused)
-{
+static void test_counts(void **unused) {
     (void)unused;
     open_screen(30);
     host_progress_begin(true);
@@ -192,8 +182,7 @@ static void test_counts(void **unused)
     close_screen();
 }
 
-static void test_notes(void **unused)
-{
+static void test_notes(void **unused) {
     (void)unused;
     open_screen(80);
     host_note("node %u: %s", 1, "before");
@@ -213,8 +202,7 @@ static void test_notes(void **unused)
 }
 
 /* clock: likewise */
-static void draw_rows(double part)
-{
+static void draw_rows(double part) {
     look();
     for (unsigned before = screen.drawn, i = 0;
          i < 6000 && screen.drawn == before; i++) {
@@ -227,8 +215,7 @@ static void draw_rows(double part)
 }
 
 /* A table stays where it is, makes room for notes, and goes away whole. */
-static void test_rows(void **unused)
-{
+static void test_rows(void **unused) {
     (void)unused;
     open_screen(60);
     assert_int_equal(host_progress_rows_max(), 0);
@@ -255,8 +242,7 @@ static void test_rows(void **unused)
 }
 
 /* No line where it is not wanted, nor where nobody sees it; notes come. */
-static void test_quiet(void **unused)
-{
+static void test_quiet(void **unused) {
     int ends[2];
     char said[64] = "";
     (void)unused;
@@ -280,8 +266,7 @@ static void test_quiet(void **unused)
 }
 
 /* Without a terminal, where that is asked for: whole lines, and few. */
-static void test_lines(void **unused)
-{
+static void test_lines(void **unused) {
     int ends[2], before = dup(STDERR_FILENO);
     char said[256] = "";
     struct pollfd file;
@@ -314,8 +299,7 @@ static void test_lines(void **unused)
     (void)close(ends[0]);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_fits),   cmocka_unit_test(test_follows_the_width),
         cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),

@@ -30,16 +30,14 @@ static const char map_text[] =
 static char folder[] = "/tmp/incode-test.XXXXXX";
 static char map[64], counts[64];
 
-static void write_file(const char *path, const void *bytes, size_t size)
-{
+static void write_file(const char *path, const void *bytes, size_t size) {
     FILE *file = fopen(path, "wbe");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
     assert_int_equal(fclose(file), 0);
 }
 
-static int make_folder(void **state)
-{
+static int make_folder(void **state) {
     (void)state;
     if (mkdtemp(folder) == NULL) {
         return -1;
@@ -49,16 +47,14 @@ static int make_folder(void **state)
     return 0;
 }
 
-static int remove_folder(void **state)
-{
+static int remove_folder(void **state) {
     (void)state;
     (void)remove(map);
     (void)remove(counts);
     return rmdir(folder);
 }
 
-static void test_counts(void **state)
-{
+static void test_counts(void **state) {
     /* Address, instructions, times; behind the first of none, nothing counts,
      * nor does what is below the image, a loader. */
     static const uint64_t blocks[][3] = {
@@ -82,8 +78,7 @@ static void test_counts(void **state)
     assert_int_equal(access(counts, F_OK), -1); /* they count once */
 }
 
-static void test_no_map(void **state)
-{
+static void test_no_map(void **state) {
     double counted[HOST_ROOMS] = {0};
     struct host_error error = {0};
     (void)state;
@@ -93,8 +88,7 @@ static void test_no_map(void **state)
     assert_non_null(strstr(error.text, "make firmware"));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_counts),
                                        cmocka_unit_test(test_no_map)};
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

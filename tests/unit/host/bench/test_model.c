@@ -18,8 +18,7 @@ static const double prices[HOST_BENCH_COUNTS] = {[HOST_BENCH_CALLS] = 7,
                                                  [HOST_BENCH_CANDIDATES] = 0.5,
                                                  [HOST_BENCH_EXACT] = 100};
 
-static void test_node(void **state)
-{
+static void test_node(void **state) {
     (void)state;
     const struct host_bench_machine machine = {
         .price = prices, .scale = 10, .message_us = 3};
@@ -33,8 +32,7 @@ static void test_node(void **state)
     assert_true(host_bench_node_ns(&machine, &totals, 6) == 4790 + 18000);
 }
 
-static void test_io(void **state)
-{
+static void test_io(void **state) {
     (void)state;
     const struct host_bench_machine machine = {
         .wire = {.bytes_per_s = 1000000, .latency_us = 40},
@@ -46,8 +44,7 @@ static void test_io(void **state)
 
 /* Prices that times were made of are found again, but for one that would have
  * to be negative. */
-static void test_fit(void **state)
-{
+static void test_fit(void **state) {
     (void)state;
     static const double made[HOST_CALIBRATE_TERMS] = {3,  0,    0.25,
                                                       40, 2000, 90000};
@@ -75,8 +72,7 @@ static void test_fit(void **state)
 
 /* Two wires of 1 MB/s: bytes of both, sent at once, come one after the other
  * where they are one medium, and together where they are not. */
-static void one_medium(bool shared, uint64_t last_us)
-{
+static void one_medium(bool shared, uint64_t last_us) {
     static uint8_t memory[2][2 * SIM_BYTES_MIN];
     static const struct sim_quality quality = {.bytes_per_s = 1000000,
                                                .latency_us = 100,
@@ -106,8 +102,7 @@ static void one_medium(bool shared, uint64_t last_us)
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 1);
 }
 
-static void test_medium(void **state)
-{
+static void test_medium(void **state) {
     (void)state;
     one_medium(false, 1600);
     one_medium(true, 2100);
@@ -115,8 +110,7 @@ static void test_medium(void **state)
 
 /* The figures that the paper prints follow from its times. */
 static void check_speed_up(const char *table, uint64_t points, unsigned nodes,
-                           double speed_up)
-{
+                           double speed_up) {
     const struct host_paper_series *s =
         host_paper_find(table, "Uniform", points, "");
     assert_non_null(s);
@@ -125,8 +119,7 @@ static void check_speed_up(const char *table, uint64_t points, unsigned nodes,
     assert_true(fabs(s->alone_s / row->t_max - speed_up) < 0.0101);
 }
 
-static void test_figures(void **state)
-{
+static void test_figures(void **state) {
     (void)state;
     static const double uniform_10k[] = {1,    1.75,  3.03,  5.10,
                                          8.05, 12.80, 19.26, 24.91};
@@ -154,8 +147,7 @@ static void test_figures(void **state)
     assert_null(host_paper_find("2", "Bubbles", 20000, ""));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_node), cmocka_unit_test(test_io),
         cmocka_unit_test(test_fit), cmocka_unit_test(test_medium),

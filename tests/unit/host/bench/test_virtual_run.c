@@ -24,8 +24,7 @@ static struct host_virtual_run run;
 static double slow; /* of the next run */
 
 static void triangulate(const char *strategy, unsigned nodes, bool routers,
-                        bool shared)
-{
+                        bool shared) {
     const struct host_bench_machine machine = {
         .price = slow > 0 ? shared_prices : prices,
         .scale = 1,
@@ -51,8 +50,7 @@ static void triangulate(const char *strategy, unsigned nodes, bool routers,
 
 /* Every tetrahedron that a node has built takes it two milliseconds, and a step
  * that did nothing, one microsecond at most. */
-static void test_charge(void **state)
-{
+static void test_charge(void **state) {
     (void)state;
     for (unsigned nodes = 1; nodes <= 8; nodes *= 2) {
         uint64_t built = 0;
@@ -70,8 +68,7 @@ static void test_charge(void **state)
     }
 }
 
-static void test_again(void **state)
-{
+static void test_again(void **state) {
     (void)state;
     for (int machine = 0; machine < 4; machine++) {
         triangulate("spatial", 8, machine & 1, machine & 2);
@@ -83,8 +80,7 @@ static void test_again(void **state)
     }
 }
 
-static void test_more_nodes(void **state)
-{
+static void test_more_nodes(void **state) {
     (void)state;
     triangulate("sequential", 1, true, false);
     double alone = run.result.t_max_s, io = run.result.time_io_s;
@@ -98,8 +94,7 @@ static void test_more_nodes(void **state)
 
 /* A node of half the speed takes twice as long alone, and holds an exchange up
  * by little, as the others take over from it. */
-static void test_slow_node(void **state)
-{
+static void test_slow_node(void **state) {
     (void)state;
     slow = 1;
     triangulate("spatial", 4, true, false);
@@ -119,8 +114,7 @@ static void test_slow_node(void **state)
     assert_true(run.result.t_max_s < 1.7 * even);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_charge), cmocka_unit_test(test_again),
         cmocka_unit_test(test_more_nodes), cmocka_unit_test(test_slow_node)};

@@ -35,14 +35,12 @@ struct fixture {
     uint64_t state;
 };
 
-static inline uint64_t draw(struct fixture *f, uint64_t below)
-{
+static inline uint64_t draw(struct fixture *f, uint64_t below) {
     f->state = f->state * 6364136223846793005u + 1442695040888963407u;
     return (f->state >> 33) % below;
 }
 
-static inline void append(struct host_tetrahedra *tets, const uint32_t t[4])
-{
+static inline void append(struct host_tetrahedra *tets, const uint32_t t[4]) {
     struct host_error error = {0};
     uint32_t(*room)[4] = host_tetrahedra_room(tets, 1, &error);
     assert_non_null(room);
@@ -50,15 +48,13 @@ static inline void append(struct host_tetrahedra *tets, const uint32_t t[4])
     host_tetrahedra_keep(tets, 1);
 }
 
-static inline void cut(struct host_tetrahedra *tets, uint64_t i)
-{
+static inline void cut(struct host_tetrahedra *tets, uint64_t i) {
     memcpy(tets->v[i], tets->v[tets->count - 1], sizeof *tets->v);
     host_tetrahedra_cut(tets, tets->count - 1);
 }
 
 /* The right ones again, in an order of chance. */
-static inline void restore(struct fixture *f)
-{
+static inline void restore(struct fixture *f) {
     host_tetrahedra_cut(&f->tets, 0);
     for (uint64_t i = 0; i < f->right.count; i++) {
         append(&f->tets, f->right.v[i]);
@@ -72,8 +68,7 @@ static inline void restore(struct fixture *f)
     }
 }
 
-static inline void open_order(struct fixture *f)
-{
+static inline void open_order(struct fixture *f) {
     struct host_error error = {0};
     f->state = 1;
     assert_int_equal(host_order_make(&f->order, "points", f->points.xyz,
@@ -97,8 +92,7 @@ static inline void open_order(struct fixture *f)
 }
 
 static inline void open_set(struct fixture *f, const char *kind, uint32_t n,
-                            uint64_t seed)
-{
+                            uint64_t seed) {
     struct host_error error = {0};
     memset(f, 0, sizeof *f);
     assert_int_equal(host_gen(kind, n, seed, &f->points, &error), 0);
@@ -113,8 +107,7 @@ static inline void open_set(struct fixture *f, const char *kind, uint32_t n,
     open_order(f);
 }
 
-static inline void close_set(struct fixture *f)
-{
+static inline void close_set(struct fixture *f) {
     host_points_free(&f->points);
     host_order_free(&f->order);
     host_tetrahedra_free(&f->right);
@@ -122,8 +115,7 @@ static inline void close_set(struct fixture *f)
     free(f->named);
 }
 
-static inline int orientation(const struct fixture *f, const uint32_t t[4])
-{
+static inline int orientation(const struct fixture *f, const uint32_t t[4]) {
     struct incode_tally tally = {0};
     double p[4][3];
     for (int k = 0; k < 4; k++) {
@@ -132,8 +124,7 @@ static inline int orientation(const struct fixture *f, const uint32_t t[4])
     return incode_orient3d(&tally, p[0], p[1], p[2], p[3]);
 }
 
-static inline bool is_one_of(const uint32_t *v, int n, uint32_t vertex)
-{
+static inline bool is_one_of(const uint32_t *v, int n, uint32_t vertex) {
     for (int i = 0; i < n; i++) {
         if (v[i] == vertex) {
             return true;
@@ -142,8 +133,7 @@ static inline bool is_one_of(const uint32_t *v, int n, uint32_t vertex)
     return false;
 }
 
-static inline bool is_row(const struct fixture *f, const uint32_t t[4])
-{
+static inline bool is_row(const struct fixture *f, const uint32_t t[4]) {
     for (int k = 0; k < 4; k++) {
         if (t[k] >= f->sites.count || !host_site_is_vertex(&f->sites, t[k])) {
             return false;
@@ -152,16 +142,15 @@ static inline bool is_row(const struct fixture *f, const uint32_t t[4])
     return orientation(f, t) > 0;
 }
 
-static inline void open_points(struct fixture *f, const double *xyz, uint32_t n)
-{
+static inline void open_points(struct fixture *f, const double *xyz,
+                               uint32_t n) {
     struct host_error error = {0};
     memset(f, 0, sizeof *f);
     assert_int_equal(host_points_append(&f->points, xyz, n, &error), 0);
     open_order(f);
 }
 
-static inline uint32_t vertex_of(const struct fixture *f, uint32_t row)
-{
+static inline uint32_t vertex_of(const struct fixture *f, uint32_t row) {
     uint32_t v = 0;
     while (f->order.row[v] != row) {
         v++;
@@ -175,8 +164,7 @@ static const struct set {
 } sets[] = {{"uniform", 4},  {"uniform", 5},   {"uniform", 400}, {"grid", 343},
             {"sphere", 200}, {"bubbles", 300}, {"rotated", 216}, {"hub", 150}};
 
-static inline void for_each_set(void (*function)(struct fixture *f))
-{
+static inline void for_each_set(void (*function)(struct fixture *f)) {
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         struct fixture f;
         open_set(&f, sets[i].kind, sets[i].n, i + 1);
@@ -186,8 +174,7 @@ static inline void for_each_set(void (*function)(struct fixture *f))
 }
 
 /* Whether some tetrahedron has a facet, in this order seen from outside. */
-static inline bool has_facet(const struct fixture *f, const uint32_t p[3])
-{
+static inline bool has_facet(const struct fixture *f, const uint32_t p[3]) {
     for (uint64_t i = 0; i < f->tets.count; i++) {
         const uint32_t *t = f->tets.v[i];
         if (!is_one_of(t, 4, p[0]) || !is_one_of(t, 4, p[1]) ||
@@ -209,8 +196,7 @@ static inline bool has_facet(const struct fixture *f, const uint32_t p[3])
 }
 
 static inline void hear(void *context, const uint64_t *tets, int tet_count,
-                        const uint32_t *vertices, int count, const char *what)
-{
+                        const uint32_t *vertices, int count, const char *what) {
     struct fixture *f = context;
     assert_non_null(what);
     for (int i = 0; i < tet_count; i++) {
@@ -224,8 +210,7 @@ static inline void hear(void *context, const uint64_t *tets, int tet_count,
 }
 
 static inline int check(struct fixture *f, enum host_check_depth depth,
-                        struct host_check_report *report)
-{
+                        struct host_check_report *report) {
     struct host_check_listener listener = {f, FAULTS_MAX, hear};
     struct host_error error = {0};
     memset(f->named, 0, f->sites.count);

@@ -7,8 +7,7 @@
 /* --- Checking --------------------------------------------------------- */
 
 /* Whether no point is beyond a facet, by trying all. */
-static bool is_of_hull(const struct fixture *f, const uint32_t p[3])
-{
+static bool is_of_hull(const struct fixture *f, const uint32_t p[3]) {
     for (uint32_t v = 0; v < f->sites.count; v++) {
         const uint32_t t[4] = {p[0], p[1], p[2], v};
         if (host_site_is_vertex(&f->sites, v) && orientation(f, t) > 0) {
@@ -19,8 +18,7 @@ static bool is_of_hull(const struct fixture *f, const uint32_t p[3])
 }
 
 /* Whether tetrahedra are all around v, as far as the hull goes. */
-static bool is_whole(const struct fixture *f, uint32_t v)
-{
+static bool is_whole(const struct fixture *f, uint32_t v) {
     bool used = false;
     for (uint64_t i = 0; i < f->tets.count; i++) {
         const uint32_t *t = f->tets.v[i];
@@ -42,8 +40,7 @@ static bool is_whole(const struct fixture *f, uint32_t v)
 }
 
 /* What the interface promises of a tetrahedron that is missing. */
-static void expect_named(const struct fixture *f, const uint32_t t[4])
-{
+static void expect_named(const struct fixture *f, const uint32_t t[4]) {
     for (int k = 0; k < 4; k++) {
         if (!f->named[t[k]] && !is_whole(f, t[k])) {
             fail_msg("vertex %u of a missing tetrahedron is not named", t[k]);
@@ -53,8 +50,7 @@ static void expect_named(const struct fixture *f, const uint32_t t[4])
 
 /* Both depths find a fault and name the place of what is missing. */
 static void expect_found(struct fixture *f, const char *damage,
-                         const uint32_t (*missing)[4], uint64_t count)
-{
+                         const uint32_t (*missing)[4], uint64_t count) {
     for (int depth = 0; depth < 2; depth++) {
         struct host_check_report r;
         if (check(f, (enum host_check_depth)depth, &r) != HOST_UNVERIFIED) {
@@ -69,8 +65,7 @@ static void expect_found(struct fixture *f, const char *damage,
 
 /* --- The sets --------------------------------------------------------- */
 
-static void passes(struct fixture *f)
-{
+static void passes(struct fixture *f) {
     for (int round = 0; round < 4; round++) {
         struct host_check_report r;
         assert_int_equal(check(f, (enum host_check_depth)(round % 2), &r), 0);
@@ -82,15 +77,13 @@ static void passes(struct fixture *f)
     }
 }
 
-static void right_results_pass(void **unused)
-{
+static void right_results_pass(void **unused) {
     (void)unused;
     for_each_set(passes);
 }
 
 /* The kinds of place: at the hull, across bricks, inside one brick. */
-static int kind_of(const struct fixture *f, const uint32_t t[4])
-{
+static int kind_of(const struct fixture *f, const uint32_t t[4]) {
     for (uint32_t c = 0; c < 4; c++) {
         uint32_t p[3];
         host_facet_outward(t, c, p);
@@ -108,8 +101,7 @@ static int kind_of(const struct fixture *f, const uint32_t t[4])
 
 /* Calls for a few tetrahedra of each kind; indices into `tets`. */
 static void at_each_place(struct fixture *f,
-                          void (*function)(struct fixture *f, uint64_t i))
-{
+                          void (*function)(struct fixture *f, uint64_t i)) {
     enum { EACH = 6 };
     int left[3] = {EACH, EACH, EACH};
     for (int tries = 0; tries < 400 && left[0] + left[1] + left[2] > 0;
@@ -125,24 +117,21 @@ static void at_each_place(struct fixture *f,
 
 /* --- Damage to one tetrahedron ---------------------------------------- */
 
-static void drop(struct fixture *f, uint64_t i)
-{
+static void drop(struct fixture *f, uint64_t i) {
     uint32_t t[1][4];
     memcpy(t, f->tets.v[i], sizeof t);
     cut(&f->tets, i);
     expect_found(f, "dropped", (const uint32_t(*)[4])t, 1);
 }
 
-static void repeat(struct fixture *f, uint64_t i)
-{
+static void repeat(struct fixture *f, uint64_t i) {
     uint32_t t[4];
     memcpy(t, f->tets.v[i], sizeof t);
     append(&f->tets, t);
     expect_found(f, "repeated", NULL, 0);
 }
 
-static void repeat_often(struct fixture *f, uint64_t i)
-{
+static void repeat_often(struct fixture *f, uint64_t i) {
     uint32_t t[4];
     memcpy(t, f->tets.v[i], sizeof t);
     for (int k = 0; k < 3; k++) {
@@ -151,8 +140,7 @@ static void repeat_often(struct fixture *f, uint64_t i)
     expect_found(f, "four times", NULL, 0);
 }
 
-static void turn(struct fixture *f, uint64_t i)
-{
+static void turn(struct fixture *f, uint64_t i) {
     uint32_t t[1][4];
     memcpy(t, f->tets.v[i], sizeof t);
     f->tets.v[i][2] = t[0][3];
@@ -160,8 +148,7 @@ static void turn(struct fixture *f, uint64_t i)
     expect_found(f, "turned", (const uint32_t(*)[4])t, 1);
 }
 
-static void exchange(struct fixture *f, uint64_t i)
-{
+static void exchange(struct fixture *f, uint64_t i) {
     for (int k = 0; k < 4; k++) {
         uint32_t t[1][4], wrong = (uint32_t)draw(f, f->sites.count);
         memcpy(t, f->tets.v[i], sizeof t);
@@ -175,8 +162,7 @@ static void exchange(struct fixture *f, uint64_t i)
 }
 
 /* A positive tetrahedron that does not belong there. */
-static void invent(struct fixture *f, uint64_t i)
-{
+static void invent(struct fixture *f, uint64_t i) {
     uint32_t t[4];
     (void)i;
     for (int tries = 0; tries < 100; tries++) {
@@ -191,8 +177,7 @@ static void invent(struct fixture *f, uint64_t i)
     }
 }
 
-static void out_of_range(struct fixture *f, uint64_t i)
-{
+static void out_of_range(struct fixture *f, uint64_t i) {
     for (int k = 0; k < 4; k++) {
         uint32_t t[1][4];
         memcpy(t, f->tets.v[i], sizeof t);
@@ -202,8 +187,7 @@ static void out_of_range(struct fixture *f, uint64_t i)
 }
 
 /* The last point of a brick that is not full stands in all slots beyond. */
-static void unused_slot(struct fixture *f, uint64_t i)
-{
+static void unused_slot(struct fixture *f, uint64_t i) {
     uint32_t t[1][4];
     memcpy(t, f->tets.v[i], sizeof t);
     for (int k = 0; k < 4; k++) {
@@ -220,8 +204,7 @@ static void unused_slot(struct fixture *f, uint64_t i)
     }
 }
 
-static void single(struct fixture *f)
-{
+static void single(struct fixture *f) {
     void (*const damage[])(struct fixture *, uint64_t) = {
         drop,   repeat,       repeat_often, turn,
         invent, out_of_range, exchange,     unused_slot};
@@ -230,16 +213,14 @@ static void single(struct fixture *f)
     }
 }
 
-static void damage_is_found(void **unused)
-{
+static void damage_is_found(void **unused) {
     (void)unused;
     for_each_set(single);
 }
 
 /* --- Damage to more --------------------------------------------------- */
 
-static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last)
-{
+static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last) {
     struct host_tetrahedra missing = {0};
     for (uint64_t i = f->tets.count; i-- > 0;) {
         const uint32_t *t = f->tets.v[i];
@@ -259,8 +240,7 @@ static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last)
     host_tetrahedra_free(&missing);
 }
 
-static void drop_bricks(struct fixture *f)
-{
+static void drop_bricks(struct fixture *f) {
     for (uint32_t b = 0; b < f->order.bricks; b += 3) {
         drop_all_at(f, b * INCODE_BRICK_POINTS, (b + 1) * INCODE_BRICK_POINTS);
     }
@@ -270,16 +250,14 @@ static void drop_bricks(struct fixture *f)
     }
 }
 
-static void missing_bricks_are_found(void **unused)
-{
+static void missing_bricks_are_found(void **unused) {
     (void)unused;
     for_each_set(drop_bricks);
 }
 
 /* Without all tetrahedra that a vertex owns (its lowest), as a node commits
  * them. */
-static void drop_owned(struct fixture *f)
-{
+static void drop_owned(struct fixture *f) {
     for (int round = 0; round < 8; round++) {
         struct host_tetrahedra missing = {0};
         uint32_t owner = f->tets.v[draw(f, f->tets.count)][0];
@@ -301,29 +279,25 @@ static void drop_owned(struct fixture *f)
     }
 }
 
-static void missing_stars_are_found(void **unused)
-{
+static void missing_stars_are_found(void **unused) {
     (void)unused;
     for_each_set(drop_owned);
 }
 
 /* All of it twice: every sum is twice what it was. */
-static void twice(struct fixture *f)
-{
+static void twice(struct fixture *f) {
     for (uint64_t i = 0; i < f->right.count; i++) {
         append(&f->tets, f->right.v[i]);
     }
     expect_found(f, "everything twice", NULL, 0);
 }
 
-static void whole_repeats_are_found(void **unused)
-{
+static void whole_repeats_are_found(void **unused) {
     (void)unused;
     for_each_set(twice);
 }
 
-static void nothing_is_found(void **unused)
-{
+static void nothing_is_found(void **unused) {
     (void)unused;
     struct fixture f;
     struct host_check_report r;
@@ -336,8 +310,7 @@ static void nothing_is_found(void **unused)
 
 /* --- Garbage ---------------------------------------------------------- */
 
-static void garbage_is_refused(void **unused)
-{
+static void garbage_is_refused(void **unused) {
     (void)unused;
     struct fixture f;
     open_set(&f, "grid", 125, 3);
@@ -360,14 +333,12 @@ static void garbage_is_refused(void **unused)
 /* The listener hears of no more than it asked for, and the report counts
  * all. */
 static void hear_few(void *context, const uint64_t *tets, int tet_count,
-                     const uint32_t *vertices, int count, const char *what)
-{
+                     const uint32_t *vertices, int count, const char *what) {
     (void)tets, (void)tet_count, (void)vertices, (void)count, (void)what;
     ++*(int *)context;
 }
 
-static void faults_are_bounded(void **unused)
-{
+static void faults_are_bounded(void **unused) {
     (void)unused;
     struct fixture f;
     struct host_check_report r;
@@ -391,8 +362,7 @@ static void faults_are_bounded(void **unused)
     close_set(&f);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(right_results_pass),
         cmocka_unit_test(damage_is_found),

@@ -6,8 +6,7 @@
 
 /* The triangulation of all points but one is a perfect one, and wrong. */
 static void leave_out(struct fixture *f, const uint32_t vertex[120],
-                      uint32_t row)
-{
+                      uint32_t row) {
     struct host_tetrahedra tets = {0};
     struct host_check_report r;
     uint32_t next = (row + 1) % 120, map[120];
@@ -31,8 +30,7 @@ static void leave_out(struct fixture *f, const uint32_t vertex[120],
     host_tetrahedra_free(&tets);
 }
 
-static void a_left_out_point_is_found(void **unused)
-{
+static void a_left_out_point_is_found(void **unused) {
     (void)unused;
     struct fixture f;
     uint32_t vertex[120] = {0};
@@ -52,8 +50,7 @@ static void a_left_out_point_is_found(void **unused)
 
 /* Two tetrahedra on a facet to three about the edge of their apexes: false
  * where their union is not convex. */
-static bool flip(struct fixture *f, uint64_t i, uint64_t j)
-{
+static bool flip(struct fixture *f, uint64_t i, uint64_t j) {
     uint32_t(*v)[4] = f->tets.v;
     for (uint32_t c = 0; c < 4; c++) {
         uint32_t p[3], apex = INCODE_NONE, made[3][4];
@@ -82,8 +79,7 @@ static bool flip(struct fixture *f, uint64_t i, uint64_t j)
 
 /* A flip leaves a tiling, which the one depth passes and the other does not;
  * both tetrahedra that are gone had the vertices that are named. */
-static void flips(struct fixture *f)
-{
+static void flips(struct fixture *f) {
     for (uint64_t i = 0; i < f->tets.count && i < 60; i++) {
         for (uint64_t j = i + 1; j < f->tets.count; j++) {
             struct host_check_report r;
@@ -105,16 +101,14 @@ static void flips(struct fixture *f)
     }
 }
 
-static void only_spheres_tell_a_flip(void **unused)
-{
+static void only_spheres_tell_a_flip(void **unused) {
     (void)unused;
     for_each_set(flips);
 }
 
 /* Five points cut in both ways, besides all that is right: every new facet
  * belongs to two tetrahedra, both on one side. */
-static void a_body_twice_is_found(void **unused)
-{
+static void a_body_twice_is_found(void **unused) {
     (void)unused;
     struct fixture f;
     int bodies = 0;
@@ -152,8 +146,7 @@ static void a_body_twice_is_found(void **unused)
 
 /* A flat tetrahedron on a face of the cube, over two facets of the hull: all
  * facets fit, and the surface is as convex as it was. */
-static bool cover(struct fixture *f, const uint32_t p[3])
-{
+static bool cover(struct fixture *f, const uint32_t p[3]) {
     struct host_check_report r;
     for (uint32_t v = 0; v < f->sites.count; v++) {
         const uint32_t t[4] = {p[0], p[2], p[1], v};
@@ -175,8 +168,7 @@ static bool cover(struct fixture *f, const uint32_t p[3])
     return false;
 }
 
-static void flat_ones_are_found(void **unused)
-{
+static void flat_ones_are_found(void **unused) {
     (void)unused;
     struct fixture f;
     int covered = 0;
@@ -200,8 +192,7 @@ static void flat_ones_are_found(void **unused)
 /* Five tetrahedra about an axis, from each corner of a pentagon to the next but
  * one: positive, closed, of Euler characteristic 2 and convex at every edge,
  * but wound twice. */
-static void a_surface_wound_twice_is_found(void **unused)
-{
+static void a_surface_wound_twice_is_found(void **unused) {
     (void)unused;
     static const double pi = 3.14159265358979323846;
     double xyz[21] = {0, 0, -1, 0, 0, 1};
@@ -229,8 +220,7 @@ static void a_surface_wound_twice_is_found(void **unused)
 }
 
 /* Odd and even points by themselves: every facet fits, and yet. */
-static void two_bodies_are_found(void **unused)
-{
+static void two_bodies_are_found(void **unused) {
     (void)unused;
     struct fixture f, part[2];
     double xyz[2][90], all[180];
@@ -261,8 +251,7 @@ static void two_bodies_are_found(void **unused)
 /* All tetrahedra at one vertex get a false vertex: a number out of range, which
  * is seen at once, or an unused slot, for which all is summed anew.  Both times
  * the same faults are counted, each once, with the vertex left alone. */
-static void false_vertices_count_once(void **unused)
-{
+static void false_vertices_count_once(void **unused) {
     (void)unused;
     struct fixture f;
     struct host_check_report r[2];
@@ -294,8 +283,7 @@ static void false_vertices_count_once(void **unused)
 }
 
 /* Whether three vertices lie on one side of the box of the points. */
-static bool is_on_box(const struct fixture *f, const uint32_t v[3])
-{
+static bool is_on_box(const struct fixture *f, const uint32_t v[3]) {
     double p[3][3];
     bool on = false;
     for (int k = 0; k < 3; k++) {
@@ -308,16 +296,14 @@ static bool is_on_box(const struct fixture *f, const uint32_t v[3])
     return on;
 }
 
-static int compare_vertices(const void *a, const void *b)
-{
+static int compare_vertices(const void *a, const void *b) {
     const uint32_t *x = a, *y = b;
     return *x < *y ? -1 : *x > *y;
 }
 
 /* Sums at vertices leave little to be paired one by one: the tetrahedra whose
  * lowest or second vertex is the lowest of a facet of the hull. */
-static void sums_leave_little_to_pair(void **unused)
-{
+static void sums_leave_little_to_pair(void **unused) {
     (void)unused;
     struct fixture f;
     struct host_check_report r;
@@ -346,8 +332,7 @@ static void sums_leave_little_to_pair(void **unused)
     close_set(&f);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_left_out_point_is_found),
         cmocka_unit_test(only_spheres_tell_a_flip),

@@ -9,8 +9,7 @@ struct heard {
 };
 
 static void hear_one(void *context, const uint64_t *tets, int tet_count,
-                     const uint32_t *vertices, int count, const char *what)
-{
+                     const uint32_t *vertices, int count, const char *what) {
     struct heard *h = context;
     (void)tets, (void)tet_count, (void)vertices, (void)count;
     h->times += strcmp(what, h->what) == 0;
@@ -18,8 +17,7 @@ static void hear_one(void *context, const uint64_t *tets, int tet_count,
 
 /* Of the tetrahedra {0 1 2 3}, {0 1 3 4} and {0 5 1 6}, facets as corner + 4 *
  * tetrahedron; returns how often it hears `what`. */
-static int heard(const uint32_t *facets, int n, const char *what)
-{
+static int heard(const uint32_t *facets, int n, const char *what) {
     static const double xyz[21] = {0, 0, 0,  1, 0, 0, 0, 1, 0, 0, 0,
                                    1, 0, -1, 0, 1, 1, 0, 0, 0, -1};
     static uint32_t v[3][4] = {{0, 1, 2, 3}, {0, 1, 3, 4}, {0, 5, 1, 6}};
@@ -43,8 +41,7 @@ static const char *const other_than_two =
     "is an edge of other than two hull facets";
 static const char *const opposite = "has hull facets of opposite orientation";
 
-static void open_surfaces_are_found(void **unused)
-{
+static void open_surfaces_are_found(void **unused) {
     (void)unused;
     assert_int_equal(heard((const uint32_t[]){0, 1, 2, 3}, 4, other_than_two),
                      0);
@@ -56,29 +53,25 @@ static void open_surfaces_are_found(void **unused)
 
 /* Facet (0 1 3) of the first, and (0 3 1) of the second, run along their common
  * edges each way; facets (0 2 1) and (0 3 1) both from 1 to 0. */
-static void turned_facets_are_found(void **unused)
-{
+static void turned_facets_are_found(void **unused) {
     (void)unused;
     assert_int_equal(heard((const uint32_t[]){2, 4 + 3}, 2, opposite), 0);
     assert_int_equal(heard((const uint32_t[]){3, 4 + 3}, 2, opposite), 1);
 }
 
 /* Facets (0 2 1) and (0 1 5) lie in one plane and over each other. */
-static void folds_are_found(void **unused)
-{
+static void folds_are_found(void **unused) {
     (void)unused;
     assert_int_equal(
         heard((const uint32_t[]){3, 8 + 3}, 2, "is a dent of the hull"), 1);
 }
 
-static void nothing_has_no_hull(void **unused)
-{
+static void nothing_has_no_hull(void **unused) {
     (void)unused;
     assert_int_equal(heard(NULL, 0, "there is no hull"), 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(open_surfaces_are_found),
         cmocka_unit_test(turned_facets_are_found),

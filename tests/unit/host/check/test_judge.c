@@ -6,8 +6,7 @@
 #include "host/check/judge.h"
 #include "tests/unit/host/check/check_world.h"
 
-static bool inside(const struct fixture *f, const uint32_t t[4], uint32_t v)
-{
+static bool inside(const struct fixture *f, const uint32_t t[4], uint32_t v) {
     struct incode_tally tally = {0};
     double p[5][3];
     for (int k = 0; k < 4; k++) {
@@ -17,8 +16,7 @@ static bool inside(const struct fixture *f, const uint32_t t[4], uint32_t v)
     return incode_in_sphere(&tally, p[0], p[1], p[2], p[3], p[4]) > 0;
 }
 
-static bool is_delaunay(const struct fixture *f, const uint32_t t[4])
-{
+static bool is_delaunay(const struct fixture *f, const uint32_t t[4]) {
     for (uint32_t v = 0; v < f->sites.count; v++) {
         if (host_site_is_vertex(&f->sites, v) && !is_one_of(t, 4, v) &&
             inside(f, t, v)) {
@@ -28,8 +26,7 @@ static bool is_delaunay(const struct fixture *f, const uint32_t t[4])
     return true;
 }
 
-static uint32_t apex_of(const struct fixture *f, const uint32_t facet[3])
-{
+static uint32_t apex_of(const struct fixture *f, const uint32_t facet[3]) {
     uint32_t t[4] = {facet[0], facet[1], facet[2], INCODE_NONE};
     for (uint32_t v = 0; v < f->sites.count; v++) {
         const uint32_t u[4] = {facet[0], facet[1], facet[2], v};
@@ -43,8 +40,7 @@ static uint32_t apex_of(const struct fixture *f, const uint32_t facet[3])
 
 static void facet_is_judged(const struct fixture *f,
                             const struct host_judge *judge,
-                            const uint32_t facet[3])
-{
+                            const uint32_t facet[3]) {
     uint32_t apex = apex_of(f, facet);
     assert_int_equal(host_judge_apex(judge, facet), apex);
     assert_int_equal(host_judge_beyond(judge, facet), apex != INCODE_NONE);
@@ -52,8 +48,7 @@ static void facet_is_judged(const struct fixture *f,
 
 static void tetrahedron_is_judged(struct fixture *f,
                                   const struct host_judge *judge,
-                                  const uint32_t t[4])
-{
+                                  const uint32_t t[4]) {
     const uint32_t turned[4] = {t[0], t[1], t[3], t[2]};
     assert_true(host_judge_tetrahedron(judge, t));
     assert_false(host_judge_tetrahedron(judge, turned));
@@ -75,8 +70,7 @@ static void tetrahedron_is_judged(struct fixture *f,
 }
 
 static void random_ones_are_judged(struct fixture *f,
-                                   const struct host_judge *judge)
-{
+                                   const struct host_judge *judge) {
     for (int i = 0; i < 300; i++) {
         uint32_t t[4];
         for (int k = 0; k < 4; k++) {
@@ -91,8 +85,7 @@ static void random_ones_are_judged(struct fixture *f,
     }
 }
 
-static void judge_all(struct fixture *f, uint64_t most)
-{
+static void judge_all(struct fixture *f, uint64_t most) {
     struct host_judge judge;
     struct host_error error = {0};
     assert_int_equal(host_judge_make(&judge, &f->sites, &error), 0);
@@ -103,8 +96,7 @@ static void judge_all(struct fixture *f, uint64_t most)
     host_judge_free(&judge);
 }
 
-static void judged_as_by_trying_all(void **unused)
-{
+static void judged_as_by_trying_all(void **unused) {
     (void)unused;
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         struct fixture f;
@@ -116,8 +108,7 @@ static void judged_as_by_trying_all(void **unused)
 
 /* Lattices whose steps no double has: points at, or a rounding beside, spheres
  * and the corners of boxes. */
-static void judged_on_lattices(void **unused)
-{
+static void judged_on_lattices(void **unused) {
     (void)unused;
     static const double parts[][3] = {{10, 10, 10}, {3, 7, 11}};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -137,8 +128,7 @@ static void judged_on_lattices(void **unused)
 }
 
 /* Axes far apart in size; products that overflow, and such that vanish. */
-static void judged_at_the_ends_of_the_range(void **unused)
-{
+static void judged_at_the_ends_of_the_range(void **unused) {
     (void)unused;
     static const int powers[][3] = {
         {400, 400, 400}, {-400, -400, -400}, {1000, 0, -1000}, {0, 0, -1060}};
@@ -158,8 +148,7 @@ static void judged_at_the_ends_of_the_range(void **unused)
 }
 
 /* Groups of bricks, most of which need no look: the boxes decide rightly. */
-static void judged_among_many(void **unused)
-{
+static void judged_among_many(void **unused) {
     (void)unused;
     struct host_judge judge;
     struct host_error error = {0};
@@ -188,8 +177,7 @@ static void judged_among_many(void **unused)
     host_order_free(&f.order);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(judged_as_by_trying_all),
         cmocka_unit_test(judged_on_lattices),

@@ -21,20 +21,17 @@ struct fixture {
     struct host_tetrahedra tets;
 };
 
-static int verify(struct fixture *f, struct host_check_report *report)
-{
+static int verify(struct fixture *f, struct host_check_report *report) {
     struct host_error error = {0};
     return host_verify(&f->points, &f->tets, report, &error);
 }
 
-static void close_fixture(struct fixture *f)
-{
+static void close_fixture(struct fixture *f) {
     host_points_free(&f->points);
     host_tetrahedra_free(&f->tets);
 }
 
-static struct fixture made(const char *kind, uint32_t n, uint64_t seed)
-{
+static struct fixture made(const char *kind, uint32_t n, uint64_t seed) {
     struct fixture f = {0};
     struct host_error error = {0};
     assert_int_equal(host_gen(kind, n, seed, &f.points, &error), 0);
@@ -44,8 +41,7 @@ static struct fixture made(const char *kind, uint32_t n, uint64_t seed)
 }
 
 /* Expects a fault whose report holds `what`. */
-static void expect(struct fixture *f, const char *what)
-{
+static void expect(struct fixture *f, const char *what) {
     struct host_check_report report;
     struct host_error error = {0};
     assert_int_equal(host_verify(&f->points, &f->tets, &report, &error),
@@ -58,8 +54,7 @@ static void expect(struct fixture *f, const char *what)
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void data_agrees(void **unused)
-{
+static void data_agrees(void **unused) {
     (void)unused;
     static const struct {
         const char *name;
@@ -120,8 +115,7 @@ static void data_agrees(void **unused)
     }
 }
 
-static void right_ones_pass(void **unused)
-{
+static void right_ones_pass(void **unused) {
     (void)unused;
     static const struct {
         const char *kind;
@@ -143,8 +137,7 @@ static void right_ones_pass(void **unused)
     }
 }
 
-static void range_beyond_scaling(void **unused)
-{
+static void range_beyond_scaling(void **unused) {
     (void)unused;
     struct fixture f = {0};
     struct host_error error = {0};
@@ -160,8 +153,7 @@ static void range_beyond_scaling(void **unused)
 }
 
 /* Corners as far away as doubles go. */
-static void ends_of_the_range(void **unused)
-{
+static void ends_of_the_range(void **unused) {
     (void)unused;
     struct fixture f = {0};
     struct host_error error = {0};
@@ -177,8 +169,7 @@ static void ends_of_the_range(void **unused)
     close_fixture(&f);
 }
 
-static void each_turned_one_is_found(void **unused)
-{
+static void each_turned_one_is_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 5);
     for (uint64_t i = 0; i < f.tets.count; i++) {
@@ -193,8 +184,7 @@ static void each_turned_one_is_found(void **unused)
     close_fixture(&f);
 }
 
-static void each_missing_one_is_found(void **unused)
-{
+static void each_missing_one_is_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 6);
     uint64_t count = f.tets.count;
@@ -214,8 +204,7 @@ static void each_missing_one_is_found(void **unused)
     close_fixture(&f);
 }
 
-static void each_doubled_one_is_found(void **unused)
-{
+static void each_doubled_one_is_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 7);
     uint64_t count = f.tets.count;
@@ -232,8 +221,7 @@ static void each_doubled_one_is_found(void **unused)
     close_fixture(&f);
 }
 
-static void each_wrong_apex_is_found(void **unused)
-{
+static void each_wrong_apex_is_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 8);
     for (uint64_t i = 0; i < f.tets.count; i++) {
@@ -252,8 +240,7 @@ static void each_wrong_apex_is_found(void **unused)
     close_fixture(&f);
 }
 
-static bool positive(const struct fixture *f, const uint32_t t[4])
-{
+static bool positive(const struct fixture *f, const uint32_t t[4]) {
     struct incode_tally tally = {0};
     const double *xyz = f->points.xyz;
     return incode_orient3d(&tally, xyz + 3 * t[0], xyz + 3 * t[1],
@@ -263,8 +250,7 @@ static bool positive(const struct fixture *f, const uint32_t t[4])
 /* Two tetrahedra on facet p to three about the edge of their apexes; false
  * where their union is not convex. */
 static bool flip(struct fixture *f, uint64_t i, uint64_t j, const uint32_t p[3],
-                 uint32_t below, uint32_t above)
-{
+                 uint32_t below, uint32_t above) {
     uint32_t made_of[3][4];
     for (int k = 0; k < 3; k++) {
         uint32_t t[4] = {p[k], p[(k + 1) % 3], below, above};
@@ -283,8 +269,7 @@ static bool flip(struct fixture *f, uint64_t i, uint64_t j, const uint32_t p[3],
 }
 
 /* Valid triangulations that differ by one flip: only the spheres tell. */
-static int flips_found(const char *kind, uint32_t n, uint64_t seed)
-{
+static int flips_found(const char *kind, uint32_t n, uint64_t seed) {
     struct fixture f = made(kind, n, seed);
     int flips = 0;
     for (uint64_t i = 0; i < f.tets.count; i++) {
@@ -313,16 +298,14 @@ static int flips_found(const char *kind, uint32_t n, uint64_t seed)
     return flips;
 }
 
-static void each_flip_is_found(void **unused)
-{
+static void each_flip_is_found(void **unused) {
     (void)unused;
     assert_true(flips_found("uniform", 30, 9) >= 10);
     assert_true(flips_found("grid", 27, 9) >= 0);
 }
 
 /* Six cospherical points: three ways to cut them, one is right. */
-static void wrong_ties_are_found(void **unused)
-{
+static void wrong_ties_are_found(void **unused) {
     (void)unused;
     const double xyz[18] = {1, 0,  0, -1, 0, 0, 0, 1, 0,
                             0, -1, 0, 0,  0, 1, 0, 0, -1};
@@ -352,8 +335,7 @@ static void wrong_ties_are_found(void **unused)
     assert_int_equal(passed, 1);
 }
 
-static void unused_points_are_found(void **unused)
-{
+static void unused_points_are_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 10);
     struct host_error error = {0};
@@ -368,8 +350,7 @@ static void unused_points_are_found(void **unused)
     close_fixture(&f);
 }
 
-static void duplicates_stand_for_the_lowest(void **unused)
-{
+static void duplicates_stand_for_the_lowest(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 40, 11);
     struct host_error error = {0};
@@ -389,8 +370,7 @@ static void duplicates_stand_for_the_lowest(void **unused)
 }
 
 /* Odd and even points by themselves: every facet fits, and yet. */
-static void two_bodies_are_found(void **unused)
-{
+static void two_bodies_are_found(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 30, 12), g = made("uniform", 30, 13);
     struct host_error error = {0};
@@ -410,8 +390,7 @@ static void two_bodies_are_found(void **unused)
 
 /* All tetrahedra at a vertex of the hull left out, and the vertex too: a dent
  * or another hull. */
-static void dents_are_found(void **unused)
-{
+static void dents_are_found(void **unused) {
     (void)unused;
     struct fixture f = made("sphere", 60, 14);
     uint64_t kept = 0;
@@ -426,8 +405,7 @@ static void dents_are_found(void **unused)
     close_fixture(&f);
 }
 
-static void nothing_is_no_triangulation(void **unused)
-{
+static void nothing_is_no_triangulation(void **unused) {
     (void)unused;
     struct fixture f = made("uniform", 10, 15);
     host_tetrahedra_cut(&f.tets, 0);
@@ -436,8 +414,7 @@ static void nothing_is_no_triangulation(void **unused)
 }
 
 /* Rows of any numbers, the same vertex twice included. */
-static void garbage_is_refused(void **unused)
-{
+static void garbage_is_refused(void **unused) {
     (void)unused;
     struct fixture f = {0};
     struct host_error error = {0};
@@ -459,8 +436,7 @@ static void garbage_is_refused(void **unused)
     close_fixture(&f);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(data_agrees),
         cmocka_unit_test(right_ones_pass),

@@ -37,67 +37,57 @@ static struct {
     unsigned pictures, enough; /* shown; after which it is enough */
 } desk;
 
-static inline void append(char *to, const char *text)
-{
+static inline void append(char *to, const char *text) {
     size_t used = strlen(to);
     assert_true(used + strlen(text) + 2 < SAID);
     snprintf(to + used, SAID - used, "%s\n", text);
 }
 
-static inline void take_line(void *context, const char *text)
-{
+static inline void take_line(void *context, const char *text) {
     (void)context;
     append(desk.said, text);
 }
 
-static inline void take_note(void *context, const char *text)
-{
+static inline void take_note(void *context, const char *text) {
     (void)context;
     append(desk.noted, text);
 }
 
-static inline void take_failed(void *context, const char *text)
-{
+static inline void take_failed(void *context, const char *text) {
     (void)context;
     append(desk.failed, text);
 }
 
-static inline bool is_interrupted(void *context)
-{
+static inline bool is_interrupted(void *context) {
     (void)context;
     return desk.interrupt;
 }
 
 static inline int open_world(void *context, struct host_machine *machine,
-                             struct host_error *error)
-{
+                             struct host_error *error) {
     (void)context, (void)error;
     *machine = host_world_machine(&desk.world);
     return 0;
 }
 
-static inline void close_world(void *context)
-{
+static inline void close_world(void *context) {
     (void)context;
 }
 
-static inline bool world_has_line(void *context, unsigned node)
-{
+static inline bool world_has_line(void *context, unsigned node) {
     (void)context;
     return (desk.lined >> node & 1) != 0;
 }
 
 static inline int world_pulse(void *context, unsigned node,
-                              struct host_error *error)
-{
+                              struct host_error *error) {
     (void)context, (void)error;
     desk.pulses++;
     host_world_crash(&desk.world, node, 1000, false);
     return 0;
 }
 
-static inline void begin(unsigned dimension, bool json)
-{
+static inline void begin(unsigned dimension, bool json) {
     const struct host_world_options options = {
         .cube = {.dimension = dimension,
                  .seed = 7,
@@ -128,22 +118,19 @@ static inline void begin(unsigned dimension, bool json)
     host_shell_init(&desk.shell, &desk.place, &desk.sink, json);
 }
 
-static inline void end(void)
-{
+static inline void end(void) {
     host_shell_close(&desk.shell);
     host_world_close(&desk.world);
 }
 
 /* A line's status; what it said is in desk.said and desk.failed alone. */
-static inline int says(const char *line)
-{
+static inline int says(const char *line) {
     desk.said[0] = desk.failed[0] = '\0';
     return host_shell_line(&desk.shell, line);
 }
 
 /* Until so much of the world's time has passed. */
-static inline void let_pass(uint64_t us)
-{
+static inline void let_pass(uint64_t us) {
     uint64_t end_us = desk.world.now_us + us;
     while (desk.world.now_us < end_us) {
         host_shell_tend(&desk.shell, end_us - desk.world.now_us);
@@ -151,8 +138,7 @@ static inline void let_pass(uint64_t us)
 }
 
 /* Both ways: what is sent is lost, and nobody is told. */
-static inline void deafen(unsigned node, unsigned link, bool deaf)
-{
+static inline void deafen(unsigned node, unsigned link, bool deaf) {
     struct host_sim_cube *cube = &desk.world.cube;
     unsigned wire = host_sim_cube_wire(cube, node, link);
     host_sim_cube_deaf(cube, wire, 0, deaf);
@@ -160,8 +146,7 @@ static inline void deafen(unsigned node, unsigned link, bool deaf)
 }
 
 /* The object that the last line has answered, to be freed. */
-static inline json_t *object(void)
-{
+static inline json_t *object(void) {
     json_error_t error;
     json_t *answer = json_loads(desk.said, 0, &error);
     if (answer == NULL) {

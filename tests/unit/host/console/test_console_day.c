@@ -9,16 +9,14 @@
 #define HOUR_US (UINT64_C(3600) * 1000000)
 enum { HOURS = 24, HOURS_EMULATED = 2, SETTLE_S = 30 };
 
-static void is_well(const char *line)
-{
+static void is_well(const char *line) {
     if (says(line) != 0) {
         fail_msg("%s: %s%s", line, desk.said, desk.failed);
     }
     assert_true(desk.said[0] != '\0');
 }
 
-static void all_is_well(void)
-{
+static void all_is_well(void) {
     is_well("ping all 2");
     is_well("links");
     is_well("stat");
@@ -30,8 +28,7 @@ static void all_is_well(void)
 }
 
 /* What happens in an hour, by turns. */
-static void disturb(unsigned hour)
-{
+static void disturb(unsigned hour) {
     unsigned node = 1 + hour % 3;
     if (hour % 3 == 0) {
         is_well("reset 1-3");
@@ -48,8 +45,7 @@ static void disturb(unsigned hour)
     let_pass(SETTLE_S * UINT64_C(1000000));
 }
 
-static void a_day_passes(void **unused)
-{
+static void a_day_passes(void **unused) {
     size_t first = 0;
     unsigned hours = emulated() || SANITIZED ? HOURS_EMULATED : HOURS;
     (void)unused;
@@ -71,8 +67,7 @@ static void a_day_passes(void **unused)
     end();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_day_passes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,8 +4,7 @@
 
 /* --- lines ---------------------------------------------------------------- */
 
-static void what_is_no_command_is_told(void **unused)
-{
+static void what_is_no_command_is_told(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says(""), 0);
@@ -32,8 +31,7 @@ static void what_is_no_command_is_told(void **unused)
     end();
 }
 
-static void a_line_may_have_too_many_words(void **unused)
-{
+static void a_line_may_have_too_many_words(void **unused) {
     char line[4096] = "ping";
     (void)unused;
     begin(0, false);
@@ -44,8 +42,7 @@ static void a_line_may_have_too_many_words(void **unused)
     end();
 }
 
-static void help_has_every_command(void **unused)
-{
+static void help_has_every_command(void **unused) {
     const struct host_shell_command *row;
     (void)unused;
     begin(0, false);
@@ -64,8 +61,7 @@ static void help_has_every_command(void **unused)
 /* --- completion ----------------------------------------------------------- */
 
 /* What may stand at the end of the line: "a b ". */
-static void completes(const char *line, const char *expected, size_t from)
-{
+static void completes(const char *line, const char *expected, size_t from) {
     char *words[64], all[1024] = "";
     size_t at;
     unsigned count = host_shell_complete(&desk.shell, line, &at, words, 64);
@@ -80,8 +76,7 @@ static void completes(const char *line, const char *expected, size_t from)
     }
 }
 
-static void words_are_completed(void **unused)
-{
+static void words_are_completed(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(host_shell_open(&desk.shell, &desk.shell.error), 0);
@@ -104,13 +99,11 @@ static void words_are_completed(void **unused)
 
 /* --- folding -------------------------------------------------------------- */
 
-static void fold_line(void *context, const char *text)
-{
+static void fold_line(void *context, const char *text) {
     append(context, text);
 }
 
-static void equal_rows_are_folded(void **unused)
-{
+static void equal_rows_are_folded(void **unused) {
     static char text[SAID];
     struct host_fold fold = {0};
     (void)unused;
@@ -133,8 +126,7 @@ static void equal_rows_are_folded(void **unused)
     host_fold_free(&fold);
 }
 
-static void figures_are_short(void **unused)
-{
+static void figures_are_short(void **unused) {
     char text[HOST_SHELL_FIGURE], bar[HOST_SHELL_BAR];
     (void)unused;
     assert_string_equal(host_shell_bytes(0, text), "0");
@@ -154,8 +146,7 @@ static void figures_are_short(void **unused)
 
 /* --- over a cube ---------------------------------------------------------- */
 
-static void nodes_are_asked(void **unused)
-{
+static void nodes_are_asked(void **unused) {
     (void)unused;
     begin(3, false);
     assert_int_equal(says("ping all 2"), 0);
@@ -182,8 +173,7 @@ static void nodes_are_asked(void **unused)
     end();
 }
 
-static void answers_are_objects(void **unused)
-{
+static void answers_are_objects(void **unused) {
     static const char *const lines[] = {
         "ping 0-1 2", "links",  "stat",      "memory 3", "log",
         "top",        "nodes",  "trace 0 3", "wires",    "help",
@@ -218,8 +208,7 @@ static void answers_are_objects(void **unused)
     end();
 }
 
-static void what_is_dead_is_marked(void **unused)
-{
+static void what_is_dead_is_marked(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says("wires"), 0);
@@ -235,8 +224,7 @@ static void what_is_dead_is_marked(void **unused)
     end();
 }
 
-static void who_is_gone_is_named(void **unused)
-{
+static void who_is_gone_is_named(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
@@ -255,8 +243,7 @@ static void who_is_gone_is_named(void **unused)
     end();
 }
 
-static void nodes_that_begin_anew_are_noted(void **unused)
-{
+static void nodes_that_begin_anew_are_noted(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
@@ -272,8 +259,7 @@ static void nodes_that_begin_anew_are_noted(void **unused)
     end();
 }
 
-static void nodes_are_reset(void **unused)
-{
+static void nodes_are_reset(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says("reset 1-2"), 0);
@@ -290,8 +276,7 @@ static void nodes_are_reset(void **unused)
     end();
 }
 
-static void a_person_may_interrupt(void **unused)
-{
+static void a_person_may_interrupt(void **unused) {
     (void)unused;
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
@@ -303,8 +288,7 @@ static void a_person_may_interrupt(void **unused)
     end();
 }
 
-static bool take_picture(void *context, const char *text)
-{
+static bool take_picture(void *context, const char *text) {
     (void)context;
     if (text == NULL) {
         return false;
@@ -313,8 +297,7 @@ static bool take_picture(void *context, const char *text)
     return ++desk.pictures < desk.enough;
 }
 
-static void top_goes_on_until_it_is_enough(void **unused)
-{
+static void top_goes_on_until_it_is_enough(void **unused) {
     (void)unused;
     begin(2, false);
     desk.sink.picture = take_picture;
@@ -325,8 +308,7 @@ static void top_goes_on_until_it_is_enough(void **unused)
     end();
 }
 
-static void bytes_that_are_no_frame_are_shown(void **unused)
-{
+static void bytes_that_are_no_frame_are_shown(void **unused) {
     char text[5 * HOST_WATCH_BYTES];
     struct host_watch watch = {.used = 0};
     (void)unused;
@@ -339,8 +321,7 @@ static void bytes_that_are_no_frame_are_shown(void **unused)
     end();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_no_command_is_told),
         cmocka_unit_test(a_line_may_have_too_many_words),

@@ -13,15 +13,13 @@
 
 static char said[2000];
 
-static void take(void *context, const char *text)
-{
+static void take(void *context, const char *text) {
     (void)context;
     strcat(said, text);
     strcat(said, "\n");
 }
 
-static const char *folded(const uint32_t *time_s, unsigned count)
-{
+static const char *folded(const uint32_t *time_s, unsigned count) {
     struct host_fold fold = {0};
     for (unsigned i = 0; i < count; i++) {
         host_fold_add_timed(&fold, i, "up \1 all", time_s[i]);
@@ -32,8 +30,7 @@ static const char *folded(const uint32_t *time_s, unsigned count)
     return said;
 }
 
-static void times_that_are_near_share_a_row(void **unused)
-{
+static void times_that_are_near_share_a_row(void **unused) {
     (void)unused;
     assert_string_equal(folded((uint32_t[]){7, 7}, 2),
                         "NODES  TIME\n0-1    up       7 s all\n");
@@ -46,16 +43,14 @@ static void times_that_are_near_share_a_row(void **unused)
 }
 
 /* One that has begun anew is seen. */
-static void times_that_are_not_do_not(void **unused)
-{
+static void times_that_are_not_do_not(void **unused) {
     (void)unused;
     assert_string_equal(folded((uint32_t[]){3600, 3605, 12}, 3),
                         "NODES  TIME\n0-1    up       1 h all\n"
                         "2      up      12 s all\n");
 }
 
-static void a_row_without_a_time_is_another(void **unused)
-{
+static void a_row_without_a_time_is_another(void **unused) {
     struct host_fold fold = {0};
     (void)unused;
     host_fold_add(&fold, 0, "no answer");
@@ -65,8 +60,7 @@ static void a_row_without_a_time_is_another(void **unused)
     host_fold_free(&fold);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(times_that_are_near_share_a_row),
         cmocka_unit_test(times_that_are_not_do_not),

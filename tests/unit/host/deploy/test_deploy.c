@@ -24,31 +24,27 @@ static const char *const cube =
 
 static struct host_cube_file file;
 
-static int read_cube(void **unused)
-{
+static int read_cube(void **unused) {
     (void)unused;
     struct host_error error = {0};
     assert_int_equal(host_cube_file_parse(&file, "t.cube", cube, &error), 0);
     return 0;
 }
 
-static int free_cube(void **unused)
-{
+static int free_cube(void **unused) {
     (void)unused;
     host_cube_file_free(&file);
     return 0;
 }
 
-static void test_where(void **unused)
-{
+static void test_where(void **unused) {
     (void)unused;
     assert_string_equal(host_cube_ssh(&file, 0)->to, "pi@board");
     assert_string_equal(host_cube_ssh(&file, 0)->folder, "a b");
     assert_null(host_cube_ssh(&file, 1));
 }
 
-static char *text_of(const char *manager)
-{
+static char *text_of(const char *manager) {
     const struct host_unit unit = {.file = &file,
                                    .node = 0,
                                    .folder = "/home/p i/node-0",
@@ -59,8 +55,7 @@ static char *text_of(const char *manager)
     return text;
 }
 
-static void test_service(void **unused)
-{
+static void test_service(void **unused) {
     (void)unused;
     char *text = text_of("system");
     assert_non_null(
@@ -80,8 +75,7 @@ static void test_service(void **unused)
     free(text);
 }
 
-static void test_start(void **unused)
-{
+static void test_start(void **unused) {
     (void)unused;
     char *text = text_of("none");
     assert_int_equal(strncmp(text, "#!/bin/sh\n", 10), 0);
@@ -91,8 +85,7 @@ static void test_start(void **unused)
 }
 
 /* A shell hands the script its words as they were. */
-static void test_command(void **unused)
-{
+static void test_command(void **unused) {
     (void)unused;
     char *command = host_script_command("look", 7, "a 'b' $c");
     assert_non_null(command);
@@ -102,8 +95,7 @@ static void test_command(void **unused)
     free(command);
 }
 
-static void test_programs(void **unused)
-{
+static void test_programs(void **unused) {
     (void)unused;
     static struct host_programs programs;
     struct host_error error = {0};
@@ -124,8 +116,7 @@ static void test_programs(void **unused)
 
 /* Where the folder lacks it, what make has made for this machine's processor,
  * and for no other. */
-static void test_own_program(void **unused)
-{
+static void test_own_program(void **unused) {
     (void)unused;
     static struct host_programs programs;
     struct host_error error = {0};
@@ -156,8 +147,7 @@ static void test_own_program(void **unused)
     host_programs_free(&programs);
 }
 
-static void test_refused(void **unused)
-{
+static void test_refused(void **unused) {
     (void)unused;
     static const char *const bad[] = {"ssh = \"\"",
                                       "ssh = \"-oProxyCommand=x\"",
@@ -183,8 +173,7 @@ static void test_refused(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_where),    cmocka_unit_test(test_service),
         cmocka_unit_test(test_start),    cmocka_unit_test(test_command),

@@ -24,8 +24,7 @@ static struct host_points points;
 static struct host_tetrahedra tets;
 
 /* Each small cube is six tetrahedra around its diagonal. */
-static int make_cube(void **unused)
-{
+static int make_cube(void **unused) {
     static const unsigned steps[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2},
                                          {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     static const uint32_t stride[3] = {ROWS * ROWS, ROWS, 1};
@@ -52,8 +51,7 @@ static int make_cube(void **unused)
     return 0;
 }
 
-static int drop_cube(void **unused)
-{
+static int drop_cube(void **unused) {
     (void)unused;
     host_points_free(&points);
     host_tetrahedra_free(&tets);
@@ -61,8 +59,7 @@ static int drop_cube(void **unused)
 }
 
 /* Of one cell; every corner turns the same way. */
-static double area_of(const struct host_cell *c)
-{
+static double area_of(const struct host_cell *c) {
     double area = 0.0, turn = 0.0;
     for (unsigned k = 0; k < c->corners; k++) {
         const float *a = c->corner[k], *b = c->corner[(k + 1) % c->corners];
@@ -77,8 +74,7 @@ static double area_of(const struct host_cell *c)
     return fabs(area);
 }
 
-static double section_area(struct host_plane plane, double unit)
-{
+static double section_area(struct host_plane plane, double unit) {
     struct host_section section;
     struct host_error error = {0};
     double area = 0.0;
@@ -93,8 +89,7 @@ static double section_area(struct host_plane plane, double unit)
     return area;
 }
 
-static void test_covers_the_section_once(void **unused)
-{
+static void test_covers_the_section_once(void **unused) {
     /* The widest has sides that are no double any more. */
     static const double units[] = {1.0, 1e307, 4.9e-324, 5e307};
     static const double from[] = {0.0, 0.0, 0.0, -3.0};
@@ -119,8 +114,7 @@ static void test_covers_the_section_once(void **unused)
     points.xyz = xyz;
 }
 
-static void test_beside(void **unused)
-{
+static void test_beside(void **unused) {
     static const double at[] = {-1.0, 0.0, 6.0000001, 1e300};
     (void)unused;
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
@@ -135,8 +129,7 @@ static void test_beside(void **unused)
     }
 }
 
-static void test_default_plane(void **unused)
-{
+static void test_default_plane(void **unused) {
     (void)unused;
     struct host_plane plane = host_plane_through_middle(&points);
     assert_true(plane.axis == 2 && plane.at == 3.0);
@@ -153,8 +146,7 @@ static void test_default_plane(void **unused)
 /* --- pictures ------------------------------------------------------------- */
 
 /* What is written of the cube, `width` pixels wide; to be freed. */
-static char *written(const char *name, unsigned width, long *bytes)
-{
+static char *written(const char *name, unsigned width, long *bytes) {
     struct host_section section;
     struct host_error error = {0};
     struct host_output out;
@@ -187,8 +179,7 @@ static char *written(const char *name, unsigned width, long *bytes)
 }
 
 /* Of a path's cells, in the drawing's units. */
-static double path_area(const char *d)
-{
+static double path_area(const char *d) {
     double area = 0.0, at[2] = {0, 0}, start[2] = {0, 0};
     char command = 0;
     while (*d != '\0') {
@@ -218,8 +209,7 @@ static double path_area(const char *d)
 }
 
 /* Cells of a path may turn either way: each is taken by itself. */
-static double cells_area(const char *d)
-{
+static double cells_area(const char *d) {
     double area = 0.0;
     assert_memory_equal(d, "M0 0m", 5);
     for (d += 4; *d == 'm';) {
@@ -240,8 +230,7 @@ struct drawing {
 };
 
 static void XMLCALL on_element(void *context, const XML_Char *name,
-                               const XML_Char **attributes)
-{
+                               const XML_Char **attributes) {
     struct drawing *drawing = context;
     for (; *attributes != NULL; attributes += 2) {
         if (strcmp(name, "path") == 0 && strcmp(attributes[0], "d") == 0) {
@@ -254,8 +243,7 @@ static void XMLCALL on_element(void *context, const XML_Char *name,
     }
 }
 
-static struct drawing parse_svg(const char *text, long bytes)
-{
+static struct drawing parse_svg(const char *text, long bytes) {
     struct drawing drawing = {0};
     XML_Parser parser = XML_ParserCreate(NULL);
     XML_SetUserData(parser, &drawing);
@@ -265,8 +253,7 @@ static struct drawing parse_svg(const char *text, long bytes)
     return drawing;
 }
 
-static void test_svg(void **unused)
-{
+static void test_svg(void **unused) {
     long bytes;
     (void)unused;
     char *text = written("a.svg", 402, &bytes);
@@ -279,8 +266,7 @@ static void test_svg(void **unused)
 }
 
 /* Cells below a pixel are one path element a pixel, and no more. */
-static void test_svg_merges(void **unused)
-{
+static void test_svg_merges(void **unused) {
     struct host_cell cells[500];
     struct host_section section = {cells, 500, 0.0, {1, 1}, {1, 1}};
     struct host_picture picture = host_picture_of(&section, 102);
@@ -299,8 +285,7 @@ static void test_svg_merges(void **unused)
     assert_int_equal(host_output_close(&out, 1, &error), 0);
 }
 
-static void test_png(void **unused)
-{
+static void test_png(void **unused) {
     enum { WIDTH = 122 };
     static png_byte pixels[WIDTH][WIDTH][3];
     png_image image = {.version = PNG_IMAGE_VERSION};
@@ -326,8 +311,7 @@ static void test_png(void **unused)
 }
 
 /* What is covered adds up, also where it reaches out of the raster. */
-static void test_raster(void **unused)
-{
+static void test_raster(void **unused) {
     enum { N = 16 };
     static float pixels[N * N][HOST_CHANNELS];
     static const float one[HOST_CHANNELS] = {0, 0, 0, 1.0f, 0};
@@ -352,8 +336,7 @@ static void test_raster(void **unused)
     assert_true(fabs(sum - 50.0) < 0.01);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_covers_the_section_once),
         cmocka_unit_test(test_beside),

@@ -24,8 +24,7 @@
 
 enum { OUTPUTS = 4 };
 
-static void put(const char *name, const char *text)
-{
+static void put(const char *name, const char *text) {
     FILE *file = fopen(name, "w");
     assert_non_null(file);
     assert_true(fputs(text, file) >= 0);
@@ -38,8 +37,7 @@ static int
     raise_at; /* the change of a name that a signal comes with; 0: none */
 static const char *taken_over; /* a name that another file has soon after */
 
-int link(const char *from, const char *to)
-{
+int link(const char *from, const char *to) {
     if (no_links && access(from, F_OK) == 0) {
         errno = EPERM;
         return -1;
@@ -47,8 +45,7 @@ int link(const char *from, const char *to)
     return (int)syscall(SYS_linkat, AT_FDCWD, from, AT_FDCWD, to, 0);
 }
 
-int rename(const char *from, const char *to)
-{
+int rename(const char *from, const char *to) {
     if (raise_at > 0 && --raise_at == 0) {
         (void)raise(SIGTERM);
     }
@@ -65,20 +62,17 @@ static char directory[] = "/tmp/incode-output-XXXXXX";
 static const char *const names[OUTPUTS] = {"a.node", "a.neigh", "a.face",
                                            "a.ele"};
 
-static int enter(void **unused)
-{
+static int enter(void **unused) {
     (void)unused;
     return mkdtemp(directory) != NULL && chdir(directory) == 0 ? 0 : -1;
 }
 
-static int leave(void **unused)
-{
+static int leave(void **unused) {
     (void)unused;
     return chdir("/") == 0 && rmdir(directory) == 0 ? 0 : -1;
 }
 
-static unsigned files(void)
-{
+static unsigned files(void) {
     unsigned count = 0;
     DIR *all = opendir(".");
     assert_non_null(all);
@@ -90,8 +84,7 @@ static unsigned files(void)
 }
 
 /* Takes the file away, whose text this is. */
-static void take(const char *name, const char *text)
-{
+static void take(const char *name, const char *text) {
     char found[64] = "";
     FILE *file = fopen(name, "r");
     if (file == NULL) {
@@ -104,15 +97,13 @@ static void take(const char *name, const char *text)
     assert_int_equal(unlink(name), 0);
 }
 
-static const char *beside(const char *name, const char *what, pid_t writer)
-{
+static const char *beside(const char *name, const char *what, pid_t writer) {
     static char text[64];
     (void)snprintf(text, sizeof text, "%s.%s-%ld", name, what, (long)writer);
     return text;
 }
 
-static void open_all(struct host_output *out, struct host_error *error)
-{
+static void open_all(struct host_output *out, struct host_error *error) {
     for (int i = 0; i < OUTPUTS; i++) {
         if (host_output_open(&out[i], names[i], error) != 0) {
             _exit(100);
@@ -123,8 +114,7 @@ static void open_all(struct host_output *out, struct host_error *error)
 
 /* In a process of its own: opens outputs, closes `closed` of them, is ended, or
  * else gives all of them their names. */
-static _Noreturn void be_ended(int number, int closed, void (*ignored)(int))
-{
+static _Noreturn void be_ended(int number, int closed, void (*ignored)(int)) {
     struct host_output out[OUTPUTS];
     struct host_error error = {0};
     (void)signal(number, ignored);
@@ -141,8 +131,7 @@ static _Noreturn void be_ended(int number, int closed, void (*ignored)(int))
     _exit(error.code);
 }
 
-static int ended(int number, int closed, void (*ignored)(int))
-{
+static int ended(int number, int closed, void (*ignored)(int)) {
     int status = -1;
     pid_t child = fork();
     if (child == 0) {
@@ -153,8 +142,7 @@ static int ended(int number, int closed, void (*ignored)(int))
     return status;
 }
 
-static void a_signal_leaves_no_parts(void **unused)
-{
+static void a_signal_leaves_no_parts(void **unused) {
     (void)unused;
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
     for (int i = 0; i < 3; i++) {
@@ -168,8 +156,7 @@ static void a_signal_leaves_no_parts(void **unused)
 }
 
 /* What a process says that is ended while this is its output; NULL: none. */
-static const char *last_words(int number, const char *path)
-{
+static const char *last_words(int number, const char *path) {
     static char said[256];
     int ends[2], status = -1;
     assert_int_equal(pipe(ends), 0);
@@ -195,8 +182,7 @@ static const char *last_words(int number, const char *path)
     return said;
 }
 
-static void a_signal_says_what_is_written(void **unused)
-{
+static void a_signal_says_what_is_written(void **unused) {
     (void)unused;
     assert_string_equal(last_words(SIGINT, names[0]),
                         "incode: interrupted; no output was written\n");
@@ -209,8 +195,7 @@ static void a_signal_says_what_is_written(void **unused)
     assert_int_equal(files(), 0);
 }
 
-static void an_ignored_signal_stays_ignored(void **unused)
-{
+static void an_ignored_signal_stays_ignored(void **unused) {
     (void)unused;
     int status = ended(SIGHUP, 0, SIG_IGN);
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
@@ -220,8 +205,7 @@ static void an_ignored_signal_stays_ignored(void **unused)
     }
 }
 
-static void a_signal_amid_the_names_is_too_late(void **unused)
-{
+static void a_signal_amid_the_names_is_too_late(void **unused) {
     (void)unused;
     for (int at = 1; at <= OUTPUTS; at++) {
         raise_at = at;
@@ -236,8 +220,7 @@ static void a_signal_amid_the_names_is_too_late(void **unused)
 }
 
 /* More than one command line can ask for. */
-static void however_many_there_are(void **unused)
-{
+static void however_many_there_are(void **unused) {
     (void)unused;
     enum { MANY = 100 };
     int status = -1;
@@ -262,8 +245,7 @@ static void however_many_there_are(void **unused)
     assert_int_equal(files(), 0);
 }
 
-static void what_was_there_outlives_a_failure(void **unused)
-{
+static void what_was_there_outlives_a_failure(void **unused) {
     (void)unused;
     struct host_output out[OUTPUTS];
     struct host_error error = {0};
@@ -277,8 +259,7 @@ static void what_was_there_outlives_a_failure(void **unused)
 }
 
 /* a.face is a directory by then; a.node was a file before. */
-static void fail_amid_the_names(struct host_error *error)
-{
+static void fail_amid_the_names(struct host_error *error) {
     struct host_output out[OUTPUTS];
     put(names[0], "former");
     open_all(out, error);
@@ -288,8 +269,7 @@ static void fail_amid_the_names(struct host_error *error)
     assert_int_equal(rmdir(names[2]), 0);
 }
 
-static void all_get_their_names_or_none(void **unused)
-{
+static void all_get_their_names_or_none(void **unused) {
     (void)unused;
     struct host_error error = {0};
     fail_amid_the_names(&error);
@@ -299,8 +279,7 @@ static void all_get_their_names_or_none(void **unused)
     take(names[0], "former");
 }
 
-static void what_cannot_be_kept_is_told(void **unused)
-{
+static void what_cannot_be_kept_is_told(void **unused) {
     (void)unused;
     struct host_error error = {0};
     no_links = true;
@@ -310,8 +289,7 @@ static void what_cannot_be_kept_is_told(void **unused)
     assert_int_equal(files(), 0);
 }
 
-static void what_a_killed_process_left_is_no_hindrance(void **unused)
-{
+static void what_a_killed_process_left_is_no_hindrance(void **unused) {
     (void)unused;
     struct host_output out[OUTPUTS], again;
     struct host_error error = {0}, other = {0};
@@ -329,8 +307,7 @@ static void what_a_killed_process_left_is_no_hindrance(void **unused)
     }
 }
 
-static void write_one(const char *path)
-{
+static void write_one(const char *path) {
     struct host_output out;
     struct host_error error = {0};
     assert_int_equal(host_output_open(&out, path, &error), 0);
@@ -339,8 +316,7 @@ static void write_one(const char *path)
     assert_int_equal(host_output_commit(&error), 0);
 }
 
-static void links_to_what_is_not_yet_are_followed(void **unused)
-{
+static void links_to_what_is_not_yet_are_followed(void **unused) {
     (void)unused;
     struct host_output out;
     struct host_error error = {0};
@@ -364,8 +340,7 @@ static void links_to_what_is_not_yet_are_followed(void **unused)
 static const pid_t lost = 4194305; /* no process has it */
 
 /* What it left of `name` once that had the name, beside what `former` was. */
-static void leave_whole(const char *name, const char *former)
-{
+static void leave_whole(const char *name, const char *former) {
     put(name, "new");
     assert_int_equal(link(name, beside(name, "made", lost)), 0);
     if (former != NULL) {
@@ -373,8 +348,7 @@ static void leave_whole(const char *name, const char *former)
     }
 }
 
-static void cleaning_takes_no_more_than_was_made(void **unused)
-{
+static void cleaning_takes_no_more_than_was_made(void **unused) {
     (void)unused;
     assert_int_equal(mkdir("sub", 0777), 0);
     assert_int_equal(symlink("sub/file", "link"), 0);
@@ -400,8 +374,7 @@ static void cleaning_takes_no_more_than_was_made(void **unused)
 }
 
 /* Changed, or put there anew, while a run went on that failed. */
-static void cleaning_leaves_the_files_of_others(void **unused)
-{
+static void cleaning_leaves_the_files_of_others(void **unused) {
     (void)unused;
     put("file", "former");
     assert_int_equal(chmod("file", 0600), 0);
@@ -418,8 +391,7 @@ static void cleaning_leaves_the_files_of_others(void **unused)
 }
 
 /* Nor does the process itself take more back than it has put there. */
-static void a_name_taken_over_is_left(void **unused)
-{
+static void a_name_taken_over_is_left(void **unused) {
     (void)unused;
     struct host_output out[OUTPUTS];
     struct host_error error = {0};
@@ -434,8 +406,7 @@ static void a_name_taken_over_is_left(void **unused)
     take(names[0], "of somebody else");
 }
 
-static void a_limit_is_an_error(void **unused)
-{
+static void a_limit_is_an_error(void **unused) {
     (void)unused;
     struct rlimit limit, little;
     struct host_output out[OUTPUTS];
@@ -456,8 +427,7 @@ static void a_limit_is_an_error(void **unused)
     free(bytes);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_signal_leaves_no_parts),
         cmocka_unit_test(a_signal_says_what_is_written),

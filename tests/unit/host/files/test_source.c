@@ -24,8 +24,7 @@
 static char directory[] = "/tmp/incode-source-XXXXXX";
 static struct rlimit before;
 
-static int enter(void **unused)
-{
+static int enter(void **unused) {
     (void)unused;
     return mkdtemp(directory) != NULL && chdir(directory) == 0 &&
                    getrlimit(RLIMIT_AS, &before) == 0
@@ -33,15 +32,13 @@ static int enter(void **unused)
                : -1;
 }
 
-static int leave(void **unused)
-{
+static int leave(void **unused) {
     (void)unused;
     return chdir("/") == 0 && rmdir(directory) == 0 ? 0 : -1;
 }
 
 /* Lets this process map so many bytes more. */
-static void leave_memory(uint64_t bytes)
-{
+static void leave_memory(uint64_t bytes) {
     char line[128];
     unsigned long long kib = 0;
     struct rlimit limit = before;
@@ -56,8 +53,7 @@ static void leave_memory(uint64_t bytes)
 }
 
 /* n MiB of lines, packed. */
-static void pack(const char *name, int n)
-{
+static void pack(const char *name, int n) {
     static char lines[1 << 20];
     for (size_t i = 0; i < sizeof lines; i++) {
         lines[i] = "1 2 3 4\n"[i % 8];
@@ -70,8 +66,7 @@ static void pack(const char *name, int n)
     assert_int_equal(gzclose(file), Z_OK);
 }
 
-static void what_unpacks_beyond_the_memory(void **unused)
-{
+static void what_unpacks_beyond_the_memory(void **unused) {
     (void)unused;
     struct host_source source;
     struct host_error error = {0};
@@ -98,8 +93,7 @@ static void what_unpacks_beyond_the_memory(void **unused)
 
 /* A window is enough for text, whatever it unpacks to: here all but the end is
  * blank, so that points take nothing. */
-static void text_beyond_the_memory(void **unused)
-{
+static void text_beyond_the_memory(void **unused) {
     (void)unused;
     static const char *const names[] = {"blank.xyz.gz", "blank.csv.gz",
                                         "blank.obj.gz"};
@@ -128,8 +122,7 @@ static void text_beyond_the_memory(void **unused)
 /* Of text that is unpacked piece by piece, each number and the place of a
  * mistake are as in a plain file, wherever a piece ends; so are rows of bytes.
  */
-static void pieces_are_as_the_whole(void **unused)
-{
+static void pieces_are_as_the_whole(void **unused) {
     (void)unused;
     enum { ROWS = 300000 };
     struct host_points points;
@@ -190,8 +183,7 @@ static void pieces_are_as_the_whole(void **unused)
 }
 
 /* A header is whole, however little of a pipe comes at a time. */
-static void a_pipe_that_brings_little(void **unused)
-{
+static void a_pipe_that_brings_little(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_error error = {0};
@@ -221,8 +213,7 @@ static void a_pipe_that_brings_little(void **unused)
 }
 
 /* A line that never ends is no text. */
-static void a_line_without_an_end(void **unused)
-{
+static void a_line_without_an_end(void **unused) {
     (void)unused;
     static char letters[1 << 20];
     struct host_points points;
@@ -244,8 +235,7 @@ static void a_line_without_an_end(void **unused)
 }
 
 /* What is little is read however little is left: it may be more than half. */
-static void what_is_little(void **unused)
-{
+static void what_is_little(void **unused) {
     (void)unused;
     struct host_source source;
     struct host_error error = {0};
@@ -259,8 +249,7 @@ static void what_is_little(void **unused)
     assert_int_equal(unlink("little.xyz.gz"), 0);
 }
 
-static void a_plain_file_beyond_the_memory(void **unused)
-{
+static void a_plain_file_beyond_the_memory(void **unused) {
     (void)unused;
     struct host_source source;
     struct host_error error = {0};
@@ -274,8 +263,7 @@ static void a_plain_file_beyond_the_memory(void **unused)
     assert_int_equal(unlink("huge.las"), 0);
 }
 
-static void what_is_longer_than_its_caller_takes(void **unused)
-{
+static void what_is_longer_than_its_caller_takes(void **unused) {
     (void)unused;
     struct host_source source;
     struct host_error error = {0};
@@ -303,8 +291,7 @@ static void what_is_longer_than_its_caller_takes(void **unused)
 }
 
 /* A file of points whose numbers are a block of nothing but zeros. */
-static char *zeros_in_vtk(size_t points, size_t *bytes)
-{
+static char *zeros_in_vtk(size_t points, size_t *bytes) {
     enum { ROOM = 1 << 18 };
     uLongf size = 24 * points, packed = ROOM - 1024;
     char *file = malloc(ROOM), *zeros = calloc(1, size);
@@ -332,8 +319,7 @@ static char *zeros_in_vtk(size_t points, size_t *bytes)
     return file;
 }
 
-static void an_array_beyond_the_memory(void **unused)
-{
+static void an_array_beyond_the_memory(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_error error = {0};
@@ -355,8 +341,7 @@ static void an_array_beyond_the_memory(void **unused)
 
 /* Numbers of a byte each become points of 24: these tell how many there were.
  */
-static void points_beyond_the_memory(void **unused)
-{
+static void points_beyond_the_memory(void **unused) {
     (void)unused;
     enum { ROWS = 4096 };
     static const double some[3 * ROWS];
@@ -375,8 +360,7 @@ static void points_beyond_the_memory(void **unused)
     host_points_free(&points);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_unpacks_beyond_the_memory),
         cmocka_unit_test(what_is_little),

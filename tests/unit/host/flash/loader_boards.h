@@ -70,34 +70,29 @@ static struct sim_faults faults;
 static void (*strike)(void); /* what befalls them, at each moment */
 static struct made old, new, third, small;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&chance) >> 32) % below;
 }
 
 /* --- boards ----------------------------------------------------------------
  */
 
-static uint64_t tell_time(void *unused)
-{
+static uint64_t tell_time(void *unused) {
     (void)unused;
     return now_us;
 }
 
-static void board_idle(void *unused, uint64_t wait_us)
-{
+static void board_idle(void *unused, uint64_t wait_us) {
     (void)unused;
     (void)wait_us;
 }
 
-static void board_reset(void *unused, int status)
-{
+static void board_reset(void *unused, int status) {
     (void)unused;
     (void)status;
 }
 
-static void board_who(void *context, struct node_who *who)
-{
+static void board_who(void *context, struct node_who *who) {
     const struct board *b = context;
     strcpy((char *)who->board, "mps2-an385");
     strcpy((char *)who->loader, "0.1.0");
@@ -110,8 +105,7 @@ static void board_who(void *context, struct node_who *who)
 }
 
 /* Its wires, as they are from this start on. */
-static void plug_in(unsigned i)
-{
+static void plug_in(unsigned i) {
     for (unsigned d = 0; d < machine.dimension + (i == 0); d++) {
         struct host_sim_port *port = host_sim_cube_port(&wires, i, d);
         sim_direction_flush(port->end->in);
@@ -120,8 +114,7 @@ static void plug_in(unsigned i)
 }
 
 /* As a board's start-up does it. */
-static void start(unsigned i, bool ended_badly)
-{
+static void start(unsigned i, bool ended_badly) {
     struct board *b = &board[i];
     const char *why = NULL;
     plug_in(i);
@@ -142,8 +135,7 @@ static void start(unsigned i, bool ended_badly)
 }
 
 /* Power is back after that time; what was kept over a reset is gone. */
-static void lose_power(unsigned i)
-{
+static void lose_power(unsigned i) {
     struct board *b = &board[i];
     b->off = true;
     b->stays = false;
@@ -153,8 +145,7 @@ static void lose_power(unsigned i)
     b->busy_us = now_us + 20000 + draw(300000);
 }
 
-static void make_board(unsigned i)
-{
+static void make_board(unsigned i) {
     struct board *b = &board[i];
     chip_make(&b->chip, 4096, 256, SECTORS);
     b->chip.random = i + 1;
@@ -177,8 +168,7 @@ static void make_board(unsigned i)
     b->busy_us = START_US + draw(50000);
 }
 
-static void step_loader(struct board *b)
-{
+static void step_loader(struct board *b) {
     enum node_event event = loader_step(b->loader);
     if (event == NODE_STOPPED) {
         b->stays = loader_reset_why(b->loader) == NODE_RESET_STAY;
@@ -189,8 +179,7 @@ static void step_loader(struct board *b)
     b->due_us = now_us + loader_wait_us(b->loader);
 }
 
-static void step_node(struct board *b)
-{
+static void step_node(struct board *b) {
     enum node_event event = node_step(b->node);
     if (!b->confirmed && node_has_met(b->node)) {
         b->confirmed = chip_confirm(&b->chip, b->slot);
@@ -206,8 +195,7 @@ static void step_node(struct board *b)
 }
 
 /* Whether its links bring something, or have room. */
-static bool is_roused(unsigned i)
-{
+static bool is_roused(unsigned i) {
     for (unsigned d = 0; d < machine.dimension + (i == 0); d++) {
         const struct sim_end *end = host_sim_cube_port(&wires, i, d)->end;
         if (sim_next_us(end->in, 0) <= now_us ||
@@ -218,8 +206,7 @@ static bool is_roused(unsigned i)
     return false;
 }
 
-static void look(unsigned i)
-{
+static void look(unsigned i) {
     struct board *b = &board[i];
     uint32_t erased = b->chip.erased, programs = b->chip.programs;
     if (now_us < b->busy_us ||
@@ -248,8 +235,7 @@ static void look(unsigned i)
 /* --- the machine -----------------------------------------------------------
  */
 
-static void idle(void *unused, uint64_t wait_us)
-{
+static void idle(void *unused, uint64_t wait_us) {
     struct sim_end *end = host_sim_cube_port(&wires, machine.nodes, 0)->end;
     uint64_t until_us = now_us + wait_us;
     (void)unused;
@@ -267,16 +253,14 @@ static void idle(void *unused, uint64_t wait_us)
     end->out->blocked = false;
 }
 
-static int check(void *unused, struct host_error *unused_error)
-{
+static int check(void *unused, struct host_error *unused_error) {
     (void)unused;
     (void)unused_error;
     return 0;
 }
 
 /* What the next world's carry. */
-static void wires_are(uint32_t said, uint32_t carried, uint32_t ahead)
-{
+static void wires_are(uint32_t said, uint32_t carried, uint32_t ahead) {
     said_baud = said;
     carried_baud = carried;
     room = ahead;
@@ -285,8 +269,7 @@ static void wires_are(uint32_t said, uint32_t carried, uint32_t ahead)
 /* --- the transfer ----------------------------------------------------------
  */
 
-static void open_world(unsigned dimension, uint64_t seed)
-{
+static void open_world(unsigned dimension, uint64_t seed) {
     const struct host_sim_cube_options options = {
         .dimension = dimension,
         .seed = seed,
@@ -319,8 +302,7 @@ static void open_world(unsigned dimension, uint64_t seed)
     assert_int_equal(host_visit_open(&visit, &machine, &error), 0);
 }
 
-static void close_world(void)
-{
+static void close_world(void) {
     host_visit_close(&visit);
     for (unsigned i = 0; i < machine.nodes; i++) {
         free(board[i].as.arena);
@@ -329,8 +311,7 @@ static void close_world(void)
     host_sim_cube_close(&wires);
 }
 
-static bool all_have_it(void)
-{
+static bool all_have_it(void) {
     for (unsigned i = 0; i < machine.nodes; i++) {
         if (spread.node[i].phase < HOST_SPREAD_VERIFIED) {
             return false;
@@ -340,8 +321,7 @@ static bool all_have_it(void)
 }
 
 /* Seconds until all have it verified. */
-static double flash(const struct made *made)
-{
+static double flash(const struct made *made) {
     struct host_spread_options how = {
         .image = made->all, .bytes = made->bytes, .patience_us = 60000000};
     host_node_set_all(&how.nodes, machine.nodes);
@@ -361,8 +341,7 @@ static double flash(const struct made *made)
 }
 
 /* All run that image, byte for byte. */
-static void assert_all_run(const struct made *made)
-{
+static void assert_all_run(const struct made *made) {
     for (unsigned i = 0; i < machine.nodes; i++) {
         const struct board *b = &board[i];
         assert_non_null(b->node);

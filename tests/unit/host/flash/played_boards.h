@@ -79,20 +79,17 @@ static struct {
 } queue[QUEUE];
 static unsigned queued;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     random_state = random_state * 1664525u + 1013904223u;
     return (random_state >> 8) % below;
 }
 
-static void fill(uint8_t *bytes, uint8_t value, size_t size)
-{
+static void fill(uint8_t *bytes, uint8_t value, size_t size) {
     memset(bytes, value, size);
 }
 
 /* As a start is: what the host is told of it. */
-static void come_up(unsigned i)
-{
+static void come_up(unsigned i) {
     struct board *b = &board[i];
     struct node_who *who = &seen[i].who;
     bool image = b->kind == NODE_KIND_LOADER && !b->stay &&
@@ -120,8 +117,7 @@ static void come_up(unsigned i)
     seen[i].starts++;
 }
 
-static void go_down(unsigned i, uint64_t for_us)
-{
+static void go_down(unsigned i, uint64_t for_us) {
     struct board *b = &board[i];
     b->back_us = now_us + for_us;
     b->down_us = now_us;
@@ -130,8 +126,7 @@ static void go_down(unsigned i, uint64_t for_us)
     }
 }
 
-static uint32_t held(const struct board *b)
-{
+static uint32_t held(const struct board *b) {
     uint32_t count = 0;
     for (uint32_t i = 0; i < BLOCKS; i++) {
         count += b->map[i / 8] >> i % 8 & 1;
@@ -139,8 +134,7 @@ static uint32_t held(const struct board *b)
     return count;
 }
 
-static void answer(unsigned i)
-{
+static void answer(unsigned i) {
     struct board *b = &board[i];
     struct loader_state_message state = {.transfer = b->transfer,
                                          .phase = b->phase,
@@ -155,8 +149,7 @@ static void answer(unsigned i)
     visit.take(visit.context, &message);
 }
 
-static void begin(struct board *b, unsigned i, const uint8_t *data)
-{
+static void begin(struct board *b, unsigned i, const uint8_t *data) {
     struct loader_begin_message message;
     memcpy(&message, data, sizeof message);
     b->begins++;
@@ -172,8 +165,8 @@ static void begin(struct board *b, unsigned i, const uint8_t *data)
                                          : LOADER_TAKES;
 }
 
-static void block(struct board *b, unsigned i, const uint8_t *data, size_t size)
-{
+static void block(struct board *b, unsigned i, const uint8_t *data,
+                  size_t size) {
     struct loader_block_message head;
     memcpy(&head, data, sizeof head);
     if (b->transfer != head.transfer || b->phase != LOADER_TAKES) {
@@ -199,8 +192,7 @@ static void block(struct board *b, unsigned i, const uint8_t *data, size_t size)
     }
 }
 
-static void obey(struct board *b, unsigned i, const uint8_t *data)
-{
+static void obey(struct board *b, unsigned i, const uint8_t *data) {
     struct loader_do_message message;
     memcpy(&message, data, sizeof message);
     if (message.what == LOADER_VERIFY && b->phase == LOADER_WHOLE) {
@@ -215,8 +207,8 @@ static void obey(struct board *b, unsigned i, const uint8_t *data)
     }
 }
 
-static void deliver(unsigned i, uint8_t type, const uint8_t *data, size_t size)
-{
+static void deliver(unsigned i, uint8_t type, const uint8_t *data,
+                    size_t size) {
     struct board *b = &board[i];
     if (!b->on || b->back_us != 0 || b->kind != NODE_KIND_LOADER || b->mute ||
         b->deaf) {
@@ -239,15 +231,13 @@ static void deliver(unsigned i, uint8_t type, const uint8_t *data, size_t size)
 /* --- the visit -------------------------------------------------------------
  */
 
-static uint64_t tell_time(void *unused)
-{
+static uint64_t tell_time(void *unused) {
     (void)unused;
     return now_us;
 }
 
 bool host_visit_send(struct host_visit *unused, uint16_t dest, uint8_t type,
-                     const void *data, size_t size)
-{
+                     const void *data, size_t size) {
     (void)unused;
     assert_true(size <= CUBE_PAYLOAD_MAX);
     if (queued == QUEUE) {
@@ -262,8 +252,7 @@ bool host_visit_send(struct host_visit *unused, uint16_t dest, uint8_t type,
 }
 
 int host_visit_round(struct host_visit *unused, uint64_t wait_us,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     (void)unused;
     now_us += queued > 0 ? A_MESSAGE_US : wait_us;
     if (lost) {
@@ -295,8 +284,7 @@ int host_visit_round(struct host_visit *unused, uint64_t wait_us,
 
 int host_visit_restart(struct host_visit *unused,
                        const struct host_node_set *set, enum node_restart what,
-                       struct host_error *error)
-{
+                       struct host_error *error) {
     (void)unused;
     (void)error;
     assert_int_equal(what, NODE_RESTART_STAY);
@@ -313,8 +301,7 @@ int host_visit_restart(struct host_visit *unused,
 
 int host_visit_ask(struct host_visit *unused, const struct host_node_set *set,
                    enum node_question what, unsigned target, uint64_t wait_us,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     static char log[] = "started 3 times\nlast fault: watchdog\n";
     (void)unused;
     (void)target;
@@ -332,8 +319,7 @@ int host_visit_ask(struct host_visit *unused, const struct host_node_set *set,
 }
 
 const char *host_visit_reason(const struct host_visit *unused, unsigned node,
-                              char *text, size_t size)
-{
+                              char *text, size_t size) {
     (void)unused;
     (void)node;
     snprintf(text, size, "is not heard; turn it on");

@@ -29,8 +29,7 @@ static struct host_spread spread;
 static struct host_flash_show show;
 static char text[TEXT];
 
-static int prepare(void **unused)
-{
+static int prepare(void **unused) {
     (void)unused;
     memset(seen, 0, sizeof seen);
     memset(node, 0, sizeof node);
@@ -46,8 +45,7 @@ static int prepare(void **unused)
 }
 
 /* What `print` says on standard output or error. */
-static void capture(int stream, void (*print)(void))
-{
+static void capture(int stream, void (*print)(void)) {
     int ends[2], before = dup(stream);
     assert_int_equal(pipe(ends), 0);
     (void)fflush(stdout);
@@ -62,22 +60,19 @@ static void capture(int stream, void (*print)(void))
     (void)close(ends[0]);
 }
 
-static void print_result(void)
-{
+static void print_result(void) {
     host_flash_show_begin(&show, &spread, false);
     host_flash_show_result(&show);
 }
 
-static void print_cut(void)
-{
+static void print_cut(void) {
     static char *const argv[] = {"incode flash", "--cube", "my lab.cube",
                                  "new.img"};
     host_flash_cut_tell(stderr, &spread, 4, argv);
 }
 
 /* Ctrl-C: what each board does now, and the command that goes on. */
-static void test_cut(void **unused)
-{
+static void test_cut(void **unused) {
     (void)unused;
     node[0].phase = HOST_SPREAD_TAKES;
     node[1].phase = HOST_SPREAD_WHOLE;
@@ -96,14 +91,12 @@ static void test_cut(void **unused)
                                  "--cube 'my lab.cube' new.img\n"));
 }
 
-static void print_plan(void)
-{
+static void print_plan(void) {
     host_flash_show_begin(&show, &spread, true);
     host_flash_show_plan(&show);
 }
 
-static void print_changes(void)
-{
+static void print_changes(void) {
     host_flash_show_begin(&show, &spread, false);
     node[3].phase = HOST_SPREAD_TAKES;
     host_flash_show_change(&show, 3);
@@ -114,8 +107,7 @@ static void print_changes(void)
     host_progress_end();
 }
 
-static void nodes_of_a_kind_share_a_line(void **unused)
-{
+static void nodes_of_a_kind_share_a_line(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i == 2   ? HOST_SPREAD_PASSED
@@ -132,8 +124,7 @@ static void nodes_of_a_kind_share_a_line(void **unused)
                         "nodes 5-6: had mps2-an500 1.2, number 3 already\n");
 }
 
-static void a_plan_tells_what_runs_now(void **unused)
-{
+static void a_plan_tells_what_runs_now(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i < 2 ? HOST_SPREAD_LEAVES : HOST_SPREAD_BEGINS;
@@ -149,8 +140,7 @@ static void a_plan_tells_what_runs_now(void **unused)
               "its loader\n");
 }
 
-static void where_there_is_no_terminal_there_are_lines(void **unused)
-{
+static void where_there_is_no_terminal_there_are_lines(void **unused) {
     (void)unused;
     capture(STDERR_FILENO, print_changes);
     assert_string_equal(text, "incode: flash: node 3: takes blocks\n"
@@ -159,8 +149,7 @@ static void where_there_is_no_terminal_there_are_lines(void **unused)
 
 /* As much as a terminal was sent, up to a bell of ours.  clock: within a
  * minute. */
-static void take_all(int master, int slave)
-{
+static void take_all(int master, int slave) {
     size_t size = 0;
     assert_int_equal(write(slave, "\a", 1), 1);
     while (size == 0 || text[size - 1] != '\a') {
@@ -172,8 +161,7 @@ static void take_all(int master, int slave)
     text[size] = '\0';
 }
 
-static void a_small_terminal_has_several_nodes_a_row(void **unused)
-{
+static void a_small_terminal_has_several_nodes_a_row(void **unused) {
     struct winsize size = {.ws_row = 5, .ws_col = 70};
     int master, slave, before = dup(STDERR_FILENO);
     (void)unused;
@@ -198,8 +186,7 @@ static void a_small_terminal_has_several_nodes_a_row(void **unused)
     assert_non_null(strstr(text, "nodes 6-7 is not there"));
 }
 
-int main(void)
-{
+int main(void) {
 #define TEST(name) cmocka_unit_test_setup(name, prepare)
     const struct CMUnitTest tests[] = {
         TEST(nodes_of_a_kind_share_a_line),

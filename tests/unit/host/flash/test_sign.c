@@ -27,8 +27,7 @@ static char folder[] = "/tmp/incode-sign.XXXXXX";
 static struct host_error error;
 
 /* A file's name in the folder; a few at a time. */
-static const char *in(const char *name)
-{
+static const char *in(const char *name) {
     static char names[8][96];
     static unsigned next;
     char *at = names[next++ % 8];
@@ -36,16 +35,14 @@ static const char *in(const char *name)
     return at;
 }
 
-static void put(const char *name, const void *bytes, size_t size)
-{
+static void put(const char *name, const void *bytes, size_t size) {
     FILE *file = fopen(in(name), "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
     assert_int_equal(fclose(file), 0);
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     uint8_t code[CODE];
     (void)unused;
     assert_non_null(mkdtemp(folder));
@@ -59,8 +56,7 @@ static int set_up(void **unused)
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     static const char *const names[] = {"code", "lab",   "lab.pub",  "other",
                                         "cube", "image", "other.pub"};
     (void)unused;
@@ -71,8 +67,7 @@ static int tear_down(void **unused)
 }
 
 /* incode sign WORD..., up to NULL; argp may put them in another order. */
-static int sign(const char *const *words)
-{
+static int sign(const char *const *words) {
     static char name[] = "incode sign";
     static char copies[WORDS_MAX][128];
     char *argv[WORDS_MAX + 2] = {name};
@@ -86,8 +81,7 @@ static int sign(const char *const *words)
 }
 
 /* of `code`, by `key` */
-static void make_image(const char *key)
-{
+static void make_image(const char *key) {
     const char *const words[] = {in("code"),  "--key",      in(key),
                                  "--board",   "mps2-an500", "--number",
                                  "5",         "--version",  "1.2",
@@ -96,8 +90,7 @@ static void make_image(const char *key)
     assert_int_equal(sign(words), 0);
 }
 
-static enum loader_fault signed_by(const char *public)
-{
+static enum loader_fault signed_by(const char *public) {
     struct host_image file;
     uint8_t key[SIGN_PUBLIC_BYTES];
     error = (struct host_error){0};
@@ -111,8 +104,7 @@ static enum loader_fault signed_by(const char *public)
     return fault;
 }
 
-static void a_binary_becomes_an_image(void **unused)
-{
+static void a_binary_becomes_an_image(void **unused) {
     struct host_image file;
     (void)unused;
     make_image("lab");
@@ -129,8 +121,7 @@ static void a_binary_becomes_an_image(void **unused)
     assert_int_equal(signed_by("other.pub"), LOADER_WRONG_KEY);
 }
 
-static void an_image_is_signed_anew_in_its_place(void **unused)
-{
+static void an_image_is_signed_anew_in_its_place(void **unused) {
     struct host_image file;
     (void)unused;
     make_image("lab");
@@ -146,8 +137,7 @@ static void an_image_is_signed_anew_in_its_place(void **unused)
 }
 
 /* "abc", as b2sum -l 256 has it. */
-static void the_digest_is_blake2b_of_name_and_code(void **unused)
-{
+static void the_digest_is_blake2b_of_name_and_code(void **unused) {
     static const uint8_t expected[SIGN_DIGEST_BYTES] = {
         0xbd, 0xdd, 0x81, 0x3c, 0x63, 0x42, 0x39, 0x72, 0x31, 0x71, 0xef,
         0x3f, 0xee, 0x98, 0x57, 0x9b, 0x94, 0x96, 0x4e, 0x3b, 0xb1, 0xcb,
@@ -162,8 +152,7 @@ static void the_digest_is_blake2b_of_name_and_code(void **unused)
     assert_memory_equal(digest, expected, sizeof digest);
 }
 
-static void false_code_and_false_signatures_are_found(void **unused)
-{
+static void false_code_and_false_signatures_are_found(void **unused) {
     struct host_image file;
     uint8_t bytes[LOADER_HEADER_BYTES + CODE];
     struct loader_image image;
@@ -192,8 +181,7 @@ static void false_code_and_false_signatures_are_found(void **unused)
 /* What a board's loader has against it; slots.h has the rules, incoming.c the
  * order. */
 static enum loader_fault refusal(const uint8_t *bytes, size_t size,
-                                 const uint8_t key[SIGN_PUBLIC_BYTES])
-{
+                                 const uint8_t key[SIGN_PUBLIC_BYTES]) {
     struct loader_image image;
     uint8_t digest[SIGN_DIGEST_BYTES];
     enum loader_fault fault = loader_image_unpack(&image, bytes);
@@ -209,8 +197,7 @@ static enum loader_fault refusal(const uint8_t *bytes, size_t size,
 }
 
 /* The CRC is no secret: who changes a bit makes it right again. */
-static void every_bit_of_an_image_is_held(void **unused)
-{
+static void every_bit_of_an_image_is_held(void **unused) {
     enum { CRC = LOADER_HEADER_BYTES - 4, SIZE = LOADER_HEADER_BYTES + CODE };
     struct host_image file;
     uint8_t bytes[SIZE], whole[SIZE], key[SIGN_PUBLIC_BYTES];
@@ -233,8 +220,7 @@ static void every_bit_of_an_image_is_held(void **unused)
 }
 
 /* At every length, and with a byte too many. */
-static void an_image_that_is_not_whole_is_refused(void **unused)
-{
+static void an_image_that_is_not_whole_is_refused(void **unused) {
     struct host_image file;
     uint8_t bytes[LOADER_HEADER_BYTES + CODE + 1] = {0};
     (void)unused;
@@ -256,8 +242,7 @@ static void an_image_that_is_not_whole_is_refused(void **unused)
     assert_int_equal(host_image_open(&file, in("no"), &error), HOST_INPUT);
 }
 
-static void a_file_without_an_end_is_no_image(void **unused)
-{
+static void a_file_without_an_end_is_no_image(void **unused) {
     const char *const words[] = {"/dev/zero", "--key",      in("lab"),
                                  "--board",   "mps2-an500", NULL};
     struct host_image file;
@@ -269,16 +254,14 @@ static void a_file_without_an_end_is_no_image(void **unused)
     assert_non_null(strstr(error.text, "the most that an image has; "));
 }
 
-static void refuses_key(const char *name, const char *what)
-{
+static void refuses_key(const char *name, const char *what) {
     const char *const words[] = {in("image"), "--key", in(name), NULL};
     assert_int_equal(sign(words), HOST_INPUT);
     assert_non_null(strstr(error.text, what));
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void keys_of_the_other_kind_are_refused(void **unused)
-{
+static void keys_of_the_other_kind_are_refused(void **unused) {
     uint8_t public[SIGN_PUBLIC_BYTES];
     (void)unused;
     make_image("lab");
@@ -292,8 +275,7 @@ static void keys_of_the_other_kind_are_refused(void **unused)
     assert_non_null(strstr(error.text, "secret half"));
 }
 
-static void a_secret_half_is_its_owner_s_alone(void **unused)
-{
+static void a_secret_half_is_its_owner_s_alone(void **unused) {
     struct stat about;
     (void)unused;
     make_image("lab");
@@ -307,8 +289,7 @@ static void a_secret_half_is_its_owner_s_alone(void **unused)
 }
 
 /* Neither half replaces a file, and one alone is not left. */
-static void a_pair_is_made_whole_or_not_at_all(void **unused)
-{
+static void a_pair_is_made_whole_or_not_at_all(void **unused) {
     (void)unused;
     error = (struct host_error){0};
     assert_int_equal(host_sign_key_make(in("lab"), &error), HOST_INPUT);
@@ -322,8 +303,7 @@ static void a_pair_is_made_whole_or_not_at_all(void **unused)
                      HOST_INPUT);
 }
 
-static void wrong_usage_is_told(void **unused)
-{
+static void wrong_usage_is_told(void **unused) {
     static const char *const wrong[][2] = {
         {"--board", "linux"},
         {"--board", "mps3"},
@@ -347,8 +327,7 @@ static void wrong_usage_is_told(void **unused)
     assert_int_equal(sign(no_key), HOST_USAGE);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_binary_becomes_an_image),
         cmocka_unit_test(an_image_is_signed_anew_in_its_place),

@@ -12,23 +12,20 @@ static struct host_spread_options options;
 static struct host_error error;
 static unsigned serials;
 
-static bool make_serial(void *unused, uint8_t serial[NODE_SERIAL_BYTES])
-{
+static bool make_serial(void *unused, uint8_t serial[NODE_SERIAL_BYTES]) {
     (void)unused;
     fill(serial, (uint8_t)++serials, NODE_SERIAL_BYTES);
     return true;
 }
 
-static void say(void *unused, const char *line)
-{
+static void say(void *unused, const char *line) {
     size_t used = strlen(said);
     (void)unused;
     snprintf(said + used, sizeof said - used, "%s\n", line);
 }
 
 /* Four boards that run the old image. */
-static int prepare(void **unused)
-{
+static int prepare(void **unused) {
     struct loader_image header = {.bytes = BYTES - LOADER_HEADER_BYTES,
                                   .board = "mps2-an500"};
     (void)unused;
@@ -68,8 +65,7 @@ static int prepare(void **unused)
     return 0;
 }
 
-static int run(void)
-{
+static int run(void) {
     for (unsigned i = 0; i < NODES; i++) {
         if (board[i].on && !seen[i].there) {
             come_up(i);
@@ -85,8 +81,7 @@ static int run(void)
     return status == 0 ? host_spread_result(&spread, &error) : status;
 }
 
-static void is_in(unsigned i, enum host_spread_phase phase)
-{
+static void is_in(unsigned i, enum host_spread_phase phase) {
     if (spread.node[i].phase != phase) {
         print_error("node %u: %s, expected: %s (%s)\n", i,
                     host_spread_phase_text(spread.node[i].phase),
@@ -99,16 +94,14 @@ static void is_in(unsigned i, enum host_spread_phase phase)
     }
 }
 
-static void all_are_in(enum host_spread_phase phase)
-{
+static void all_are_in(enum host_spread_phase phase) {
     for (unsigned i = 0; i < NODES; i++) {
         is_in(i, phase);
     }
 }
 
 /* What goes with a generation is not waited for. */
-static void a_lost_generation_costs_no_wait(void **unused)
-{
+static void a_lost_generation_costs_no_wait(void **unused) {
     uint64_t seconds[2];
     (void)unused;
     for (unsigned i = 0; i < 2; i++) {
@@ -127,8 +120,7 @@ static void a_lost_generation_costs_no_wait(void **unused)
     assert_true(seconds[1] <= seconds[0] + 3);
 }
 
-static void every_block_goes_once_to_all(void **unused)
-{
+static void every_block_goes_once_to_all(void **unused) {
     (void)unused;
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
@@ -144,8 +136,7 @@ static void every_block_goes_once_to_all(void **unused)
 
 /* What broken transfers have left is not sent again; what one lacks alone goes
  * to it alone. */
-static void only_what_is_lacking_is_sent(void **unused)
-{
+static void only_what_is_lacking_is_sent(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         memset(board[i].map, 0xff, 1); /* blocks 0 .. 7 */
@@ -159,8 +150,7 @@ static void only_what_is_lacking_is_sent(void **unused)
     host_spread_close(&spread);
 }
 
-static void nodes_that_are_left_out_are_left_alone(void **unused)
-{
+static void nodes_that_are_left_out_are_left_alone(void **unused) {
     (void)unused;
     options.nodes = (struct host_node_set){{0}};
     host_node_set_add(&options.nodes, 1);
@@ -173,8 +163,7 @@ static void nodes_that_are_left_out_are_left_alone(void **unused)
     host_spread_close(&spread);
 }
 
-static void what_is_lost_is_sent_again(void **unused)
-{
+static void what_is_lost_is_sent_again(void **unused) {
     (void)unused;
     loss = 30;
     assert_int_equal(run(), 0);
@@ -184,8 +173,7 @@ static void what_is_lost_is_sent_again(void **unused)
     host_spread_close(&spread);
 }
 
-static void where_the_image_is_nothing_happens(void **unused)
-{
+static void where_the_image_is_nothing_happens(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         board[i].digest = NEW;
@@ -208,8 +196,7 @@ static void where_the_image_is_nothing_happens(void **unused)
 }
 
 /* A board in its loader as it has nothing else, or as it was told to wait. */
-static void empty_boards_are_filled_and_named(void **unused)
-{
+static void empty_boards_are_filled_and_named(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         board[i].kind = NODE_KIND_LOADER;
@@ -228,8 +215,7 @@ static void empty_boards_are_filled_and_named(void **unused)
     host_spread_close(&spread);
 }
 
-static void who_refuses_has_its_old_image_back(void **unused)
-{
+static void who_refuses_has_its_old_image_back(void **unused) {
     (void)unused;
     board[2].refuses = LOADER_WRONG_KEY;
     assert_int_equal(run(), HOST_INPUT);
@@ -242,8 +228,7 @@ static void who_refuses_has_its_old_image_back(void **unused)
     host_spread_close(&spread);
 }
 
-static void every_refusal_says_what_to_do(void **unused)
-{
+static void every_refusal_says_what_to_do(void **unused) {
     (void)unused;
     for (unsigned f = LOADER_GOOD + 1; f <= LOADER_FAULTS; f++) {
         (void)prepare(NULL);
@@ -258,14 +243,12 @@ static void every_refusal_says_what_to_do(void **unused)
     }
 }
 
-static const char *known_board(void *unused, unsigned node)
-{
+static const char *known_board(void *unused, unsigned node) {
     (void)unused;
     return node == 1 ? "raspi3b" : node == 2 ? "linux" : "mps2-an500";
 }
 
-static void other_boards_are_passed_over_or_refused(void **unused)
-{
+static void other_boards_are_passed_over_or_refused(void **unused) {
     (void)unused;
     for (unsigned known = 0; known < 2; known++) {
         (void)prepare(NULL);
@@ -288,8 +271,7 @@ static void other_boards_are_passed_over_or_refused(void **unused)
     }
 }
 
-static void who_is_off_is_waited_for(void **unused)
-{
+static void who_is_off_is_waited_for(void **unused) {
     (void)unused;
     board[3].on = false;
     off_until_us[3] = 12000000;
@@ -299,8 +281,7 @@ static void who_is_off_is_waited_for(void **unused)
     host_spread_close(&spread);
 }
 
-static void who_stays_off_is_named_and_the_others_are_done(void **unused)
-{
+static void who_stays_off_is_named_and_the_others_are_done(void **unused) {
     (void)unused;
     board[1].on = board[3].on = false;
     assert_int_equal(run(), HOST_CUBE);
@@ -314,8 +295,7 @@ static void who_stays_off_is_named_and_the_others_are_done(void **unused)
 }
 
 /* Whatever block it was at: it goes on from there. */
-static void lost_power_loses_nothing_that_is_written(void **unused)
-{
+static void lost_power_loses_nothing_that_is_written(void **unused) {
     (void)unused;
     for (uint32_t at = 1; at <= BLOCKS; at++) {
         (void)prepare(NULL);
@@ -328,8 +308,7 @@ static void lost_power_loses_nothing_that_is_written(void **unused)
     }
 }
 
-static void an_image_that_does_not_come_up_is_told(void **unused)
-{
+static void an_image_that_does_not_come_up_is_told(void **unused) {
     (void)unused;
     board[0].end = FALLS_BACK;
     board[1].end = STAYS;
@@ -345,8 +324,7 @@ static void an_image_that_does_not_come_up_is_told(void **unused)
     host_spread_close(&spread);
 }
 
-static void a_loader_that_says_nothing_is_given_up(void **unused)
-{
+static void a_loader_that_says_nothing_is_given_up(void **unused) {
     (void)unused;
     board[2].mute = true;
     assert_int_equal(run(), HOST_CUBE);
@@ -357,8 +335,7 @@ static void a_loader_that_says_nothing_is_given_up(void **unused)
 }
 
 /* Its links are up, and pings are answered. */
-static void a_loader_that_takes_nothing_is_given_up(void **unused)
-{
+static void a_loader_that_takes_nothing_is_given_up(void **unused) {
     (void)unused;
     board[2].deaf = true;
     assert_int_equal(run(), HOST_CUBE);
@@ -368,8 +345,7 @@ static void a_loader_that_takes_nothing_is_given_up(void **unused)
     host_spread_close(&spread);
 }
 
-static void who_restarts_for_ever_is_given_up(void **unused)
-{
+static void who_restarts_for_ever_is_given_up(void **unused) {
     (void)unused;
     board[1].restless = true;
     options.patience_us = 1000000000;
@@ -380,8 +356,7 @@ static void who_restarts_for_ever_is_given_up(void **unused)
     host_spread_close(&spread);
 }
 
-static void another_version_is_refused(void **unused)
-{
+static void another_version_is_refused(void **unused) {
     (void)unused;
     come_up(1);
     seen[1].who = (struct node_who){.protocol = NODE_PROTOCOL + 1};
@@ -391,8 +366,7 @@ static void another_version_is_refused(void **unused)
     host_spread_close(&spread);
 }
 
-static void a_look_changes_nothing(void **unused)
-{
+static void a_look_changes_nothing(void **unused) {
     (void)unused;
     board[1].digest = NEW;
     board[2].on = false;
@@ -412,8 +386,7 @@ static void a_look_changes_nothing(void **unused)
     host_spread_close(&spread);
 }
 
-static void a_cube_that_is_lost_ends_it(void **unused)
-{
+static void a_cube_that_is_lost_ends_it(void **unused) {
     (void)unused;
     lost = true;
     assert_int_equal(run(), HOST_CUBE);
@@ -422,8 +395,7 @@ static void a_cube_that_is_lost_ends_it(void **unused)
 }
 
 /* Power, losses and absences by chance: each is done in the end. */
-static void chance_does_not_stop_it(void **unused)
-{
+static void chance_does_not_stop_it(void **unused) {
     (void)unused;
     for (uint32_t seed = 1; seed <= 300; seed++) {
         (void)prepare(NULL);
@@ -445,8 +417,7 @@ static void chance_does_not_stop_it(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
 #define TEST(name) cmocka_unit_test_setup(name, prepare)
     const struct CMUnitTest tests[] = {
         TEST(every_block_goes_once_to_all),

@@ -4,8 +4,7 @@
 #include "loader_boards.h"
 
 /* From empty boards, and again over a program that runs. */
-static void the_wire_is_kept_full(void **unused)
-{
+static void the_wire_is_kept_full(void **unused) {
     double seconds[2];
     (void)unused;
     for (unsigned i = 0; i < 2; i++) {
@@ -23,8 +22,7 @@ static void the_wire_is_kept_full(void **unused)
 
 /* Wires that carry a sixth of what is said of them, and drivers that take a
  * little, or whatever the links' windows hold, ahead of the wire. */
-static void of_slow_wires_answers_take_little(void **unused)
-{
+static void of_slow_wires_answers_take_little(void **unused) {
     static const uint32_t rooms[] = {512, 8192};
     (void)unused;
     for (unsigned k = 0; k < 2; k++) {
@@ -47,8 +45,7 @@ static void of_slow_wires_answers_take_little(void **unused)
     wires_are(BAUD, BAUD, 512);
 }
 
-static void a_second_image_takes_the_first_s_place(void **unused)
-{
+static void a_second_image_takes_the_first_s_place(void **unused) {
     (void)unused;
     open_world(2, 2);
     (void)flash(&old);
@@ -66,8 +63,7 @@ static void a_second_image_takes_the_first_s_place(void **unused)
 /* A slot that had another image has to be erased, for longer than the wire
  * takes: what comes meanwhile waits in the links' windows.  Its way into the
  * loader, a second, included. */
-static void erasing_goes_beside_the_wire(void **unused)
-{
+static void erasing_goes_beside_the_wire(void **unused) {
     (void)unused;
     open_world(0, 3);
     (void)flash(&old);
@@ -86,8 +82,7 @@ static void erasing_goes_beside_the_wire(void **unused)
 
 static char told[NODE_FAULT_TEXT_MAX + 1];
 
-static void hear(void *unused, const struct cube_message *message)
-{
+static void hear(void *unused, const struct cube_message *message) {
     (void)unused;
     if (message->type == NODE_FAULT) {
         memcpy(told, message->data, message->size);
@@ -95,23 +90,20 @@ static void hear(void *unused, const struct cube_message *message)
     }
 }
 
-static void stay_for(uint64_t us)
-{
+static void stay_for(uint64_t us) {
     for (uint64_t end_us = now_us + us; now_us < end_us;) {
         assert_int_equal(host_visit_round(&visit, 10000, &error), 0);
     }
 }
 
-static bool is_named(const struct board *b, const uint8_t *serial)
-{
+static bool is_named(const struct board *b, const uint8_t *serial) {
     uint8_t has[NODE_SERIAL_BYTES];
     return loader_slots_serial(&b->chip.flash, has) &&
            memcmp(has, serial, sizeof has) == 0;
 }
 
 /* A board takes a name only with an image that the board's signer signed. */
-static void a_name_counts_within_a_transfer_alone(void **unused)
-{
+static void a_name_counts_within_a_transfer_alone(void **unused) {
     struct loader_do_message name = {.what = LOADER_NAME,
                                      .serial = {1, 2, 3, 4, 5, 6, 7, 8}};
     struct loader_begin_message begin = {.transfer = 9, .bytes = old.bytes};
@@ -144,8 +136,7 @@ static void a_name_counts_within_a_transfer_alone(void **unused)
     close_world();
 }
 
-static void a_loader_answers_as_a_node(void **unused)
-{
+static void a_loader_answers_as_a_node(void **unused) {
     struct node_setup_message setup = {.protocol = NODE_PROTOCOL, .nodes = 4};
     struct host_node_set all;
     (void)unused;
@@ -187,8 +178,7 @@ static void a_loader_answers_as_a_node(void **unused)
 }
 
 /* Its neighbours are flashed and run; it says what is wrong with it. */
-static void a_board_with_a_worn_flash_waits_and_says_so(void **unused)
-{
+static void a_board_with_a_worn_flash_waits_and_says_so(void **unused) {
     struct node_setup_message setup = {.protocol = NODE_PROTOCOL, .nodes = 4};
     struct host_node_set all, worn = {{0}};
     (void)unused;
@@ -229,8 +219,7 @@ static uint64_t strike_us;
 static unsigned struck;
 static int pulled; /* the wire, or -1 */
 
-static void pull(bool out)
-{
+static void pull(bool out) {
     for (unsigned side = 0; side < 2; side++) {
         host_sim_cube_deaf(&wires, (unsigned)pulled, side, out);
     }
@@ -238,8 +227,7 @@ static void pull(bool out)
 
 /* Power goes in the midst of one of a board's next operations, or at once; a
  * wire is off for a while. */
-static void befall(void)
-{
+static void befall(void) {
     if (now_us < strike_us) {
         return;
     }
@@ -259,8 +247,7 @@ static void befall(void)
     strike_us = now_us + draw(400000);
 }
 
-static void losses_cost_time_alone(void **unused)
-{
+static void losses_cost_time_alone(void **unused) {
     (void)unused;
     for (uint64_t seed = 1; seed <= 12; seed++) {
         open_world((unsigned)seed % 4, seed);
@@ -278,8 +265,7 @@ static void losses_cost_time_alone(void **unused)
 
 /* The host, or a board, is kept from its work for 1 to 10 seconds, as on a
  * machine that has much to do. */
-static void hold_up(void)
-{
+static void hold_up(void) {
     uint64_t until_us;
     if (now_us < strike_us) {
         return;
@@ -294,8 +280,7 @@ static void hold_up(void)
     strike_us = until_us + 1000 * draw(10000);
 }
 
-static void pauses_cost_time_alone(void **unused)
-{
+static void pauses_cost_time_alone(void **unused) {
     static const uint32_t rooms[] = {512, 8192, 65536};
     double worst = 0;
     (void)unused;
@@ -316,8 +301,7 @@ static void pauses_cost_time_alone(void **unused)
     wires_are(BAUD, BAUD, 512);
 }
 
-static int make_images(void **unused)
-{
+static int make_images(void **unused) {
     (void)unused;
     made_make(&old, IMAGE_BYTES, 5);
     made_make(&new, IMAGE_BYTES - 5000, 6);
@@ -326,8 +310,7 @@ static int make_images(void **unused)
     return 0;
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_wire_is_kept_full),
         cmocka_unit_test(of_slow_wires_answers_take_little),

@@ -30,21 +30,18 @@ struct bytes {
     size_t n;
 };
 
-static inline void put(struct bytes *b, const void *data, size_t n)
-{
+static inline void put(struct bytes *b, const void *data, size_t n) {
     assert_true(b->n + n <= sizeof b->data);
     memcpy(b->data + b->n, data, n);
     b->n += n;
 }
 
-static inline void put_text(struct bytes *b, const char *text)
-{
+static inline void put_text(struct bytes *b, const char *text) {
     put(b, text, strlen(text));
 }
 
 static inline void put_word(struct bytes *b, uint64_t value, size_t size,
-                            bool big)
-{
+                            bool big) {
     for (size_t i = 0; i < size; i++) {
         uint8_t byte = (uint8_t)(value >> (8 * (big ? size - 1 - i : i)));
         put(b, &byte, 1);
@@ -52,8 +49,7 @@ static inline void put_word(struct bytes *b, uint64_t value, size_t size,
 }
 
 static inline void put_number(struct bytes *b, double value, bool wide,
-                              bool big)
-{
+                              bool big) {
     uint64_t bits;
     float single = (float)value;
     uint32_t low;
@@ -62,20 +58,18 @@ static inline void put_number(struct bytes *b, double value, bool wide,
     put_word(b, wide ? bits : low, wide ? 8 : 4, big);
 }
 
-static inline double value_of(uint64_t i)
-{
+static inline double value_of(uint64_t i) {
     return (double)i * 0.5 - 3; /* exact in single precision */
 }
 
-static inline void put_values(struct bytes *b, uint64_t n, bool wide, bool big)
-{
+static inline void put_values(struct bytes *b, uint64_t n, bool wide,
+                              bool big) {
     for (uint64_t i = 0; i < n; i++) {
         put_number(b, value_of(i), wide, big);
     }
 }
 
-static inline void put_base64(struct bytes *b, const uint8_t *from, size_t n)
-{
+static inline void put_base64(struct bytes *b, const uint8_t *from, size_t n) {
     static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
                                 "abcdefghijklmnopqrstuvwxyz0123456789+/";
     for (size_t i = 0; i < n; i += 3) {
@@ -92,8 +86,7 @@ static inline void put_base64(struct bytes *b, const uint8_t *from, size_t n)
 
 /* Expects n points with the values of value_of, row by row. */
 static inline void expect_rows(const char *path, const struct bytes *b,
-                               uint64_t n)
-{
+                               uint64_t n) {
     struct host_points points;
     struct host_error error = {0};
     if (host_points_parse(path, b->data, b->n, &points, &error) != 0) {
@@ -108,8 +101,7 @@ static inline void expect_rows(const char *path, const struct bytes *b,
 
 /* Every shorter file is refused, or (the end of a text may go) the same. */
 static inline void expect_cuts_refused(const char *path, const struct bytes *b,
-                                       size_t from)
-{
+                                       size_t from) {
     for (size_t n = from; n < b->n; n++) {
         struct host_points points;
         struct host_error error = {0};
@@ -121,8 +113,7 @@ static inline void expect_cuts_refused(const char *path, const struct bytes *b,
 }
 
 static inline void refused(const char *path, const char *text,
-                           const char *expected)
-{
+                           const char *expected) {
     struct host_points points;
     struct host_error error = {0};
     assert_int_equal(

@@ -2,8 +2,7 @@
 #include "bytes.h"
 #include "tests/unit/reference.h"
 
-static void ply_of_every_coding(void **unused)
-{
+static void ply_of_every_coding(void **unused) {
     (void)unused;
     static const char *const codings[] = {"ascii", "binary_little_endian",
                                           "binary_big_endian"};
@@ -72,8 +71,7 @@ static void ply_of_every_coding(void **unused)
 }
 
 /* Four vertices and two faces, of which the header tells otherwise. */
-static void ply_is_as_long_as_it_says(void **unused)
-{
+static void ply_is_as_long_as_it_says(void **unused) {
     (void)unused;
     static const struct {
         int vertices, faces;
@@ -106,8 +104,7 @@ static void ply_is_as_long_as_it_says(void **unused)
 
 /* The beginning of an array of 5 rows. */
 static void put_npy(struct bytes *b, int version, const char *type,
-                    bool fortran, const char *columns)
-{
+                    bool fortran, const char *columns) {
     char header[128];
     (void)snprintf(header, sizeof header,
                    "{'descr': '%s', 'fortran_order': %s, 'shape': (5, %s), }"
@@ -121,8 +118,7 @@ static void put_npy(struct bytes *b, int version, const char *type,
     put_text(b, header);
 }
 
-static void npy_of_every_kind(void **unused)
-{
+static void npy_of_every_kind(void **unused) {
     (void)unused;
     static struct bytes b;
     for (unsigned bits = 0; bits < 64; bits++) {
@@ -154,8 +150,7 @@ static void npy_of_every_kind(void **unused)
 }
 
 /* Of another number of columns than points and tetrahedra have. */
-static void npy_of_other_shapes(void **unused)
-{
+static void npy_of_other_shapes(void **unused) {
     (void)unused;
     static const struct {
         const char *type, *columns, *why;
@@ -202,8 +197,7 @@ static void npy_of_other_shapes(void **unused)
     assert_non_null(strstr(error.text, "4 columns of floating-point numbers"));
 }
 
-static void binary_nan_is_named(void **unused)
-{
+static void binary_nan_is_named(void **unused) {
     (void)unused;
     struct bytes b = {.n = 0};
     put_text(&b, "ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
@@ -222,8 +216,7 @@ static void binary_nan_is_named(void **unused)
         strstr(error.text, "a.ply: point 2 (counted from 0): y is NaN; "));
 }
 
-static void plot3d_of_every_variant(void **unused)
-{
+static void plot3d_of_every_variant(void **unused) {
     (void)unused;
     for (int bits = 0; bits < 32; bits++) {
         bool big = (bits & 1) != 0, marks = (bits & 2) != 0;
@@ -277,8 +270,7 @@ static void plot3d_of_every_variant(void **unused)
 }
 
 /* Real files in more than one form hold the same points. */
-static void real_data(void **unused)
-{
+static void real_data(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct host_error error = {0};
@@ -315,8 +307,7 @@ static void real_data(void **unused)
     host_points_free(&points);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ply_is_as_long_as_it_says),
         cmocka_unit_test(ply_of_every_coding),

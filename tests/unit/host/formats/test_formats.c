@@ -9,16 +9,14 @@
 #include "host/formats/write.h"
 #include "host/mesh/gen.h"
 
-static const char *list_of(enum host_use use)
-{
+static const char *list_of(enum host_use use) {
     static char list[HOST_FORMAT_LIST_MAX];
     host_format_list(use, list, sizeof list);
     return list;
 }
 
 /* What help and messages say is what there is. */
-static void listed(void **unused)
-{
+static void listed(void **unused) {
     (void)unused;
     char text[HOST_FORMAT_LIST_MAX], small[16];
     static const enum host_use uses[] = {HOST_READ_POINTS, HOST_WRITE_POINTS,
@@ -53,8 +51,7 @@ static void listed(void **unused)
 }
 
 /* No extension is in two rows, nor ends another that is found before it. */
-static void found_by_extension(void **unused)
-{
+static void found_by_extension(void **unused) {
     (void)unused;
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
@@ -94,8 +91,7 @@ static void found_by_extension(void **unused)
 }
 
 /* By a name that an option gives, which is that of an extension. */
-static void told_by_name(void **unused)
-{
+static void told_by_name(void **unused) {
     (void)unused;
     struct host_error error = {0};
     const struct host_format *f;
@@ -126,8 +122,7 @@ static void told_by_name(void **unused)
     assert_non_null(strstr(error.text, "--format laz: its points are com"));
 }
 
-static void written_and_read_back(void **unused)
-{
+static void written_and_read_back(void **unused) {
     (void)unused;
     char list[HOST_FORMAT_LIST_MAX];
     struct host_points points, again;
@@ -159,8 +154,7 @@ static void written_and_read_back(void **unused)
     host_points_free(&points);
 }
 
-static void packed_files(void **unused)
-{
+static void packed_files(void **unused) {
     (void)unused;
     const char *text = "-3 -2.5 -2\n-1.5 -1 -.5\n";
     struct bytes b = {.n = 0};
@@ -202,8 +196,7 @@ static void packed_files(void **unused)
     b.n = 0;
 }
 
-static void files_that_are_not_there(void **unused)
-{
+static void files_that_are_not_there(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_error error = {0};
@@ -230,8 +223,7 @@ static void files_that_are_not_there(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(listed),
         cmocka_unit_test(found_by_extension),

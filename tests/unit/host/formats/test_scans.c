@@ -2,16 +2,14 @@
  * whole, cut short and wrong. */
 #include "bytes.h"
 
-static void expect_text(const char *path, const char *text, uint64_t n)
-{
+static void expect_text(const char *path, const char *text, uint64_t n) {
     static struct bytes b;
     b.n = 0;
     put_text(&b, text);
     expect_rows(path, &b, n);
 }
 
-static void pts_with_and_without_a_count(void **unused)
-{
+static void pts_with_and_without_a_count(void **unused) {
     (void)unused;
     static const char *const two[] = {
         "2\n-3 -2.5 -2 55 52 44 65\n-1.5 -1 -.5 228 228 230 225\n",
@@ -29,8 +27,7 @@ static void pts_with_and_without_a_count(void **unused)
     refused("a.pts", "0\n", "holds no point");
 }
 
-static void obj_of_every_habit(void **unused)
-{
+static void obj_of_every_habit(void **unused) {
     (void)unused;
     static const char *const two[] = {
         ("# made here\nmtllib a.mtl\no v 1\nv -3 -2.5 -2\nv -1.5 -1 -.5\n"
@@ -55,8 +52,7 @@ static const char facet[] = "facet normal 0 -nan 1e999\n  outer loop\n"
                             "    vertex -3 -2.5 -2\n    vertex -1.5 -1 -.5\n"
                             "    vertex 0 .5 1\n  endloop\nendfacet\n";
 
-static void stl_as_text(void **unused)
-{
+static void stl_as_text(void **unused) {
     (void)unused;
     static const char *const forms[] = {
         "solid\n%sendsolid\n", "\r\nsolid a # solid\r\n%sEndSolid a\r\n",
@@ -87,8 +83,7 @@ static void stl_as_text(void **unused)
 }
 
 /* A header of any bytes, also those with which text begins. */
-static void stl_in_binary(void **unused)
-{
+static void stl_in_binary(void **unused) {
     (void)unused;
     static const char *const headers[] = {"made here", "solid made here\n", ""};
     for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
@@ -133,16 +128,14 @@ struct las {
     bool signature;
 };
 
-static void put_zeros(struct bytes *b, size_t until)
-{
+static void put_zeros(struct bytes *b, size_t until) {
     while (b->n < until) {
         put_word(b, 0, 1, false);
     }
 }
 
 /* Records whose points are value_of: X / 1024 - 2^20 and the like. */
-static void put_las(struct bytes *b, const struct las *las)
-{
+static void put_las(struct bytes *b, const struct las *las) {
     static const double scale = 0x1p-10, shift = -0x1p20;
     b->n = 0;
     put_text(b, "LASF");
@@ -182,8 +175,7 @@ static void put_las(struct bytes *b, const struct las *las)
     }
 }
 
-static void las_of_every_version(void **unused)
-{
+static void las_of_every_version(void **unused) {
     (void)unused;
     static struct bytes b;
     for (unsigned minor = 0; minor <= 4; minor++) {
@@ -210,8 +202,7 @@ static void las_of_every_version(void **unused)
 }
 
 /* Rounded once by the product and once by the sum, in that order. */
-static void las_is_rounded_as_specified(void **unused)
-{
+static void las_is_rounded_as_specified(void **unused) {
     (void)unused;
     static struct bytes b;
     const struct las las = {
@@ -240,8 +231,7 @@ static void las_is_rounded_as_specified(void **unused)
 }
 
 /* Of 1.0, whose points begin behind a signature: within the offset or not. */
-static void las_with_a_signature(void **unused)
-{
+static void las_with_a_signature(void **unused) {
     (void)unused;
     static struct bytes b;
     struct las las = {
@@ -252,8 +242,7 @@ static void las_with_a_signature(void **unused)
     expect_rows("a.las", &b, 3);
 }
 
-static void las_that_is_wrong(void **unused)
-{
+static void las_that_is_wrong(void **unused) {
     (void)unused;
     static const struct {
         struct las las;
@@ -293,8 +282,7 @@ static void las_that_is_wrong(void **unused)
     refused("a.LAZ.gz", "1 2 3\n", "pdal translate IN.laz OUT.las");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pts_with_and_without_a_count),
         cmocka_unit_test(obj_of_every_habit),

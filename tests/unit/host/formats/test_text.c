@@ -2,8 +2,7 @@
  * its place. */
 #include "bytes.h"
 
-static void numbers_are_correctly_rounded(void **unused)
-{
+static void numbers_are_correctly_rounded(void **unused) {
     (void)unused;
     static const char *const hard[] = {
         "0",
@@ -74,8 +73,7 @@ static void numbers_are_correctly_rounded(void **unused)
 }
 
 /* Reads every beginning of a file, with nothing readable behind it. */
-static void read_cuts(const char *path, const struct bytes *b)
-{
+static void read_cuts(const char *path, const struct bytes *b) {
     for (size_t n = 1; n < b->n; n++) {
         struct host_points points;
         struct host_error error = {0};
@@ -88,8 +86,7 @@ static void read_cuts(const char *path, const struct bytes *b)
     }
 }
 
-static void text_in_all_its_habits(void **unused)
-{
+static void text_in_all_its_habits(void **unused) {
     (void)unused;
     struct bytes b = {.n = 0};
     put_text(&b, "\xef\xbb\xbf# a comment\r\n\r\n-3 -2.5\t-2 # behind\r\n"
@@ -137,8 +134,7 @@ static void text_in_all_its_habits(void **unused)
 }
 
 /* A line of names, // before comments, lines that end in CR alone. */
-static void text_of_other_tools(void **unused)
-{
+static void text_of_other_tools(void **unused) {
     (void)unused;
     static const struct {
         const char *path, *text;
@@ -177,8 +173,7 @@ static void text_of_other_tools(void **unused)
 
 /* Commas that are decimal ones are refused; where they may be columns, that is
  * noted. */
-static void decimal_commas(void **unused)
-{
+static void decimal_commas(void **unused) {
     (void)unused;
     static const struct {
         const char *text;
@@ -213,8 +208,7 @@ static void decimal_commas(void **unused)
 }
 
 /* The first three count, whatever the others hold and however many they are. */
-static void columns_after_the_third(void **unused)
-{
+static void columns_after_the_third(void **unused) {
     (void)unused;
     static const struct {
         const char *path, *text;
@@ -242,8 +236,7 @@ static void columns_after_the_third(void **unused)
     }
 }
 
-static void text_faults_have_their_place(void **unused)
-{
+static void text_faults_have_their_place(void **unused) {
     (void)unused;
     refused("a.xyz", "1 2 3\n4 5 six\n", "a.xyz:2:5: 'six' is no number; ");
     refused("a.xyz", "1 2 3\n4 5 6x\n", "a.xyz:2:5: '6x' is no number; ");
@@ -312,8 +305,7 @@ static void text_faults_have_their_place(void **unused)
 }
 
 /* Bytes of zero are told as such, where they are. */
-static void binary_is_no_text(void **unused)
-{
+static void binary_is_no_text(void **unused) {
     (void)unused;
     static const struct {
         const char *path, *bytes, *where;
@@ -336,8 +328,7 @@ static void binary_is_no_text(void **unused)
 }
 
 /* What a header counts is what there is. */
-static void text_is_as_long_as_it_says(void **unused)
-{
+static void text_is_as_long_as_it_says(void **unused) {
     (void)unused;
     struct bytes b = {.n = 0};
     refused("a.node", "2 3 0 0\n1 1 2 3\n2 1 2 4\n# end\n\n3 1 2 5\n",
@@ -374,8 +365,7 @@ static void text_is_as_long_as_it_says(void **unused)
     expect_rows("a.off", &b, 3);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_correctly_rounded),
         cmocka_unit_test(text_in_all_its_habits),

@@ -3,8 +3,7 @@
 
 #include "bytes.h"
 
-static void vtk_legacy(void **unused)
-{
+static void vtk_legacy(void **unused) {
     (void)unused;
     struct bytes b = {.n = 0};
     put_text(&b, "# vtk DataFile Version 3.0\ntitle # with a hash\nASCII\n"
@@ -60,8 +59,7 @@ static void vtk_legacy(void **unused)
 
 /* One VTK XML file with its points coded in one of five ways. */
 static void put_xml(struct bytes *b, int way, bool wide_header, bool packed,
-                    bool big)
-{
+                    bool big) {
     struct bytes raw = {.n = 0}, head = {.n = 0};
     put_values(&raw, 12, true, big);
     size_t word = wide_header ? 8 : 4;
@@ -126,8 +124,7 @@ static void put_xml(struct bytes *b, int way, bool wide_header, bool packed,
     put_text(b, "</VTKFile>\n");
 }
 
-static void vtk_xml_of_every_coding(void **unused)
-{
+static void vtk_xml_of_every_coding(void **unused) {
     (void)unused;
     for (int way = 0; way < 5; way++) {
         for (int bits = 0; bits < 8; bits++) {
@@ -195,8 +192,7 @@ static void vtk_xml_of_every_coding(void **unused)
             "a.vtu:1: a compressor");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(vtk_legacy),
         cmocka_unit_test(vtk_xml_of_every_coding),

@@ -27,8 +27,7 @@ struct folder {
     char name[64];
 };
 
-static struct folder make_folder(void)
-{
+static struct folder make_folder(void) {
     struct folder f;
     strcpy(f.name, "/tmp/incode-tets-XXXXXX");
     assert_non_null(mkdtemp(f.name));
@@ -36,15 +35,13 @@ static struct folder make_folder(void)
 }
 
 static const char *in_folder(const struct folder *f, const char *name,
-                             char path[128])
-{
+                             char path[128]) {
     (void)snprintf(path, 128, "%s/%s", f->name, name);
     return path;
 }
 
 /* Removes the folder; returns how many files were in it. */
-static int remove_folder(const struct folder *f)
-{
+static int remove_folder(const struct folder *f) {
     DIR *dir = opendir(f->name);
     assert_non_null(dir);
     int count = 0;
@@ -62,8 +59,7 @@ static int remove_folder(const struct folder *f)
 }
 
 static void triangulate(struct host_points *points,
-                        struct host_tetrahedra *tets)
-{
+                        struct host_tetrahedra *tets) {
     struct host_error error = {0};
     *tets = (struct host_tetrahedra){0};
     assert_int_equal(host_gen("uniform", 200, 4, points, &error), 0);
@@ -72,15 +68,13 @@ static void triangulate(struct host_points *points,
 }
 
 static void write_whole(const char *path, const struct host_points *points,
-                        const struct host_tetrahedra *tets)
-{
+                        const struct host_tetrahedra *tets) {
     struct host_error error = {0};
     assert_int_equal(host_write(path, NULL, points, tets, &error), 0);
     assert_int_equal(host_output_commit(&error), 0);
 }
 
-static void written_and_read_back(void **unused)
-{
+static void written_and_read_back(void **unused) {
     (void)unused;
     static const char *const names[] = {"a.vtu",  "a.vtk", "a.msh",
                                         "a.mesh", "a.npy", "a.ele"};
@@ -121,8 +115,7 @@ static void written_and_read_back(void **unused)
 }
 
 /* .neigh and .face against all pairs of tetrahedra. */
-static void neighbours_are_right(void **unused)
-{
+static void neighbours_are_right(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets;
@@ -172,8 +165,7 @@ static void neighbours_are_right(void **unused)
     assert_int_equal(remove_folder(&folder), 4);
 }
 
-static void failures_leave_nothing(void **unused)
-{
+static void failures_leave_nothing(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets;
@@ -212,8 +204,7 @@ static void failures_leave_nothing(void **unused)
     assert_int_equal(remove_folder(&folder), 0);
 }
 
-static void links_are_followed(void **unused)
-{
+static void links_are_followed(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets, again;
@@ -238,8 +229,7 @@ static void links_are_followed(void **unused)
     assert_int_equal(remove_folder(&folder), 2);
 }
 
-static void refused(const char *path, const char *text, const char *expected)
-{
+static void refused(const char *path, const char *text, const char *expected) {
     struct host_tetrahedra tets;
     struct host_error error = {0};
     assert_int_equal(
@@ -251,8 +241,7 @@ static void refused(const char *path, const char *text, const char *expected)
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void faults_have_their_place(void **unused)
-{
+static void faults_have_their_place(void **unused) {
     (void)unused;
     refused("a.ele", "2 4 0\n0 0 1 2 3\n1 0 1 2\n", "a.ele:3:8: fewer than 4");
     refused("a.ele", "2 4 0\n0 0 1 2 3\n", "a.ele:3:1: the file ends");
@@ -304,8 +293,7 @@ static void faults_have_their_place(void **unused)
     refused("a.xyz", "1 2 3\n", "no format of tetrahedra");
 }
 
-static void other_writers_files(void **unused)
-{
+static void other_writers_files(void **unused) {
     (void)unused;
     static const char *const files[][2] = {
         {"a.vtk", "# vtk DataFile Version 5.1\nt\nASCII\n"
@@ -351,8 +339,7 @@ static void other_writers_files(void **unused)
     }
 }
 
-static void conversion(void **unused)
-{
+static void conversion(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets, again;
@@ -396,8 +383,7 @@ static void conversion(void **unused)
 
 /* What a point with this x has in an .xyz for it. */
 static const char *printed(const char *path, const double *x, unsigned n,
-                           char *text, size_t size)
-{
+                           char *text, size_t size) {
     struct host_points points = {0};
     struct host_error error = {0};
     for (unsigned i = 0; i < n; i++) {
@@ -417,8 +403,7 @@ static const char *printed(const char *path, const double *x, unsigned n,
 }
 
 /* The digits of a number, but for those that only place its point. */
-static int significant(const char *number, char digits[64])
-{
+static int significant(const char *number, char digits[64]) {
     int n = 0;
     for (; *number != '\0' && *number != 'e'; number++) {
         if (*number >= (n == 0 ? '1' : '0') && *number <= '9') {
@@ -434,8 +419,7 @@ static int significant(const char *number, char digits[64])
 
 /* The number reads back; none with fewer digits does, and with as many none is
  * nearer. */
-static void check_number(const char *number, double x)
-{
+static void check_number(const char *number, double x) {
     char other[64], digits[64], others[64];
     if (strtod(number, NULL) != x) {
         fail_msg("%s, and not %.17g", number, x);
@@ -456,8 +440,7 @@ static void check_number(const char *number, double x)
 }
 
 /* Of many sizes; some of few digits, some next to powers of two. */
-static void draw_numbers(double *x, int n, uint64_t *state)
-{
+static void draw_numbers(double *x, int n, uint64_t *state) {
     for (int i = 0; i < n; i++) {
         *state = *state * 6364136223846793005u + 1442695040888963407u;
         double part = 1 + (double)(*state >> 12) * 0x1p-52;
@@ -475,8 +458,7 @@ static void draw_numbers(double *x, int n, uint64_t *state)
     }
 }
 
-static void fewest_digits(void **unused)
-{
+static void fewest_digits(void **unused) {
     (void)unused;
     enum { MANY = 4096, TEXT = 64 * MANY };
     static const struct {
@@ -535,8 +517,7 @@ static void fewest_digits(void **unused)
 
 /* The .node of the points stays as it is beside their .ele, whatever it is
  * called there; others are written. */
-static void input_is_left(void **unused)
-{
+static void input_is_left(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_tetrahedra tets;
@@ -573,8 +554,7 @@ static void input_is_left(void **unused)
     assert_int_equal(remove_folder(&folder), 8);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(written_and_read_back),
         cmocka_unit_test(neighbours_are_right),

@@ -10,8 +10,7 @@
 
 #include "host/lines/gpio.h"
 
-static void no_such_chip(void **unused)
-{
+static void no_such_chip(void **unused) {
     static const char *const names[] = {"no such chip", "/dev/null",
                                         "/dev/no-such-chip"};
     (void)unused;
@@ -28,8 +27,7 @@ static void no_such_chip(void **unused)
     host_gpio_close(NULL);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(no_such_chip)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -37,16 +37,14 @@ static struct played {
     uint64_t up_us[LINES_MAX], held_us[LINES_MAX];
 } * played;
 
-static void tell(char what, unsigned offset)
-{
+static void tell(char what, unsigned offset) {
     size_t used = strlen(played->told);
     snprintf(played->told + used, sizeof played->told - used, "%c%u ", what,
              offset);
 }
 
 int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
-                   char why[HOST_GPIO_WHY])
-{
+                   char why[HOST_GPIO_WHY]) {
     *gpio = NULL;
     if (pin->offset == played->fails_to_open) {
         snprintf(why, HOST_GPIO_WHY, "line %u: in use by another; end it",
@@ -62,8 +60,7 @@ int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
 }
 
 /* clock: lines are held no shorter than is stated. */
-int host_gpio_set(struct host_gpio *gpio, bool active)
-{
+int host_gpio_set(struct host_gpio *gpio, bool active) {
     unsigned line = gpio->offset;
     tell(active ? '+' : '-', line);
     if (active && line == played->fails_to_set) {
@@ -79,8 +76,7 @@ int host_gpio_set(struct host_gpio *gpio, bool active)
     return 0;
 }
 
-void host_gpio_close(struct host_gpio *gpio)
-{
+void host_gpio_close(struct host_gpio *gpio) {
     if (gpio != NULL) {
         played->open--;
         free(gpio);
@@ -94,8 +90,7 @@ static struct host_lines lines;
 static struct host_error error;
 
 /* Node 0 has both, node 1 no boot line, node 2 and node 3 none. */
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     memset(&error, 0, sizeof error);
     memset(played, 0, sizeof *played);
@@ -110,21 +105,18 @@ static int set_up(void **unused)
         &error);
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_cube_file_free(&file);
     return (int)played->open;
 }
 
-static void open_lines(void)
-{
+static void open_lines(void) {
     assert_int_equal(host_lines_open(&lines, &file, NULL, &error), 0);
     assert_int_equal(played->open, 3);
 }
 
-static void nothing_is_active(void)
-{
+static void nothing_is_active(void) {
     for (unsigned i = 0; i < LINES_MAX; i++) {
         assert_false(played->active[i]);
     }
@@ -132,8 +124,7 @@ static void nothing_is_active(void)
 
 /* --- resets --------------------------------------------------------------- */
 
-static void a_reset(void **unused)
-{
+static void a_reset(void **unused) {
     (void)unused;
     assert_true(host_lines_has(&file, 0, HOST_LINE_BOOT));
     assert_false(host_lines_has(&file, 1, HOST_LINE_BOOT));
@@ -144,8 +135,7 @@ static void a_reset(void **unused)
     host_lines_close(&lines);
 }
 
-static void a_loader_that_waits(void **unused)
-{
+static void a_loader_that_waits(void **unused) {
     (void)unused;
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 0, true, &error), 0);
@@ -157,8 +147,7 @@ static void a_loader_that_waits(void **unused)
     host_lines_close(&lines);
 }
 
-static void a_node_without_one(void **unused)
-{
+static void a_node_without_one(void **unused) {
     (void)unused;
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 3, false, &error), HOST_CUBE);
@@ -167,8 +156,7 @@ static void a_node_without_one(void **unused)
     host_lines_close(&lines);
 }
 
-static void a_line_in_use(void **unused)
-{
+static void a_line_in_use(void **unused) {
     (void)unused;
     played->fails_to_open = 3;
     assert_int_equal(host_lines_open(&lines, &file, NULL, &error), HOST_CUBE);
@@ -178,8 +166,7 @@ static void a_line_in_use(void **unused)
     assert_int_equal(played->open, 0);
 }
 
-static void a_line_that_fails(void **unused)
-{
+static void a_line_that_fails(void **unused) {
     (void)unused;
     open_lines();
     played->fails_to_set = 1;
@@ -196,8 +183,7 @@ static void a_line_that_fails(void **unused)
 static volatile sig_atomic_t seen;
 static volatile bool active_then;
 
-static void see(int signal)
-{
+static void see(int signal) {
     seen = signal;
     for (unsigned i = 0; i < LINES_MAX; i++) {
         active_then = active_then || played->active[i];
@@ -205,8 +191,7 @@ static void see(int signal)
 }
 
 /* A reset of node 0 in which a signal comes while line `on` is active. */
-static int reset_amid(int signal, unsigned on, void (*handler)(int))
-{
+static int reset_amid(int signal, unsigned on, void (*handler)(int)) {
     struct sigaction action = {.sa_handler = handler}, before;
     open_lines();
     seen = 0;
@@ -224,8 +209,7 @@ static int reset_amid(int signal, unsigned on, void (*handler)(int))
 }
 
 /* Its handler comes when nothing is active any more. */
-static void a_signal_that_is_handled(void **unused)
-{
+static void a_signal_that_is_handled(void **unused) {
     static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
     (void)unused;
     for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
@@ -237,24 +221,21 @@ static void a_signal_that_is_handled(void **unused)
 }
 
 /* Ctrl-Z waits for the end of the reset. */
-static void a_signal_that_stops(void **unused)
-{
+static void a_signal_that_stops(void **unused) {
     (void)unused;
     assert_int_equal(reset_amid(SIGTSTP, 1, see), 0);
     assert_int_equal(seen, SIGTSTP);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
-static void a_signal_that_is_ignored(void **unused)
-{
+static void a_signal_that_is_ignored(void **unused) {
     (void)unused;
     assert_int_equal(reset_amid(SIGHUP, 1, SIG_IGN), 0);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
 /* The program ends by it as it would have without. */
-static void a_signal_that_ends_the_program(void **unused)
-{
+static void a_signal_that_ends_the_program(void **unused) {
     int status = 0;
     (void)unused;
     pid_t child = fork();
@@ -273,8 +254,7 @@ static void a_signal_that_ends_the_program(void **unused)
 /* --- the host's port ------------------------------------------------------ */
 
 /* A terminal that has no such lines, in the hands of another. */
-static void a_port_without_them(void **unused)
-{
+static void a_port_without_them(void **unused) {
     static struct host_remote remote;
     (void)unused;
     int master = posix_openpt(O_RDWR | O_NOCTTY);
@@ -308,8 +288,7 @@ static void a_port_without_them(void **unused)
 
 #define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         TEST(a_reset),
         TEST(a_loader_that_waits),

@@ -39,15 +39,13 @@ static struct host_node_set all;
 
 /* Its time passes faster than the watcher's.  clock: both wait for minutes.
  */
-static uint64_t holder_us(void *context)
-{
+static uint64_t holder_us(void *context) {
     (void)context;
     return 10 * host_now_us();
 }
 
 static void answer_for(struct host_onlooking *onlooking,
-                       const struct host_machine *machine, unsigned node)
-{
+                       const struct host_machine *machine, unsigned node) {
     struct node_question_message question;
     uint8_t bytes[CUBE_PAYLOAD_MAX] = {0};
     if (!host_onlooking_due(onlooking, node, &question)) {
@@ -67,8 +65,7 @@ static void answer_for(struct host_onlooking *onlooking,
     }
 }
 
-static _Noreturn void hold(int begun, int ended)
-{
+static _Noreturn void hold(int begun, int ended) {
     static struct host_offer offer;
     struct host_onlooking onlooking = {0};
     struct host_machine machine = {.nodes = NODES,
@@ -93,8 +90,7 @@ static _Noreturn void hold(int begun, int ended)
     exit(0);
 }
 
-static void begin_holder(void)
-{
+static void begin_holder(void) {
     int begun[2], ended[2];
     char byte;
     assert_int_equal(pipe(begun), 0);
@@ -112,8 +108,7 @@ static void begin_holder(void)
     end = ended[1];
 }
 
-static void end_holder(void)
-{
+static void end_holder(void) {
     int status;
     close(end);
     assert_int_equal(waitpid(holder, &status, 0), holder);
@@ -121,8 +116,7 @@ static void end_holder(void)
     assert_int_equal(WEXITSTATUS(status), 0); /* nor has it leaked */
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     static unsigned count;
     (void)unused;
     memset(&error, 0, sizeof error);
@@ -131,8 +125,7 @@ static int set_up(void **unused)
     return 0;
 }
 
-static void look_at(struct host_look *look)
-{
+static void look_at(struct host_look *look) {
     if (host_look_open(look, wire, &error) != 0) {
         fail_msg("%s", error.text);
     }
@@ -141,8 +134,7 @@ static void look_at(struct host_look *look)
 /* --- looks -----------------------------------------------------------------
  */
 
-static void test_nobody(void **unused)
-{
+static void test_nobody(void **unused) {
     struct host_look look;
     struct host_holder who;
     (void)unused;
@@ -152,8 +144,7 @@ static void test_nobody(void **unused)
     host_look_close(&look);
 }
 
-static void check_answers(const struct host_look *look, unsigned what)
-{
+static void check_answers(const struct host_look *look, unsigned what) {
     for (unsigned i = 0; i < NODES; i++) {
         const struct host_look_node *node = &look->node[i];
         size_t size = what == NODE_LOG ? CUBE_PAYLOAD_MAX - 8 : 8 + i;
@@ -166,8 +157,7 @@ static void check_answers(const struct host_look *look, unsigned what)
     }
 }
 
-static void test_answers(void **unused)
-{
+static void test_answers(void **unused) {
     struct host_look look;
     uint64_t before = 0;
     (void)unused;
@@ -197,8 +187,7 @@ static void test_answers(void **unused)
     end_holder();
 }
 
-static void test_holder(void **unused)
-{
+static void test_holder(void **unused) {
     struct host_holder who;
     char text[HOST_HOLDER_TEXT], number[40];
     (void)unused;
@@ -216,8 +205,7 @@ static void test_holder(void **unused)
     assert_false(host_holder_find(&who, wire));
 }
 
-static void test_several(void **unused)
-{
+static void test_several(void **unused) {
     struct host_look look[HOST_LOOKERS_MAX], late;
     (void)unused;
     begin_holder();
@@ -250,8 +238,7 @@ static void test_several(void **unused)
 }
 
 /* However the other ends, its place is free at once. */
-static void test_killed(void **unused)
-{
+static void test_killed(void **unused) {
     struct host_look look;
     struct host_holder who;
     int status;
@@ -272,8 +259,7 @@ static void test_killed(void **unused)
 
 /* Who stands still is waited for no longer than one has patience; clock: a
  * fifth of a second, in which nobody could answer. */
-static void test_stopped(void **unused)
-{
+static void test_stopped(void **unused) {
     struct host_look look;
     (void)unused;
     begin_holder();
@@ -293,8 +279,7 @@ static void test_stopped(void **unused)
 }
 
 /* Whoever asks who has it, and how often: it is had. */
-static void test_queue(void **unused)
-{
+static void test_queue(void **unused) {
     enum { CALLS = 200 };
     struct host_look look;
     struct host_holder who;
@@ -321,8 +306,7 @@ static void test_queue(void **unused)
 /* --- who says what is no question ------------------------------------------
  */
 
-static int call(void)
-{
+static int call(void) {
     struct sockaddr_un address;
     socklen_t size = host_holder_address(wire, &address);
     int file = socket(AF_UNIX, SOCK_STREAM, 0);
@@ -332,8 +316,7 @@ static int call(void)
 }
 
 /* A line, or what came before the end. */
-static void hears(int file, const char *expected)
-{
+static void hears(int file, const char *expected) {
     char line[400];
     size_t used = 0;
     while (used + 1 < sizeof line && read(file, line + used, 1) == 1 &&
@@ -346,14 +329,12 @@ static void hears(int file, const char *expected)
     }
 }
 
-static void says(int file, const char *text)
-{
+static void says(int file, const char *text) {
     assert_int_equal(send(file, text, strlen(text), MSG_NOSIGNAL),
                      strlen(text));
 }
 
-static void test_nonsense(void **unused)
-{
+static void test_nonsense(void **unused) {
     static const char *const lines[] = {
         "who\n", "{\"ask\":\"who\",\"nodes\":\"9\"}\n", "{\"ask\":\"probe\"}\n",
         "{\"ask\":7}\n", "\n"};
@@ -377,8 +358,7 @@ static void test_nonsense(void **unused)
 }
 
 /* Who does not read is dropped after a while; the others go on. */
-static void test_deaf(void **unused)
-{
+static void test_deaf(void **unused) {
     struct host_look look;
     int size = 1, file;
     (void)unused;
@@ -400,8 +380,7 @@ static void test_deaf(void **unused)
 }
 
 /* The next one waits for the place, and takes it. */
-static void test_next(void **unused)
-{
+static void test_next(void **unused) {
     struct host_look look;
     pid_t first;
     int first_end, status;
@@ -432,8 +411,7 @@ static void test_next(void **unused)
 enum { OTHER_USER = 65534 };
 
 /* A process of another user that has taken the place, and has `file` open. */
-static void begin_other(int file)
-{
+static void begin_other(int file) {
     int begun[2], ended[2];
     char byte;
     assert_int_equal(pipe(begun), 0);
@@ -456,8 +434,7 @@ static void begin_other(int file)
 }
 
 /* believed: it says so, and root takes its word. */
-static void check_other(int file, bool believed)
-{
+static void check_other(int file, bool believed) {
     struct host_look look;
     struct host_holder who;
     begin_other(file);
@@ -474,8 +451,7 @@ static void check_other(int file, bool believed)
 
 /* A socket that listens there, and one that has called it. */
 static void make_calls(int family, struct sockaddr *at, socklen_t size,
-                       int *listener, int *call)
-{
+                       int *listener, int *call) {
     *listener = socket(family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_int_equal(bind(*listener, at, size), 0);
     assert_int_equal(listen(*listener, 4), 0);
@@ -484,8 +460,7 @@ static void make_calls(int family, struct sockaddr *at, socklen_t size,
     assert_int_equal(connect(*call, at, size), 0);
 }
 
-static void test_other_users(void **unused)
-{
+static void test_other_users(void **unused) {
     struct sockaddr_in in = {.sin_family = AF_INET,
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     struct sockaddr_un un = {.sun_family = AF_UNIX};
@@ -516,8 +491,7 @@ static void test_other_users(void **unused)
     assert_int_equal(unlink(un.sun_path), 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_nobody, set_up),
         cmocka_unit_test_setup(test_answers, set_up),

@@ -17,15 +17,13 @@
 static struct host_cube_file file;
 static struct host_error error;
 
-static int parse(const char *text)
-{
+static int parse(const char *text) {
     memset(&error, 0, sizeof error);
     return host_cube_file_parse(&file, "a.cube", text, &error);
 }
 
 /* No link between them is needed in the file. */
-static void all_nodes_are_of_a_board(void **unused)
-{
+static void all_nodes_are_of_a_board(void **unused) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     char line[400];
     (void)unused;
@@ -51,8 +49,7 @@ static const char *const mixed =
     "  { node = 1; to = 3; serial = [\"/dev/ttyUSB0\", \"/dev/ttyUSB1\"]; },\n"
     "  { node = 2; to = 3; unix = \"23\"; } );\n";
 
-static void nodes_are_of_several_boards(void **unused)
-{
+static void nodes_are_of_several_boards(void **unused) {
     char line[400];
     (void)unused;
     assert_int_equal(parse(mixed), 0);
@@ -69,8 +66,7 @@ static void nodes_are_of_several_boards(void **unused)
 }
 
 /* The whole is named, or where nothing is said of a board, linux. */
-static void one_board_is_no_mixture(void **unused)
-{
+static void one_board_is_no_mixture(void **unused) {
     (void)unused;
     assert_int_equal(parse("dimension = 0; " M7
                            "nodes = ( { node = 0; board = \"linux\"; "
@@ -81,8 +77,7 @@ static void one_board_is_no_mixture(void **unused)
     host_cube_file_free(&file);
 }
 
-static void what_a_board_has_not(void **unused)
-{
+static void what_a_board_has_not(void **unused) {
     static const struct {
         const char *text, *said;
     } cases[] = {
@@ -136,8 +131,7 @@ static void what_a_board_has_not(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_nodes_are_of_a_board),
         cmocka_unit_test(nodes_are_of_several_boards),

@@ -17,16 +17,14 @@
 static char directory[] = "/tmp/incode-cube.XXXXXX";
 static char path[64], key_path[64];
 
-static void write_file(const char *name, const char *text)
-{
+static void write_file(const char *name, const char *text) {
     FILE *file = fopen(name, "w");
     assert_non_null(file);
     assert_true(fputs(text, file) >= 0);
     assert_int_equal(fclose(file), 0);
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     assert_non_null(mkdtemp(directory));
     snprintf(path, sizeof path, "%s/lab.cube", directory);
@@ -36,8 +34,7 @@ static int set_up(void **unused)
     return chmod(key_path, 0600);
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     return unlink(path) | unlink(key_path) | rmdir(directory);
 }
@@ -52,8 +49,7 @@ static const char *const good =
     ");\n";
 
 static bool has(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
-                unsigned count, const char *name, const char *value)
-{
+                unsigned count, const char *name, const char *value) {
     for (unsigned i = 0; i + 1 < count; i += 2) {
         if (strcmp(options[i], name) == 0 &&
             strcmp(options[i + 1], value) == 0) {
@@ -64,8 +60,7 @@ static bool has(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
 }
 
 static bool named(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
-                  unsigned count, const char *name)
-{
+                  unsigned count, const char *name) {
     bool found = false;
     for (unsigned i = 0; i < count; i++) {
         found = found || strcmp(options[i], name) == 0;
@@ -73,8 +68,7 @@ static bool named(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
     return found;
 }
 
-static void nodes_are_started_as_it_says(void **unused)
-{
+static void nodes_are_started_as_it_says(void **unused) {
     static struct host_cube_file file;
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};
@@ -121,8 +115,7 @@ static const char *const local =
 
 /* Paths beside the file or from the root, wires that are insecure, and what
  * the statistics call them all. */
-static void wires_without_a_key(void **unused)
-{
+static void wires_without_a_key(void **unused) {
     static const struct {
         const char *one, *two, *first, *second, *insecure, *link;
     } cases[] = {
@@ -160,8 +153,7 @@ static void wires_without_a_key(void **unused)
 }
 
 /* Writes the good file with another text in place of one of it. */
-static void write_changed(const char *old, const char *new)
-{
+static void write_changed(const char *old, const char *new) {
     char text[1024];
     const char *at = strstr(good, old);
     assert_non_null(at);
@@ -234,8 +226,7 @@ static const struct {
      ":4: ", "no.such.host.invalid", 4},
 };
 
-static void mistakes_are_named(void **unused)
-{
+static void mistakes_are_named(void **unused) {
     static struct host_cube_file file;
     (void)unused;
     for (size_t i = 0; i < sizeof mistakes / sizeof mistakes[0]; i++) {
@@ -257,8 +248,7 @@ static void mistakes_are_named(void **unused)
 
 /* Of each setting a value of another type, and one that is another number
  * where it is cut to an int.  Lines as in the good file. */
-static void other_types_are_no_values(void **unused)
-{
+static void other_types_are_no_values(void **unused) {
     static const struct {
         const char *old, *new, *what;
     } cases[] = {
@@ -320,8 +310,7 @@ static void other_types_are_no_values(void **unused)
 }
 
 /* What the library would follow, or not come back from, it never sees. */
-static void what_the_library_is_not_given(void **unused)
-{
+static void what_the_library_is_not_given(void **unused) {
     static const struct {
         const char *text, *said;
     } cases[] = {
@@ -358,8 +347,7 @@ static void what_the_library_is_not_given(void **unused)
     assert_non_null(strstr(error.text, ":1: more settings"));
 }
 
-static void files_that_are_not_taken(void **unused)
-{
+static void files_that_are_not_taken(void **unused) {
     static const struct {
         const char *path, *what;
     } others[] = {{"/no/such.cube", "No such file"},
@@ -393,8 +381,7 @@ static void files_that_are_not_taken(void **unused)
     assert_int_equal(chmod(key_path, 0600), 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_are_started_as_it_says),
         cmocka_unit_test(wires_without_a_key),

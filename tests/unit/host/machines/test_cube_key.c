@@ -20,22 +20,19 @@
 static char directory[] = "/tmp/incode-key.XXXXXX";
 static char path[64];
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     assert_non_null(mkdtemp(directory));
     snprintf(path, sizeof path, "%s/cube.key", directory);
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     return rmdir(directory);
 }
 
-static void a_key_is_for_its_owner_alone(void **unused)
-{
+static void a_key_is_for_its_owner_alone(void **unused) {
     static const mode_t masks[] = {0, 022, 0777};
     uint8_t key[3][SECURE_KEY_BYTES];
     struct stat about;
@@ -56,8 +53,7 @@ static void a_key_is_for_its_owner_alone(void **unused)
     assert_memory_not_equal(key[1], key[2], SECURE_KEY_BYTES);
 }
 
-static void a_file_that_is_there_stays(void **unused)
-{
+static void a_file_that_is_there_stays(void **unused) {
     uint8_t key[SECURE_KEY_BYTES], same[SECURE_KEY_BYTES];
     struct host_error error = {0};
     char link[80];
@@ -79,8 +75,7 @@ static void a_file_that_is_there_stays(void **unused)
 }
 
 /* A disk without room for it: as a limit of the size of files shows it. */
-static void what_cannot_be_written_leaves_nothing(void **unused)
-{
+static void what_cannot_be_written_leaves_nothing(void **unused) {
     struct rlimit before, none;
     struct host_error error = {0};
     (void)unused;
@@ -99,8 +94,7 @@ static void what_cannot_be_written_leaves_nothing(void **unused)
     assert_int_equal(host_key_make("/no/such/folder/key", &error), HOST_INPUT);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_key_is_for_its_owner_alone),
         cmocka_unit_test(a_file_that_is_there_stays),

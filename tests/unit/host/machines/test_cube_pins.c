@@ -14,8 +14,7 @@
 static struct host_cube_file file;
 static struct host_error error;
 
-static int parse(const char *text)
-{
+static int parse(const char *text) {
     memset(&error, 0, sizeof error);
     return host_cube_file_parse(&file, "a.cube", text, &error);
 }
@@ -24,8 +23,7 @@ static int parse(const char *text)
 #define LINKS                                                                  \
     "links = (" HOST_WIRE ", { node = 0; to = 1; unix = \"01\"; } );\n"
 
-static void lines_of_chips(void **unused)
-{
+static void lines_of_chips(void **unused) {
     (void)unused;
     assert_int_equal(
         parse("dimension = 1;\n"
@@ -58,8 +56,7 @@ static void lines_of_chips(void **unused)
 #define SERIAL "serial = [\"/dev/uart\", \"/dev/ttyUSB0\"]; "
 
 /* The second wire of the host has lines of its own. */
-static void lines_of_ports(void **unused)
-{
+static void lines_of_ports(void **unused) {
     (void)unused;
     assert_int_equal(
         parse("dimension = 1; links = (\n"
@@ -92,8 +89,7 @@ static void lines_of_ports(void **unused)
 }
 
 /* Many boards, each with both. */
-static void room_for_all(void **unused)
-{
+static void room_for_all(void **unused) {
     static char text[64 * 200];
     size_t used = 0;
     (void)unused;
@@ -116,8 +112,7 @@ static void room_for_all(void **unused)
     host_cube_file_free(&file);
 }
 
-static void refuse(const char *text, const char *said)
-{
+static void refuse(const char *text, const char *said) {
     assert_int_equal(parse(text), HOST_INPUT);
     if (strncmp(error.text, said, strlen(said)) != 0 ||
         strstr(error.text, "; ") == NULL) {
@@ -125,8 +120,7 @@ static void refuse(const char *text, const char *said)
     }
 }
 
-static void what_is_wrong_with_a_chips(void **unused)
-{
+static void what_is_wrong_with_a_chips(void **unused) {
     static const char *const cases[][2] = {
         {"reset = 17;", "a.cube:2: reset: no group in braces; "},
         {"reset = { line = 1; };", "a.cube:2: reset: chip: not given"},
@@ -163,8 +157,7 @@ static void what_is_wrong_with_a_chips(void **unused)
     }
 }
 
-static void what_is_wrong_with_a_ports(void **unused)
-{
+static void what_is_wrong_with_a_ports(void **unused) {
     static const char *const cases[][2] = {
         {"{ node = 0; to = \"host\"; " SERIAL "dtr = \"rst\"; }",
          "a.cube:2: dtr: does neither; give "},
@@ -195,8 +188,7 @@ static void what_is_wrong_with_a_ports(void **unused)
            "a.cube:3: reset: node 0 has one in line 2; leave one of them out");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lines_of_chips),
         cmocka_unit_test(lines_of_ports),

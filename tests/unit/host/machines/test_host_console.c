@@ -15,16 +15,14 @@
     "incode: mps2-an500: a stack overflow, address 0x1ffffffc; restarting\r\n" \
     " pc 0x00001234 lr 0x00005678\r\n"
 
-static void hear_record(struct host_console *console, const char *text)
-{
+static void hear_record(struct host_console *console, const char *text) {
     static const uint8_t mark[] = {0, 0xff}, end[] = {0};
     host_console_hear(console, mark, sizeof mark);
     host_console_hear(console, (const uint8_t *)text, strlen(text));
     host_console_hear(console, end, sizeof end);
 }
 
-static void a_fault_is_kept(void **unused)
-{
+static void a_fault_is_kept(void **unused) {
     struct host_console console;
     (void)unused;
     host_console_init(&console, 3, "mps2-an500");
@@ -40,8 +38,7 @@ static void a_fault_is_kept(void **unused)
 }
 
 /* Frames that hold the same bytes, whole and in pieces, are no records. */
-static void frames_are_passed_over(void **unused)
-{
+static void frames_are_passed_over(void **unused) {
     static uint8_t wire[FRAME_ENCODED(LINK_MESSAGE_MAX) + FRAME_SLACK];
     static uint8_t payload[LINK_MESSAGE_MAX];
     struct frame_header header = {.session = 0x01010101, .size = 1500};
@@ -63,8 +60,7 @@ static void frames_are_passed_over(void **unused)
 }
 
 /* No text is too long. */
-static void a_long_record_is_cut(void **unused)
-{
+static void a_long_record_is_cut(void **unused) {
     static const char end[] = "; restarting";
     static char text[3 * HOST_CONSOLE_TEXT];
     struct host_console console;
@@ -79,8 +75,7 @@ static void a_long_record_is_cut(void **unused)
     assert_int_equal(strlen(console.fault), 600);
 }
 
-static int bring(void *context, uint8_t *bytes, size_t size)
-{
+static int bring(void *context, uint8_t *bytes, size_t size) {
     static const uint8_t record[] = "\0\377" REPORT;
     size_t *at = context;
     size_t n = sizeof record - *at < size ? sizeof record - *at : size;
@@ -89,14 +84,12 @@ static int bring(void *context, uint8_t *bytes, size_t size)
     return (int)n;
 }
 
-static int take(void *context, const uint8_t *bytes, size_t size)
-{
+static int take(void *context, const uint8_t *bytes, size_t size) {
     (void)context, (void)bytes;
     return (int)size;
 }
 
-static void a_pipe_stays_as_it_is(void **unused)
-{
+static void a_pipe_stays_as_it_is(void **unused) {
     struct host_console console;
     uint8_t bytes[7];
     size_t at = 0, got = 0;
@@ -114,8 +107,7 @@ static void a_pipe_stays_as_it_is(void **unused)
     assert_int_equal(console.faults, 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_fault_is_kept),
         cmocka_unit_test(frames_are_passed_over),

@@ -21,8 +21,7 @@ static int ends[2];
 static struct host_qmp qmp;
 static struct host_error error;
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     memset(&error, 0, sizeof error);
     assert_int_equal(unix_file_pair(ends), 0);
@@ -30,26 +29,22 @@ static int set_up(void **unused)
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     return close(ends[0]) | close(ends[1]);
 }
 
-static void say(const char *text)
-{
+static void say(const char *text) {
     assert_int_equal(write(ends[1], text, strlen(text)), strlen(text));
 }
 
-static void heard(const char *expected)
-{
+static void heard(const char *expected) {
     char text[512] = "";
     assert_true(read(ends[1], text, sizeof text - 1) > 0);
     assert_string_equal(text, expected);
 }
 
-static void requests_are_answered(void **unused)
-{
+static void requests_are_answered(void **unused) {
     (void)unused;
     say(GREETING GOOD EVENT GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
@@ -59,8 +54,7 @@ static void requests_are_answered(void **unused)
     heard("{\"execute\":\"cont\"}\n");
 }
 
-static void a_refusal_is_told(void **unused)
-{
+static void a_refusal_is_told(void **unused) {
     (void)unused;
     say(GREETING GOOD BAD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_RESET, &error), HOST_CUBE);
@@ -69,8 +63,7 @@ static void a_refusal_is_told(void **unused)
 
 /* Nothing waits for ever, nor as long as usual where less was asked for.
  * Where the machine is held up for ten seconds, it has more turns. */
-static void silence_ends(void **unused)
-{
+static void silence_ends(void **unused) {
     uint64_t took_us = HOST_QMP_US;
     (void)unused;
     qmp.wait_us = 200000;
@@ -85,8 +78,7 @@ static void silence_ends(void **unused)
     assert_true(took_us < HOST_QMP_US);
 }
 
-static void its_end_is_told(void **unused)
-{
+static void its_end_is_told(void **unused) {
     (void)unused;
     close(ends[1]);
     ends[1] = dup(ends[0]);
@@ -94,8 +86,7 @@ static void its_end_is_told(void **unused)
 }
 
 /* What is left of the process before is passed over. */
-static void another_process_is_greeted(void **unused)
-{
+static void another_process_is_greeted(void **unused) {
     (void)unused;
     say(GREETING GOOD GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
@@ -108,8 +99,7 @@ static void another_process_is_greeted(void **unused)
 }
 
 /* A line that has no room is passed over whole. */
-static void a_long_line_is_passed_over(void **unused)
-{
+static void a_long_line_is_passed_over(void **unused) {
     static char line[2 * HOST_QMP_LINE];
     (void)unused;
     memset(line, ' ', sizeof line - 1);
@@ -119,8 +109,7 @@ static void a_long_line_is_passed_over(void **unused)
     heard("{\"execute\":\"qmp_capabilities\"}\n{\"execute\":\"stop\"}\n");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(requests_are_answered, set_up,
                                         tear_down),

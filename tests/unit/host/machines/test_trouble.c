@@ -11,8 +11,7 @@
 
 enum { EVERY_US = 1000 };
 
-static void each_board_once(void **unused)
-{
+static void each_board_once(void **unused) {
     enum host_trouble_kind kind;
     unsigned node, resets = 0;
     struct host_troubled t = {.nodes = 4};
@@ -29,8 +28,7 @@ static void each_board_once(void **unused)
     assert_int_equal(resets, 4);
 }
 
-static void each_stop_ends(void **unused)
-{
+static void each_stop_ends(void **unused) {
     enum host_trouble_kind kind;
     unsigned node, stops = 0, ends = 0;
     struct host_troubled t = {.nodes = 2};
@@ -48,8 +46,7 @@ static void each_stop_ends(void **unused)
     assert_int_equal(ends, 2);
 }
 
-static void none_where_none_is_wanted(void **unused)
-{
+static void none_where_none_is_wanted(void **unused) {
     enum host_trouble_kind kind;
     unsigned node;
     struct host_troubled t = {.nodes = 2};
@@ -59,8 +56,7 @@ static void none_where_none_is_wanted(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_board_once),
         cmocka_unit_test(each_stop_ends),

@@ -10,8 +10,7 @@
 
 #include "host/machines/wires.h"
 
-static void assert_joined(int a, int b, char mark)
-{
+static void assert_joined(int a, int b, char mark) {
     char got = 0;
     assert_true(a >= 0 && b >= 0);
     assert_int_equal(write(a, &mark, 1), 1);
@@ -19,8 +18,7 @@ static void assert_joined(int a, int b, char mark)
     assert_int_equal(got, mark);
 }
 
-static void check(unsigned host_ports)
-{
+static void check(unsigned host_ports) {
     enum { NODES = 8, DIMENSION = 3 };
     struct host_wires wires;
     struct host_error error;
@@ -48,21 +46,18 @@ static void check(unsigned host_ports)
     }
 }
 
-static void test_one(void **state)
-{
+static void test_one(void **state) {
     (void)state;
     check(1);
 }
 
-static void test_many(void **state)
-{
+static void test_many(void **state) {
     (void)state;
     check(4);
     check(8);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_one),
         cmocka_unit_test(test_many),

@@ -15,8 +15,7 @@
 #include "host/mesh/gen.h"
 #include "host/order/duplicates.h"
 
-static struct host_points made(const char *kind, uint64_t n, uint64_t seed)
-{
+static struct host_points made(const char *kind, uint64_t n, uint64_t seed) {
     struct host_points points;
     struct host_error error = {0};
     assert_int_equal(host_gen(kind, n, seed, &points, &error), 0);
@@ -27,8 +26,7 @@ static struct host_points made(const char *kind, uint64_t n, uint64_t seed)
     return points;
 }
 
-static void digests_are_known(void **unused)
-{
+static void digests_are_known(void **unused) {
     (void)unused;
     static const char *const known[][2] = {
         {"uniform", "93dad7296d99889e"},  {"bubbles", "1d3a6942e6d59fe0"},
@@ -56,13 +54,11 @@ static void digests_are_known(void **unused)
     }
 }
 
-static double length(const double *p)
-{
+static double length(const double *p) {
     return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
 }
 
-static void shapes_are_as_named(void **unused)
-{
+static void shapes_are_as_named(void **unused) {
     (void)unused;
     struct host_points u = made("uniform", 5000, 1);
     double sum = 0;
@@ -92,8 +88,7 @@ static void shapes_are_as_named(void **unused)
     host_points_free(&r);
 }
 
-static void surfaces_are_as_named(void **unused)
-{
+static void surfaces_are_as_named(void **unused) {
     (void)unused;
     struct host_points s = made("shell", 5000, 1);
     struct host_points c = made("cylinder", 5000, 1);
@@ -110,8 +105,7 @@ static void surfaces_are_as_named(void **unused)
     host_points_free(&t);
 }
 
-static void the_rest_is_as_named(void **unused)
-{
+static void the_rest_is_as_named(void **unused) {
     (void)unused;
     struct host_points t = made("terrain", 400, 1);
     struct host_points s = made("scales", 3000, 1);
@@ -137,8 +131,7 @@ static void the_rest_is_as_named(void **unused)
 }
 
 /* As --help says it. */
-static void some_kinds_have_no_chance_in_them(void **unused)
-{
+static void some_kinds_have_no_chance_in_them(void **unused) {
     (void)unused;
     static const struct {
         const char *kind;
@@ -161,8 +154,7 @@ static void some_kinds_have_no_chance_in_them(void **unused)
     }
 }
 
-static void seeds_differ_and_points_do_not_repeat(void **unused)
-{
+static void seeds_differ_and_points_do_not_repeat(void **unused) {
     (void)unused;
     static const char *const kinds[] = {
         "uniform",  "bubbles", "sphere",  "hub",    "shell",
@@ -185,8 +177,7 @@ static void seeds_differ_and_points_do_not_repeat(void **unused)
     host_points_free(&fin);
 }
 
-static void wrong_requests_are_refused(void **unused)
-{
+static void wrong_requests_are_refused(void **unused) {
     (void)unused;
     struct host_points points;
     struct host_error error = {0};
@@ -199,8 +190,7 @@ static void wrong_requests_are_refused(void **unused)
                      HOST_USAGE);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(digests_are_known),
         cmocka_unit_test(shapes_are_as_named),

@@ -14,15 +14,13 @@
 
 static uint64_t state = 3;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (uint32_t)((state >> 33) % below);
 }
 
 static void add(struct host_tetrahedra *tets, uint32_t a, uint32_t b,
-                uint32_t c, uint32_t d)
-{
+                uint32_t c, uint32_t d) {
     struct host_error error = {0};
     uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, &error);
     assert_non_null(row);
@@ -32,8 +30,7 @@ static void add(struct host_tetrahedra *tets, uint32_t a, uint32_t b,
 }
 
 /* Ascending vertices, then whether the row is an even permutation of them. */
-static void key_of(const uint32_t v[4], uint32_t key[5])
-{
+static void key_of(const uint32_t v[4], uint32_t key[5]) {
     memcpy(key, v, 4 * sizeof *v);
     key[4] = 0;
     for (int i = 0; i < 3; i++) {
@@ -48,8 +45,7 @@ static void key_of(const uint32_t v[4], uint32_t key[5])
     }
 }
 
-static int compare_keys(const void *p, const void *q)
-{
+static int compare_keys(const void *p, const void *q) {
     const uint32_t *a = p, *b = q;
     for (int i = 0; i < 5; i++) {
         if (a[i] != b[i]) {
@@ -59,8 +55,7 @@ static int compare_keys(const void *p, const void *q)
     return 0;
 }
 
-static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd)
-{
+static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd) {
     struct host_tetrahedra tets = {0};
     uint32_t(*key)[5] = malloc(n * sizeof *key);
     assert_non_null(key);
@@ -98,8 +93,7 @@ static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd)
     free(key);
 }
 
-static void order_is_canonical(void **unused)
-{
+static void order_is_canonical(void **unused) {
     (void)unused;
     check_sort(1, 4, 4);
     check_sort(24, 4, 4);
@@ -110,8 +104,7 @@ static void order_is_canonical(void **unused)
     check_sort(300000, 20000000, 5);
 }
 
-static void every_permutation_keeps_its_sign(void **unused)
-{
+static void every_permutation_keeps_its_sign(void **unused) {
     (void)unused;
     for (int code = 0; code < 256; code++) {
         uint32_t v[4] = {(uint32_t)code & 3, (uint32_t)code >> 2 & 3,
@@ -134,8 +127,7 @@ static void every_permutation_keeps_its_sign(void **unused)
     }
 }
 
-static void digests_are_known(void **unused)
-{
+static void digests_are_known(void **unused) {
     (void)unused;
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
@@ -152,8 +144,7 @@ static void digests_are_known(void **unused)
     host_tetrahedra_free(&tets);
 }
 
-static void mapping_and_cutting(void **unused)
-{
+static void mapping_and_cutting(void **unused) {
     (void)unused;
     struct host_tetrahedra tets = {0};
     const uint32_t map[5] = {50, 40, 30, 20, 10};
@@ -173,8 +164,7 @@ static void mapping_and_cutting(void **unused)
 }
 
 /* Beyond what numbers a neighbour: told before a tetrahedron is looked at. */
-static void too_many_for_neighbours(void **unused)
-{
+static void too_many_for_neighbours(void **unused) {
     (void)unused;
     const struct host_tetrahedra tets = {.count = UINT32_MAX};
     struct host_adjacency adjacency;
@@ -185,8 +175,7 @@ static void too_many_for_neighbours(void **unused)
     assert_non_null(strstr(error.text, "; do without these"));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(order_is_canonical),
         cmocka_unit_test(every_permutation_keeps_its_sign),

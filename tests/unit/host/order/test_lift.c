@@ -17,14 +17,12 @@
 
 static uint64_t state = 1;
 
-static double draw(void)
-{
+static double draw(void) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-53;
 }
 
-static double even(void)
-{
+static double even(void) {
     return 2 * draw() - 1;
 }
 
@@ -34,88 +32,74 @@ static double even(void)
 static const double tilt[3][3] = {
     {0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}};
 
-static void tilted(double p[3], double a, double b, double c)
-{
+static void tilted(double p[3], double a, double b, double c) {
     for (int d = 0; d < 3; d++)
         p[d] = a * tilt[0][d] + b * tilt[1][d] + c * tilt[2][d];
 }
 
-static void volume(double p[3])
-{
+static void volume(double p[3]) {
     tilted(p, even(), even(), even());
 }
 
-static void plane(double p[3])
-{
+static void plane(double p[3]) {
     tilted(p, even(), even(), 0.3);
 }
 
-static void line(double p[3])
-{
+static void line(double p[3]) {
     tilted(p, even(), 0.1, 0.3);
 }
 
-static void sphere(double p[3])
-{
+static void sphere(double p[3]) {
     double z = even(), angle = 6.283185307179586 * draw(), r = sqrt(1 - z * z);
     tilted(p, r * cos(angle), r * sin(angle), z);
 }
 
-static void cylinder(double p[3])
-{
+static void cylinder(double p[3]) {
     double angle = 6.283185307179586 * draw();
     tilted(p, 0.2 * cos(angle), 0.2 * sin(angle), even());
 }
 
-static void terrain(double p[3])
-{
+static void terrain(double p[3]) {
     p[0] = even(), p[1] = even();
     p[2] = 0.1 * sin(3 * p[0]) * cos(4 * p[1]) + 0.001 * draw();
 }
 
-static void clusters(double p[3])
-{
+static void clusters(double p[3]) {
     tilted(p, rint(2 * even()), rint(2 * even()), 0);
     for (int d = 0; d < 3; d++)
         p[d] += ldexp(even(), -8 * (1 + (int)(draw() * 5)));
 }
 
-static void trajectory(double p[3])
-{
+static void trajectory(double p[3]) {
     double t = even();
     p[0] = t * 1e6, p[1] = sin(5 * t) + 1e-3 * draw(), p[2] = 1e-6 * t * t;
 }
 
-static void far_plane(double p[3])
-{
+static void far_plane(double p[3]) {
     plane(p);
     for (int d = 0; d < 3; d++)
         p[d] += 1e9 * (d + 1);
 }
 
-static void large(double p[3])
-{
+static void large(double p[3]) {
     sphere(p);
     for (int d = 0; d < 3; d++)
         p[d] *= 0x1p1023;
 }
 
-static void small(double p[3])
-{
+static void small(double p[3]) {
     plane(p);
     for (int d = 0; d < 3; d++)
         p[d] *= 1e-306;
 }
 
-static void denormal(double p[3])
-{
+static void denormal(double p[3]) {
     sphere(p);
     for (int d = 0; d < 3; d++)
         p[d] *= 1e-312;
 }
 
-static void all_scales(double p[3])
-{
+static void all_scales(double p[3]) {
     for (int d = 0; d < 3; d++)
         p[d] = ldexp(even(), (int)(draw() * 2000) - 1000);
 }
@@ -123,8 +107,7 @@ static void all_scales(double p[3])
 typedef void making(double p[3]);
 
 /* Two points make a plane or a line span the space. */
-static void order(struct host_order *order, making *make, size_t n)
-{
+static void order(struct host_order *order, making *make, size_t n) {
     struct host_error error = {0};
     double *xyz = malloc(3 * n * sizeof *xyz);
     assert_non_null(xyz);
@@ -142,15 +125,13 @@ static void order(struct host_order *order, making *make, size_t n)
 
 /* ---- what must hold ---- */
 
-static long double dot(const long double a[3], const double b[3])
-{
+static long double dot(const long double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* The first of a child's points, and how many. */
 static uint32_t below(const struct host_order *o, uint32_t level,
-                      uint32_t child, uint32_t *last)
-{
+                      uint32_t child, uint32_t *last) {
     uint64_t width = UINT64_C(1) << (5 * (level - 1));
     uint64_t end = (child + 1) * width;
     end = end < o->bricks ? end : o->bricks;
@@ -163,8 +144,7 @@ static uint32_t below(const struct host_order *o, uint32_t level,
 static void relative(const struct host_order *o,
                      const struct incode_boxes *boxes,
                      const struct incode_lifted *l, uint32_t v,
-                     long double t[3])
-{
+                     long double t[3]) {
     double p[3];
     host_vertex(o, v, p);
     for (int d = 0; d < 3; d++)
@@ -172,8 +152,7 @@ static void relative(const struct host_order *o,
 }
 
 /* The bound of the header, for D = 1 and a gradient at the centre. */
-static double bound_of(const struct incode_lifted *l, const double g[3])
-{
+static double bound_of(const struct incode_lifted *l, const double g[3]) {
     double least = l->lid, length = 0;
     for (int k = 0; k < 3; k++) {
         double s = l->slope[k];
@@ -189,8 +168,7 @@ enum { FUNCTIONS = 8 };
 
 /* Functions |p - o|^2 + g . (p - o): at random, and of spheres that touch the
  * points near the centre. */
-static void gradients(const struct incode_lifted *l, double g[FUNCTIONS][3])
-{
+static void gradients(const struct incode_lifted *l, double g[FUNCTIONS][3]) {
     for (int i = 0; i < FUNCTIONS; i++) {
         double size = l->radius * pow(2, 12 * draw() - 4);
         const double *a = l->a[2];
@@ -201,8 +179,7 @@ static void gradients(const struct incode_lifted *l, double g[FUNCTIONS][3])
 }
 
 static void check_child(const struct host_order *o, uint32_t level,
-                        uint32_t child)
-{
+                        uint32_t child) {
     const struct incode_tree *tree = &o->tree;
     const struct incode_boxes *boxes =
         o->boxes + (tree->base[level] - tree->base[1]) + child / INCODE_FANOUT;
@@ -238,8 +215,7 @@ static void check_child(const struct host_order *o, uint32_t level,
 }
 
 /* Returns the share of bricks that have a lifted box. */
-static double check_all(making *make, size_t n)
-{
+static double check_all(making *make, size_t n) {
     struct host_order o;
     unsigned lifted = 0;
     order(&o, make, n);
@@ -255,8 +231,7 @@ static double check_all(making *make, size_t n)
     return share;
 }
 
-static void no_point_is_outside(void **unused)
-{
+static void no_point_is_outside(void **unused) {
     (void)unused;
     static const struct {
         making *make;
@@ -279,8 +254,7 @@ static void no_point_is_outside(void **unused)
 
 /* Whether the ball about c is known to hold no point. */
 static bool excluded(const struct incode_lifted *l, const double c[3],
-                     double radius)
-{
+                     double radius) {
     double g[3], f = -radius * radius;
     for (int d = 0; d < 3; d++) {
         g[d] = 2 * (l->o[d] - c[d]);
@@ -292,8 +266,7 @@ static bool excluded(const struct incode_lifted *l, const double c[3],
 /* Balls beside the box, of 1 to 10,000 times its radius, with a gap of a part
  * in 30 of their sagitta over it and a part in 1,000 of its radius. */
 static bool balls_beside(const struct incode_lifted *l,
-                         const struct incode_boxes *boxes)
-{
+                         const struct incode_boxes *boxes) {
     (void)boxes;
     double length[3], c[3];
     int thin = 0;
@@ -320,8 +293,7 @@ static bool balls_beside(const struct incode_lifted *l,
 /* A ball about the centre of the sphere that the points lie on, smaller by an
  * eighth of r^2. */
 static bool ball_within(const struct incode_lifted *l,
-                        const struct incode_boxes *boxes)
-{
+                        const struct incode_boxes *boxes) {
     double c[3], r = l->radius * boxes->unit;
     for (int d = 0; d < 3; d++)
         c[d] = -boxes->origin[d] / boxes->unit;
@@ -331,8 +303,7 @@ static bool ball_within(const struct incode_lifted *l,
 /* The share of bricks of which all of these balls are excluded. */
 static double excluding(making *make,
                         bool (*balls)(const struct incode_lifted *,
-                                      const struct incode_boxes *))
-{
+                                      const struct incode_boxes *)) {
     struct host_order o;
     unsigned count = 0;
     order(&o, make, 50000);
@@ -347,8 +318,7 @@ static double excluding(making *make,
     return share;
 }
 
-static void flat_boxes_exclude(void **unused)
-{
+static void flat_boxes_exclude(void **unused) {
     (void)unused;
     assert_true(excluding(plane, balls_beside) > 0.99);
     assert_true(excluding(line, balls_beside) > 0.99);
@@ -356,8 +326,7 @@ static void flat_boxes_exclude(void **unused)
 }
 
 /* A lump has the same shape whether it is of points or of lumps. */
-static void lumps_join(void **unused)
-{
+static void lumps_join(void **unused) {
     (void)unused;
     static _Alignas(64) struct incode_brick brick[INCODE_FANOUT];
     struct host_lump lump[INCODE_FANOUT], all, one;
@@ -398,8 +367,7 @@ static void lumps_join(void **unused)
     assert_true(fabs(one.y_square - all.y_square) < 1e-9);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_point_is_outside),
         cmocka_unit_test(flat_boxes_exclude),

@@ -13,8 +13,7 @@
 #include "host/mesh/gen.h"
 #include "host/order/open.h"
 
-static uint64_t open_of(const double *xyz, uint64_t count)
-{
+static uint64_t open_of(const double *xyz, uint64_t count) {
     struct host_order order = {0};
     struct host_error error = {0};
     assert_int_equal(host_order_make(&order, "points", xyz, count,
@@ -25,8 +24,7 @@ static uint64_t open_of(const double *xyz, uint64_t count)
     return open;
 }
 
-static uint64_t open_of_kind(const char *kind, uint64_t count)
-{
+static uint64_t open_of_kind(const char *kind, uint64_t count) {
     struct host_points points = {0};
     struct host_error error = {0};
     assert_int_equal(host_gen(kind, count, 1, &points, &error), 0);
@@ -36,8 +34,7 @@ static uint64_t open_of_kind(const char *kind, uint64_t count)
 }
 
 /* 8 n^(2/3) of a volume are not final; those open in the end are fewer. */
-static void test_growth(void **unused)
-{
+static void test_growth(void **unused) {
     (void)unused;
     double before = 0;
     for (uint64_t n = 4000; n <= 64000; n *= 4) {
@@ -52,8 +49,7 @@ static void test_growth(void **unused)
 
 /* Points on two lines askew: a tetrahedron for each pair of their intervals,
  * more than are counted. */
-static void test_across(void **unused)
-{
+static void test_across(void **unused) {
     (void)unused;
     enum { SIDE = 1000 };
     static double xyz[2 * SIDE][3];
@@ -64,8 +60,7 @@ static void test_across(void **unused)
     assert_true(open_of(xyz[0], 2 * SIDE) > 10 * SIDE);
 }
 
-static void test_few(void **unused)
-{
+static void test_few(void **unused) {
     (void)unused;
     static const double xyz[5][3] = {
         {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
@@ -73,8 +68,7 @@ static void test_few(void **unused)
     assert_true(open_of(xyz[0], 4) <= 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_growth),
         cmocka_unit_test(test_across),

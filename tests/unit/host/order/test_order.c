@@ -16,14 +16,12 @@
 
 static uint64_t state = 7;
 
-static double draw(void)
-{
+static double draw(void) {
     state = state * 6364136223846793005u + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-53;
 }
 
-static double *random_points(size_t n, double levels)
-{
+static double *random_points(size_t n, double levels) {
     double *xyz = malloc(n * 3 * sizeof *xyz);
     assert_non_null(xyz);
     for (size_t i = 0; i < 3 * n; i++) {
@@ -33,13 +31,11 @@ static double *random_points(size_t n, double levels)
     return xyz;
 }
 
-static int same(const double *p, const double *q)
-{
+static int same(const double *p, const double *q) {
     return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
-static int compare_rows(const void *a, const void *b, void *context)
-{
+static int compare_rows(const void *a, const void *b, void *context) {
     const double *xyz = context;
     const uint32_t *p = a, *q = b;
     for (int d = 0; d < 3; d++) {
@@ -53,8 +49,7 @@ static int compare_rows(const void *a, const void *b, void *context)
 }
 
 /* The lowest row of each point, by sorting. */
-static uint8_t *lowest_rows(double *xyz, size_t n, size_t *distinct)
-{
+static uint8_t *lowest_rows(double *xyz, size_t n, size_t *distinct) {
     uint32_t *rows = malloc(n * sizeof *rows);
     uint8_t *lowest = calloc(n, 1);
     assert_non_null(rows);
@@ -75,8 +70,7 @@ static uint8_t *lowest_rows(double *xyz, size_t n, size_t *distinct)
     return lowest;
 }
 
-static void check_rows(const struct host_order *order, double *xyz, size_t n)
-{
+static void check_rows(const struct host_order *order, double *xyz, size_t n) {
     size_t distinct;
     uint8_t *lowest = lowest_rows(xyz, n, &distinct);
     assert_int_equal(order->points, distinct);
@@ -106,8 +100,7 @@ static void check_rows(const struct host_order *order, double *xyz, size_t n)
 }
 
 static void check_regions(const struct host_order *order,
-                          enum host_partition partition)
-{
+                          enum host_partition partition) {
     uint32_t brick = 0, points = 0;
     for (uint32_t r = 0; r < order->regions; r++) {
         const struct host_region *region = &order->region[r];
@@ -137,8 +130,7 @@ static void check_regions(const struct host_order *order,
     assert_int_equal(points, order->points);
 }
 
-static void check_boxes(const struct host_order *order)
-{
+static void check_boxes(const struct host_order *order) {
     const struct incode_tree *tree = &order->tree;
     double box_lo[3][INCODE_FANOUT], box_hi[3][INCODE_FANOUT];
     union incode_page page;
@@ -177,8 +169,7 @@ static void check_boxes(const struct host_order *order)
     }
 }
 
-static void check_bricks(const struct host_order *order)
-{
+static void check_bricks(const struct host_order *order) {
     double page[192];
     for (uint32_t b = 0; b < order->bricks; b++) {
         size_t count = order->fill[b];
@@ -192,8 +183,7 @@ static void check_bricks(const struct host_order *order)
     assert_int_equal(host_page(order, order->tree.pages, page), 0);
 }
 
-static void check_grid(const struct host_order *order)
-{
+static void check_grid(const struct host_order *order) {
     uint32_t cells = order->cells[0] * order->cells[1] * order->cells[2];
     const struct incode_tree *tree = &order->tree;
     assert_true(cells >= 1 && cells <= order->points);
@@ -218,8 +208,7 @@ static void check_grid(const struct host_order *order)
 }
 
 static void check_all(double *xyz, size_t n, enum host_partition partition,
-                      uint32_t regions)
-{
+                      uint32_t regions) {
     struct host_order order;
     struct host_error error = {0};
     assert_int_equal(host_order_make(&order, "test", xyz, n, partition, regions,
@@ -233,8 +222,7 @@ static void check_all(double *xyz, size_t n, enum host_partition partition,
     host_order_free(&order);
 }
 
-static void every_row_once(void **unused)
-{
+static void every_row_once(void **unused) {
     (void)unused;
     const size_t sizes[] = {4, 5, 9, 63, 64, 65, 129, 1000, 2049, 70000};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
@@ -253,8 +241,7 @@ static void every_row_once(void **unused)
 }
 
 /* Bricks as tight as a k-d arrangement makes them, and box pages too. */
-static void bricks_are_compact(void **unused)
-{
+static void bricks_are_compact(void **unused) {
     (void)unused;
     size_t n = 100000;
     double *xyz = random_points(n, 0);
@@ -290,8 +277,7 @@ static void bricks_are_compact(void **unused)
 }
 
 /* A region is a function of the points, whatever their order in the input. */
-static void shuffling_changes_no_region(void **unused)
-{
+static void shuffling_changes_no_region(void **unused) {
     (void)unused;
     size_t n = 5000;
     double *xyz = random_points(n, 9);
@@ -327,8 +313,7 @@ static void shuffling_changes_no_region(void **unused)
     free(xyz);
 }
 
-static void signed_zeros_are_one(void **unused)
-{
+static void signed_zeros_are_one(void **unused) {
     (void)unused;
     const double xyz[] = {0.0, 0.0, 0.0,  1, 0, 0, 0, 1, 0,   0, 0, 1,
                           -0., 0.0, -0.0, 1, 0, 0, 0, 1, -0., 2, 2, 2};
@@ -350,8 +335,7 @@ static void signed_zeros_are_one(void **unused)
 }
 
 /* Each thread counts its rows. */
-static void signed_zeros_are_counted(void **unused)
-{
+static void signed_zeros_are_counted(void **unused) {
     (void)unused;
     const size_t rows = (1 << 17) + 5;
     double *xyz = random_points(rows, 0);
@@ -368,8 +352,7 @@ static void signed_zeros_are_counted(void **unused)
     free(xyz);
 }
 
-static void extreme_coordinates(void **unused)
-{
+static void extreme_coordinates(void **unused) {
     (void)unused;
     double *xyz = random_points(3000, 0);
     for (size_t i = 0; i < 9000; i++) {
@@ -381,8 +364,7 @@ static void extreme_coordinates(void **unused)
     free(xyz);
 }
 
-static void flat_input_is_refused(void **unused)
-{
+static void flat_input_is_refused(void **unused) {
     (void)unused;
     struct host_order order;
     struct host_error error = {0};
@@ -417,8 +399,7 @@ static void flat_input_is_refused(void **unused)
         HOST_INPUT);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_row_once),
         cmocka_unit_test(bricks_are_compact),

@@ -18,8 +18,7 @@ enum { WORDS_MAX = 13 };
 
 /* Parses "incode run" with these words, ended by NULL. */
 static int parse(const char *const *words, struct host_run_options *options,
-                 struct host_error *error)
-{
+                 struct host_error *error) {
     char text[WORDS_MAX + 2][64] = {"incode run"};
     char *argv[WORDS_MAX + 2] = {text[0]};
     int argc = 1;
@@ -32,8 +31,7 @@ static int parse(const char *const *words, struct host_run_options *options,
     return host_arguments_run(argc, argv, options, error);
 }
 
-static void test_defaults(void **unused)
-{
+static void test_defaults(void **unused) {
     (void)unused;
     struct host_run_options o;
     struct host_error error;
@@ -52,8 +50,7 @@ static void test_defaults(void **unused)
     assert_true(o.progress);
 }
 
-static void test_options(void **unused)
-{
+static void test_options(void **unused) {
     (void)unused;
     struct host_run_options o;
     struct host_error error;
@@ -88,8 +85,7 @@ static void test_options(void **unused)
 }
 
 /* The Linda programs, and what they heed, in any order. */
-static void test_linda(void **unused)
-{
+static void test_linda(void **unused) {
     static const char *const words[][4] = {
         {"a.xyz", "--strategy=linda", "--faces-per-job=7", NULL},
         {"a.xyz", "--linda=master-slaves", "--strategy=linda", NULL},
@@ -106,8 +102,7 @@ static void test_linda(void **unused)
 }
 
 /* Exit status 2, and the message says what is allowed. */
-static void test_refused(void **unused)
-{
+static void test_refused(void **unused) {
     (void)unused;
     static const struct {
         const char *word, *said;
@@ -151,8 +146,7 @@ static void test_refused(void **unused)
 }
 
 /* What would change nothing is refused, and what goes with it is not. */
-static void test_in_vain(void **unused)
-{
+static void test_in_vain(void **unused) {
     (void)unused;
     static const struct {
         const char *vain, *beside, *with;
@@ -183,8 +177,7 @@ static void test_in_vain(void **unused)
 }
 
 /* Each value of an enumeration has a name, which the options know it by. */
-static void test_names(void **unused)
-{
+static void test_names(void **unused) {
     const struct {
         const char *option;
         const char *const *names;
@@ -212,8 +205,7 @@ static void test_names(void **unused)
 
 /* Every row of the tables of links and boards is known by its name, and an
  * error about any other lists it. */
-static void test_rows(void **unused)
-{
+static void test_rows(void **unused) {
     (void)unused;
     struct host_run_options o;
     struct host_error error, refusal;
@@ -245,8 +237,7 @@ static void test_rows(void **unused)
 }
 
 /* What a bare board has settles what else may be asked for. */
-static void test_bare_boards(void **unused)
-{
+static void test_bare_boards(void **unused) {
     (void)unused;
     static const struct {
         const char *words[4], *said;
@@ -283,8 +274,7 @@ static void test_bare_boards(void **unused)
 }
 
 /* What `incode run` prints with this word, blanks squeezed. */
-static void printed(const char *word, char *text, size_t size)
-{
+static void printed(const char *word, char *text, size_t size) {
     size_t used = 0;
     int ends[2];
     char c;
@@ -316,8 +306,7 @@ static void printed(const char *word, char *text, size_t size)
 
 /* The strategies of the table, and auto, are those that the option takes, its
  * help explains, and the error about any other lists. */
-static void test_strategies(void **unused)
-{
+static void test_strategies(void **unused) {
     (void)unused;
     static char help[16384];
     struct host_run_options o;
@@ -339,8 +328,7 @@ static void test_strategies(void **unused)
     assert_string_equal(host_strategy_name(i - 1), "auto");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_defaults),   cmocka_unit_test(test_options),
         cmocka_unit_test(test_linda),      cmocka_unit_test(test_bare_boards),

@@ -16,8 +16,7 @@ static struct host_run_result result;
 /* Settles a run on so many points of that kind; true: again, by their order.
  * *regions: that the order has in the end. */
 static bool settle(struct host_run_options *options, const char *kind,
-                   uint32_t *regions)
-{
+                   uint32_t *regions) {
     struct host_points points = {0};
     struct host_order order;
     struct host_error error = {0};
@@ -40,8 +39,7 @@ static bool settle(struct host_run_options *options, const char *kind,
     return again;
 }
 
-static void volumes_and_others(void **unused)
-{
+static void volumes_and_others(void **unused) {
     (void)unused;
     struct host_run_options options;
     uint32_t regions;
@@ -64,8 +62,7 @@ static void volumes_and_others(void **unused)
     assert_ptr_not_equal(result.strategy, &host_sequential);
 }
 
-static void what_is_asked_for_stays(void **unused)
-{
+static void what_is_asked_for_stays(void **unused) {
     (void)unused;
     struct host_run_options options;
     uint32_t regions;
@@ -79,8 +76,7 @@ static void what_is_asked_for_stays(void **unused)
 }
 
 /* One node does by itself, unless somebody has said how many. */
-static void one_alone(void **unused)
-{
+static void one_alone(void **unused) {
     (void)unused;
     struct host_run_options options;
     uint32_t regions;
@@ -95,8 +91,7 @@ static void one_alone(void **unused)
 
 /* What is open of a surface has to fit, or its faces are sought; the user's
  * word stands. */
-static void what_does_not_fit(void **unused)
-{
+static void what_does_not_fit(void **unused) {
     (void)unused;
     struct host_run_options options;
     uint32_t regions;
@@ -114,8 +109,7 @@ static void what_does_not_fit(void **unused)
     assert_int_equal(result.build, INCODE_BUILD_POINTS);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(volumes_and_others),
         cmocka_unit_test(what_is_asked_for_stays),

@@ -66,8 +66,7 @@ static const char *const node_names[] = {"node",
                                          "bytes_out",
                                          "memory_high_water_bytes"};
 
-static void fill(struct host_run_result *r)
-{
+static void fill(struct host_run_result *r) {
     memset(r, 0, sizeof *r);
     r->rows = 100;
     r->points = 99;
@@ -95,8 +94,7 @@ static void fill(struct host_run_result *r)
 }
 
 /* What is written of a result, read again. */
-static json_t *written(const struct host_run_result *result)
-{
+static json_t *written(const struct host_run_result *result) {
     struct host_error error = {0};
     char path[] = "/tmp/incode-stats-XXXXXX";
     int fd = mkstemp(path);
@@ -110,8 +108,7 @@ static json_t *written(const struct host_run_result *result)
     return o;
 }
 
-static void test_names(void **unused)
-{
+static void test_names(void **unused) {
     (void)unused;
     static struct host_run_result result;
     fill(&result);
@@ -151,8 +148,7 @@ static void test_names(void **unused)
 }
 
 /* Whether a row of the table has `name` in its first column. */
-static bool documented(const char *table, const char *name)
-{
+static bool documented(const char *table, const char *name) {
     char quoted[64];
     snprintf(quoted, sizeof quoted, "`%s`", name);
     for (const char *row = table; (row = strstr(row, "\n| `")) != NULL;) {
@@ -165,13 +161,11 @@ static bool documented(const char *table, const char *name)
     return false;
 }
 
-static unsigned undocumented(const char *table, json_t *object)
-{
+static unsigned undocumented(const char *table, json_t *object) {
     unsigned count = 0;
     const char *name;
     json_t *value;
-    json_object_foreach(object, name, value)
-    {
+    json_object_foreach(object, name, value) {
         if (!documented(table, name)) {
             print_error("README.md has no row of `%s` under Statistics\n",
                         name);
@@ -182,8 +176,7 @@ static unsigned undocumented(const char *table, json_t *object)
 }
 
 /* Names of the first column that neither the run nor a node has. */
-static unsigned unwritten(const char *table, json_t *run, json_t *node)
-{
+static unsigned unwritten(const char *table, json_t *run, json_t *node) {
     unsigned count = 0;
     for (const char *row = table; (row = strstr(row, "\n| `")) != NULL;) {
         const char *end = strstr(row + 3, " |");
@@ -205,8 +198,7 @@ static unsigned unwritten(const char *table, json_t *run, json_t *node)
 }
 
 /* README.md has a row for each field that is written, and for no other. */
-static void test_documented(void **unused)
-{
+static void test_documented(void **unused) {
     (void)unused;
     static struct host_run_result result;
     static char text[1 << 18];
@@ -227,8 +219,7 @@ static void test_documented(void **unused)
     json_decref(run);
 }
 
-static void test_candidates(void **unused)
-{
+static void test_candidates(void **unused) {
     (void)unused;
     static struct host_run_result result;
     fill(&result);
@@ -238,8 +229,7 @@ static void test_candidates(void **unused)
     assert_true(host_candidates_p99(&result) < 182.0);
 }
 
-static void test_unwritable(void **unused)
-{
+static void test_unwritable(void **unused) {
     (void)unused;
     static struct host_run_result result;
     struct host_error error = {0};
@@ -253,8 +243,7 @@ static void test_unwritable(void **unused)
 /* In a process that a large one became, as a shell or a script starts it. */
 static char *self;
 
-static void test_peak_is_its_own(void **unused)
-{
+static void test_peak_is_its_own(void **unused) {
     (void)unused;
     const size_t large = (size_t)192 << 20;
     int pair[2], status = -1;
@@ -281,8 +270,7 @@ static void test_peak_is_its_own(void **unused)
     host_unmap(bytes, large);
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     self = argv[0];
     if (argc > 1 && strcmp(argv[1], "peak") == 0) {
         uint64_t peak = host_memory_peak();

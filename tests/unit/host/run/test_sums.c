@@ -14,8 +14,7 @@ enum { NODES = 5 };
 static struct host_run_result result;
 static struct host_node_report reports[NODES];
 
-static void work(unsigned node, uint64_t wall_us, uint64_t calls)
-{
+static void work(unsigned node, uint64_t wall_us, uint64_t calls) {
     struct node_finished_message *f = &reports[node].statistics;
     f->wall_us = wall_us;
     f->statistics.make_tetra_calls = calls;
@@ -23,8 +22,7 @@ static void work(unsigned node, uint64_t wall_us, uint64_t calls)
     f->statistics.vertices = calls / 10;
 }
 
-static void sum(void)
-{
+static void sum(void) {
     const struct host_service service = {.report = reports, .retransmitted = 3};
     memset(&result, 0, sizeof result);
     result.nodes = NODES;
@@ -34,8 +32,7 @@ static void sum(void)
 /* A holder has no time at work; what it sends again counts all the same.  An
  * idle worker is the fastest.  A node that was lost before it told of its time
  * is not, but what came of it counts. */
-static void test_sums(void **unused)
-{
+static void test_sums(void **unused) {
     (void)unused;
     memset(reports, 0, sizeof reports);
     sum();
@@ -56,8 +53,7 @@ static void test_sums(void **unused)
     assert_int_equal(result.node[1].statistics.wall_us, 6000000);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_sums)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

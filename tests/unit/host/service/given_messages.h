@@ -37,8 +37,7 @@ static struct host_tetrahedra tets;
  * all the same. */
 static struct sim_end nowhere;
 
-static void *open_cube(void)
-{
+static void *open_cube(void) {
     struct cube_config config = {
         .self = CUBE_HOST, .dimension = 2, .window = 1, .epoch = 1};
     config.pipes[0] = sim_pipe(&nowhere);
@@ -52,29 +51,25 @@ static void *open_cube(void)
 static void *cube_arena;
 static char said[400]; /* the last line to the user */
 
-static void keep_told(void *context, const char *line)
-{
+static void keep_told(void *context, const char *line) {
     (void)context;
     snprintf(said, sizeof said, "%s", line);
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     order = small_order(NODES);
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_order_free(&order);
     return 0;
 }
 
 /* A service in the midst of its run, a job at each node. */
-static void begin(void)
-{
+static void begin(void) {
     struct host_error error = {0};
     memset(&service, 0, sizeof service);
     memset(&tets, 0, sizeof tets);
@@ -104,8 +99,7 @@ static void begin(void)
     }
 }
 
-static void end(void)
-{
+static void end(void) {
     free(cube_arena);
     free(service.node);
     free(service.report);
@@ -118,8 +112,7 @@ static void end(void)
 static bool gap; /* messages do not say how many went before them */
 
 static inline int send(uint16_t source, uint8_t type, const void *data,
-                       size_t size, struct host_error *error)
-{
+                       size_t size, struct host_error *error) {
     /* A copy of the right size, so that a sanitizer sees reads past it. */
     uint8_t *copy = malloc(size + 1);
     assert_non_null(copy);
@@ -147,8 +140,7 @@ enum { JOB_OF_NODE_1 = 2 };
 /* A batch of one tetrahedron of node 1, and the commit of a brick of its job.
  */
 static inline size_t batch_of(uint8_t *data, const uint32_t v[4],
-                              uint32_t brick)
-{
+                              uint32_t brick) {
     struct node_result_writer writer;
     struct node_result_header header = {JOB_OF_NODE_1, 0};
     const uint32_t apexes[1][3] = {{v[1], v[2], v[3]}};

@@ -77,20 +77,17 @@ static struct host_digest expected;
 static struct host_points points;
 static struct host_run_result result;
 
-static inline uint32_t draw(uint32_t below)
-{
+static inline uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&state) >> 32) % below;
 }
 
-static inline uint64_t time_of(double when)
-{
+static inline uint64_t time_of(double when) {
     return (uint64_t)(when *
                       (double)(world.sequential ? sequential_us : spatial_us));
 }
 
 /* Both ways: what is sent is lost, and nobody is told. */
-static inline void cut(unsigned node, unsigned link, bool deaf)
-{
+static inline void cut(unsigned node, unsigned link, bool deaf) {
     struct host_sim_cube *cube = &world.sim.cube;
     unsigned wire = host_sim_cube_wire(cube, node, link);
     for (unsigned side = 0; side < 2; side++) {
@@ -98,13 +95,11 @@ static inline void cut(unsigned node, unsigned link, bool deaf)
     }
 }
 
-static inline void lacks(unsigned node, unsigned link)
-{
+static inline void lacks(unsigned node, unsigned link) {
     cut(node, link, true);
 }
 
-static inline void happen(struct event *event)
-{
+static inline void happen(struct event *event) {
     uint64_t stop_us = world.stop_us > 0 ? world.stop_us : UINT64_MAX / 4;
     switch (event->what) {
     case RESTART:
@@ -129,8 +124,7 @@ static inline void happen(struct event *event)
     event->what = NOTHING;
 }
 
-static inline void strike(void *context)
-{
+static inline void strike(void *context) {
     struct host_world *w = &world.sim;
     (void)context;
     if (world.sick && w->node[0].state == HOST_WORLD_UP &&
@@ -149,8 +143,7 @@ static inline void strike(void *context)
     }
 }
 
-static inline void start_world(void)
-{
+static inline void start_world(void) {
     const struct host_world_options options = {
         .cube = {.dimension = DIMENSION,
                  .seed = 1 + draw(UINT32_MAX),
@@ -177,16 +170,14 @@ static inline void start_world(void)
     world.sim.strike_us = 0;
 }
 
-static inline void end_world(void)
-{
+static inline void end_world(void) {
     assert_null(host_world_damage(&world.sim));
     host_world_close(&world.sim);
 }
 
 /* --- the machine ---------------------------------------------------------- */
 
-static inline int machine_check(void *context, struct host_error *error)
-{
+static inline int machine_check(void *context, struct host_error *error) {
     (void)context;
     assert_null(world.sim.fault);
     return world.host_fails > 0.0 &&
@@ -195,8 +186,7 @@ static inline int machine_check(void *context, struct host_error *error)
                : 0;
 }
 
-static inline void machine_told(void *context, const char *line)
-{
+static inline void machine_told(void *context, const char *line) {
     (void)context;
     assert_non_null(strstr(line, ": "));
     assert_non_null(strstr(line, "; "));
@@ -207,8 +197,7 @@ static inline void machine_told(void *context, const char *line)
 }
 
 /* When the user was told so first; UINT64_MAX: never. */
-static inline uint64_t told_us(const char *text)
-{
+static inline uint64_t told_us(const char *text) {
     for (unsigned i = 0; i < world.told_count; i++) {
         if (strstr(world.told[i].line, text) != NULL) {
             return world.told[i].us;
@@ -218,27 +207,23 @@ static inline uint64_t told_us(const char *text)
 }
 
 /* The first stop of the machine is the run's end. */
-static inline void machine_stop(void *context)
-{
+static inline void machine_stop(void *context) {
     world.stopped_us =
         world.stopped_us == 0 ? world.sim.now_us : world.stopped_us;
     world.stop(context);
 }
 
-static inline unsigned machine_restarts(void *context)
-{
+static inline unsigned machine_restarts(void *context) {
     (void)context;
     return 0;
 }
 
-static inline bool machine_ended(void *context)
-{
+static inline bool machine_ended(void *context) {
     (void)context;
     return true;
 }
 
-static inline struct host_machine make_machine(void)
-{
+static inline struct host_machine make_machine(void) {
     struct host_machine machine = host_world_machine(&world.sim);
     machine.missing = NULL;
     machine.told = machine_told;
@@ -256,16 +241,14 @@ static inline struct host_machine make_machine(void)
 
 /* --- runs ----------------------------------------------------------------- */
 
-static inline void prepare(void)
-{
+static inline void prepare(void) {
     memset(&world, 0, sizeof world);
     world.dead_us = DEAD_US;
 }
 
 /* Runs the world as it was prepared; the error's code. */
 static inline int run(const struct host_strategy *strategy,
-                      struct host_digest *digest, struct host_error *error)
-{
+                      struct host_digest *digest, struct host_error *error) {
     struct host_run_options options;
     struct host_tetrahedra tets = {0};
     host_run_defaults(&options);
@@ -293,8 +276,7 @@ static inline int run(const struct host_strategy *strategy,
     return status;
 }
 
-static inline void survives(const struct host_strategy *strategy)
-{
+static inline void survives(const struct host_strategy *strategy) {
     struct host_digest digest;
     struct host_error error;
     start_world();
@@ -307,8 +289,7 @@ static inline void survives(const struct host_strategy *strategy)
 }
 
 /* Points, what they come to, and how long that takes undisturbed. */
-static inline void begin_runs(uint64_t count)
-{
+static inline void begin_runs(uint64_t count) {
     struct host_error error = {0};
     assert_int_equal(host_gen("uniform", count, 5, &points, &error), 0);
     prepare();
@@ -323,15 +304,13 @@ static inline void begin_runs(uint64_t count)
     assert_int_equal(result.generations, 1);
 }
 
-static inline int end_runs(void **unused)
-{
+static inline int end_runs(void **unused) {
     (void)unused;
     host_points_free(&points);
     return 0;
 }
 
-static inline void fails_with(const char *text)
-{
+static inline void fails_with(const char *text) {
     struct host_digest digest;
     struct host_error error;
     if (run(&host_spatial, &digest, &error) != HOST_CUBE) {
@@ -343,8 +322,7 @@ static inline void fails_with(const char *text)
     assert_non_null(strchr(error.text, ';'));
 }
 
-static inline void survives_as(const struct host_strategy *strategy)
-{
+static inline void survives_as(const struct host_strategy *strategy) {
     struct host_digest digest;
     struct host_error error;
     if (run(strategy, &digest, &error) != 0) {

@@ -20,8 +20,7 @@
 #include "host/order/order.h"
 
 /* regions: a power of two. */
-static inline struct host_order small_order(unsigned regions)
-{
+static inline struct host_order small_order(unsigned regions) {
     struct host_order order;
     struct host_points points = {0};
     struct host_error error = {0};

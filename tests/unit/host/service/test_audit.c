@@ -19,8 +19,7 @@ static struct {
 } given;
 static bool loses; /* a node is lost while the check runs */
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     if (loses) {
         struct host_error error = {0};
@@ -29,8 +28,7 @@ static uint64_t now_us(void *context)
     return 0;
 }
 
-static void triangulate(const struct host_points *points)
-{
+static void triangulate(const struct host_points *points) {
     struct host_error error = {0};
     uint32_t *vertex = calloc(points->count, sizeof *vertex);
     assert_non_null(vertex);
@@ -44,8 +42,7 @@ static void triangulate(const struct host_points *points)
     free(vertex);
 }
 
-static int set_up_truth(void **unused)
-{
+static int set_up_truth(void **unused) {
     struct host_points points = {0};
     struct host_error error = {0};
     assert_int_equal(host_gen("uniform", 3000, 1, &points, &error), 0);
@@ -55,14 +52,12 @@ static int set_up_truth(void **unused)
     return 0;
 }
 
-static int tear_down_truth(void **unused)
-{
+static int tear_down_truth(void **unused) {
     host_tetrahedra_free(&truth);
     return tear_down(unused);
 }
 
-static unsigned node_of(uint32_t brick)
-{
+static unsigned node_of(uint32_t brick) {
     unsigned node = 0;
     while (brick >= order.region[node].last) {
         node++;
@@ -70,18 +65,15 @@ static unsigned node_of(uint32_t brick)
     return node;
 }
 
-static uint32_t owner_of(const uint32_t t[4])
-{
+static uint32_t owner_of(const uint32_t t[4]) {
     return host_ledger_owner(&service.ledger, &order, t);
 }
 
-static bool has(const uint32_t t[4], uint32_t v)
-{
+static bool has(const uint32_t t[4], uint32_t v) {
     return t[0] == v || t[1] == v || t[2] == v || t[3] == v;
 }
 
-static bool is_of(unsigned node, const uint32_t t[4])
-{
+static bool is_of(unsigned node, const uint32_t t[4]) {
     bool is = true;
     for (int k = 0; k < 4; k++) {
         is = is && node_of(t[k] / INCODE_BRICK_POINTS) == node;
@@ -90,8 +82,7 @@ static bool is_of(unsigned node, const uint32_t t[4])
 }
 
 /* A tetrahedron inside a node's region, as all that share a vertex with it. */
-static int64_t inside(unsigned node)
-{
+static int64_t inside(unsigned node) {
     for (uint64_t i = 0; i < truth.count; i++) {
         const uint32_t *t = truth.v[i];
         bool is = is_of(node, t);
@@ -110,8 +101,7 @@ static int64_t inside(unsigned node)
 }
 
 /* Another vertex in the place of one: positive, and of the same brick. */
-static void exchange(uint32_t t[4])
-{
+static void exchange(uint32_t t[4]) {
     uint32_t brick = owner_of(t), v = brick * INCODE_BRICK_POINTS;
     for (int k = 0; k < 4; k++) {
         for (uint32_t i = 0; i < order.fill[brick]; i++) {
@@ -132,8 +122,7 @@ static void exchange(uint32_t t[4])
     fail_msg("no vertex to be exchanged");
 }
 
-static void put(unsigned node, int64_t i)
-{
+static void put(unsigned node, int64_t i) {
     struct host_error error = {0};
     uint32_t(*v)[4] = host_tetrahedra_room(&tets, 1, &error);
     assert_non_null(v);
@@ -150,8 +139,7 @@ static void put(unsigned node, int64_t i)
 
 /* What is open of bricks [first, last) is done by that node, as `given` says.
  */
-static void work(unsigned node, uint32_t first, uint32_t last)
-{
+static void work(unsigned node, uint32_t first, uint32_t last) {
     (void)host_ledger_open(&service.ledger, node, first, last);
     service.ledger.alone = (given.alone >> node & 1) != 0;
     for (uint64_t i = 0; i < truth.count; i++) {
@@ -173,8 +161,7 @@ static void work(unsigned node, uint32_t first, uint32_t last)
     }
 }
 
-static void work_all(void)
-{
+static void work_all(void) {
     if (given.only != NOBODY) {
         work(given.only, 0, order.bricks);
         return;
@@ -187,8 +174,7 @@ static void work_all(void)
 }
 
 /* Nothing is wrong yet. */
-static void prepare(void)
-{
+static void prepare(void) {
     begin();
     machine.virtual_time = true;
     machine.now_us = now_us;
@@ -202,15 +188,13 @@ static void prepare(void)
     given.only = NOBODY;
 }
 
-static void finish(void)
-{
+static void finish(void) {
     host_audit_free(&service.audit);
     end();
 }
 
 /* The check fails, and the run goes on. */
-static void fails(void)
-{
+static void fails(void) {
     bool passed;
     struct host_error error = {0};
     assert_int_equal(host_audit_step(&service, &passed, &error), 0);
@@ -225,8 +209,7 @@ static void fails(void)
     }
 }
 
-static void passes(void)
-{
+static void passes(void) {
     bool passed;
     struct host_error error = {0};
     if (host_audit_step(&service, &passed, &error) != 0) {
@@ -236,8 +219,7 @@ static void passes(void)
     assert_int_equal(service.audit.state, HOST_AUDIT_PASSED);
 }
 
-static struct host_error gives_up(const char *text)
-{
+static struct host_error gives_up(const char *text) {
     bool passed;
     struct host_error error = {0};
     assert_int_equal(host_audit_step(&service, &passed, &error),
@@ -251,8 +233,7 @@ static struct host_error gives_up(const char *text)
 }
 
 /* That node, and no other; NOBODY. */
-static void excluded_is(unsigned node)
-{
+static void excluded_is(unsigned node) {
     for (unsigned n = 0; n < NODES; n++) {
         assert_int_equal(service.node[n].aside, n == node);
         assert_int_equal(service.node[n].left, n == node);
@@ -260,23 +241,20 @@ static void excluded_is(unsigned node)
     assert_int_equal(service.excluded, node == NOBODY ? 0 : 1);
 }
 
-static void said_is(const char *text)
-{
+static void said_is(const char *text) {
     if (strstr(said, text) == NULL) {
         fail_msg("%s: not %s", said, text);
     }
     assert_non_null(strstr(said, "; "));
 }
 
-static bool is_open(uint32_t brick)
-{
+static bool is_open(uint32_t brick) {
     return !host_ledger_committed(&service.ledger, brick);
 }
 
 /* Node 1 alone; one tetrahedron that node 3 sent was of node 1's finding, and
  * it has committed a brick of which node 2 has found all. */
-static void test_alone(void **unused)
-{
+static void test_alone(void **unused) {
     (void)unused;
     static const char *const texts[] = {
         "it left out the tetrahedron of rows ",
@@ -309,8 +287,7 @@ static void test_alone(void **unused)
 
 /* Of nodes that worked together none is at fault, and what is near is done
  * again: by nodes alone, until it is right. */
-static void test_together(void **unused)
-{
+static void test_together(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < 3; i++) {
         int64_t *faults[] = {&given.left_out, &given.twice, &given.exchanged};
@@ -341,8 +318,7 @@ static void test_together(void **unused)
 }
 
 /* A node that both found and sent what is wrong is named once. */
-static void test_suspect(void **unused)
-{
+static void test_suspect(void **unused) {
     (void)unused;
     prepare();
     given.exchanged = inside(1);
@@ -353,8 +329,7 @@ static void test_suspect(void **unused)
 }
 
 /* One node that did such points alone left them out; of two, or many, none. */
-static void test_no_tetrahedra(void **unused)
-{
+static void test_no_tetrahedra(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < 3; i++) {
         prepare();
@@ -377,8 +352,7 @@ static void test_no_tetrahedra(void **unused)
 /* A point far away has one tetrahedron, at the base of a pyramid that holds all
  * others, and it is of another node's brick: what is left without it is convex,
  * but that other node is at fault, and not the one whose point it is. */
-static void test_far_point(void **unused)
-{
+static void test_far_point(void **unused) {
     (void)unused;
     static const double pyramid[5][3] = {
         {0, 0, 0}, {1, 1, 0}, {1, -0.5, 0.75}, {1, -0.5, -0.75}, {100, 0, 0}};
@@ -417,8 +391,7 @@ static void test_far_point(void **unused)
 }
 
 /* A tetrahedron of that node's region is wrong. */
-static void spoil(unsigned node)
-{
+static void spoil(unsigned node) {
     uint64_t i = 0;
     while (i < tets.count && !is_of(node, tets.v[i])) {
         i++;
@@ -428,8 +401,7 @@ static void spoil(unsigned node)
 }
 
 /* What is near, then all that nodes did together, then everything. */
-static void test_unclear(void **unused)
-{
+static void test_unclear(void **unused) {
     (void)unused;
     bool again[64] = {false};
     prepare();
@@ -466,8 +438,7 @@ static void test_unclear(void **unused)
 }
 
 /* As long as there are two, a brick goes to the other node. */
-static void test_redo(void **unused)
-{
+static void test_redo(void **unused) {
     (void)unused;
     struct incode_job job;
     prepare();
@@ -497,8 +468,7 @@ static void test_redo(void **unused)
     finish();
 }
 
-static void test_no_other(void **unused)
-{
+static void test_no_other(void **unused) {
     (void)unused;
     prepare();
     assert_true(host_audit_is_other(&service, 1));
@@ -518,8 +488,7 @@ static void test_no_other(void **unused)
 }
 
 /* A run gives up after a bounded number of checks, and reports one offence. */
-static void test_no_end(void **unused)
-{
+static void test_no_end(void **unused) {
     (void)unused;
     prepare();
     work_all();
@@ -541,8 +510,7 @@ static void test_no_end(void **unused)
     finish();
 }
 
-static void is_exact(enum host_verifying verifying, bool foreign, bool exact)
-{
+static void is_exact(enum host_verifying verifying, bool foreign, bool exact) {
     prepare();
     service.verifying = verifying;
     service.foreign = foreign;
@@ -553,8 +521,7 @@ static void is_exact(enum host_verifying verifying, bool foreign, bool exact)
     finish();
 }
 
-static void lost_is_exact(enum host_verifying verifying, bool during)
-{
+static void lost_is_exact(enum host_verifying verifying, bool during) {
     bool passed, exact = verifying != HOST_VERIFY_NEVER;
     struct host_error error = {0};
     prepare();
@@ -574,8 +541,7 @@ static void lost_is_exact(enum host_verifying verifying, bool during)
     finish();
 }
 
-static void test_exact(void **unused)
-{
+static void test_exact(void **unused) {
     (void)unused;
     is_exact(HOST_VERIFY_WHERE_DUE, false, false);
     is_exact(HOST_VERIFY_WHERE_DUE, true, true);
@@ -587,8 +553,7 @@ static void test_exact(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_alone),     cmocka_unit_test(test_together),
         cmocka_unit_test(test_suspect),   cmocka_unit_test(test_no_tetrahedra),

@@ -32,21 +32,18 @@ static bool lost[NODES];
 static uint64_t now_us, told_us; /* when a node was doubted first; 0: none */
 static char told[400];
 
-static int send_nothing(void *context, const uint8_t *bytes, size_t size)
-{
+static int send_nothing(void *context, const uint8_t *bytes, size_t size) {
     (void)context, (void)bytes;
     return (int)size;
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): a pipe's signature */
-static int receive_nothing(void *context, uint8_t *bytes, size_t size)
-{
+static int receive_nothing(void *context, uint8_t *bytes, size_t size) {
     (void)context, (void)bytes, (void)size;
     return 0;
 }
 
-static void hear(void *context, const char *line)
-{
+static void hear(void *context, const char *line) {
     (void)context;
     if (told_us == 0) {
         told_us = now_us;
@@ -54,8 +51,7 @@ static void hear(void *context, const char *line)
     }
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     struct host_error error = {0};
     (void)unused;
     memset(&service, 0, sizeof service);
@@ -83,16 +79,14 @@ static int set_up(void **unused)
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     free(service.cube_memory);
     return 0;
 }
 
 /* Until then; node i answers whenever it has been silent for after_us[i]. */
-static void pass(uint64_t until_us, const uint64_t after_us[NODES])
-{
+static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
     for (; now_us < until_us; now_us += STEP_US) {
         for (unsigned i = 0; i < NODES; i++) {
             if (node[i].silent_us >= after_us[i]) {
@@ -113,8 +107,7 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES])
 }
 
 /* More nodes than processors: all are slow, and one is for once slower. */
-static void a_busy_machine_is_no_reason(void **unused)
-{
+static void a_busy_machine_is_no_reason(void **unused) {
     uint64_t slow[NODES];
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
@@ -135,8 +128,7 @@ static void a_busy_machine_is_no_reason(void **unused)
 
 /* One that answers no more is found among quick ones in no time, and among slow
  * ones when it is silent for longer than they are. */
-static void one_that_stands_still_is_named(void **unused)
-{
+static void one_that_stands_still_is_named(void **unused) {
     for (unsigned i = 1; i < NODES; i++) {
         for (unsigned busy = 0; busy < 2; busy++) {
             uint64_t after_us[NODES];
@@ -160,8 +152,7 @@ static void one_that_stands_still_is_named(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_busy_machine_is_no_reason, set_up,
                                         tear_down),

@@ -29,14 +29,12 @@ static struct {
     uint32_t heard;   /* the host's */
 } node;
 
-static uint64_t now_us(void *context)
-{
+static uint64_t now_us(void *context) {
     (void)context;
     return node.now_us;
 }
 
-static void tell(void)
-{
+static void tell(void) {
     static uint8_t bytes[WIRING_BYTES_MAX];
     struct cube_wiring theirs = {.host_epoch = 77};
     theirs.generation = node.beyond != 0 ? node.heard + node.beyond : node.told;
@@ -47,8 +45,7 @@ static void tell(void)
     }
 }
 
-static void idle(void *context, uint64_t wait_us)
-{
+static void idle(void *context, uint64_t wait_us) {
     struct link_message datagram;
     struct cube_wiring wiring;
     bool ask;
@@ -65,28 +62,24 @@ static void idle(void *context, uint64_t wait_us)
     }
 }
 
-static int check(void *context, struct host_error *error)
-{
+static int check(void *context, struct host_error *error) {
     (void)context;
     return node.now_us < SECONDS * 1000000u
                ? 0
                : host_fail(error, HOST_BROKEN, "nothing ends it");
 }
 
-static void stop(void *context)
-{
+static void stop(void *context) {
     (void)context;
 }
 
-static bool ended(void *context)
-{
+static bool ended(void *context) {
     (void)context;
     return true;
 }
 
 /* How a host fares that waits for the node to answer. */
-static struct host_error meet(void)
-{
+static struct host_error meet(void) {
     static const struct host_sim_cube_options wires = {
         .wire = {.latency_us = 50, .room = 1 << 16, .bytes = 1 << 17}};
     struct host_error error = {0};
@@ -120,15 +113,13 @@ static struct host_error meet(void)
     return error;
 }
 
-static void begin(void)
-{
+static void begin(void) {
     memset(&node, 0, sizeof node);
 }
 
 /* It is answered once, and takes the answer: what the host waits for then is
  * the node's answer to its ping. */
-static void one_is_answered(void **unused)
-{
+static void one_is_answered(void **unused) {
     static const uint32_t told[] = {1, 2, 0x7fffffff, 0xfffffffe, 0xffffffff};
     (void)unused;
     for (unsigned i = 0; i < sizeof told / sizeof told[0]; i++) {
@@ -141,8 +132,7 @@ static void one_is_answered(void **unused)
     }
 }
 
-static void ends_soon(void)
-{
+static void ends_soon(void) {
     struct host_error error = meet();
     assert_int_equal(error.code, HOST_CUBE);
     assert_non_null(strstr(error.text, "node 0 link 0: "));
@@ -152,8 +142,7 @@ static void ends_soon(void)
     assert_true(node.now_us < 2000000);
 }
 
-static void one_that_comes_again_ends_the_run(void **unused)
-{
+static void one_that_comes_again_ends_the_run(void **unused) {
     static const uint32_t beyond[] = {1, 0x7fff, 0x8000, 0x70000000};
     (void)unused;
     for (unsigned i = 0; i < sizeof beyond / sizeof beyond[0]; i++) {
@@ -165,8 +154,7 @@ static void one_that_comes_again_ends_the_run(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_is_answered),
         cmocka_unit_test(one_that_comes_again_ends_the_run),

@@ -5,16 +5,14 @@
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
     return (uint32_t)(state >> 32) % below;
 }
 
-static void test_any_bytes(void **unused)
-{
+static void test_any_bytes(void **unused) {
     (void)unused;
     for (uint32_t round = 0; round < 2000; round++) {
         begin();
@@ -48,8 +46,7 @@ static void test_any_bytes(void **unused)
     }
 }
 
-static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
-{
+static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick) {
     struct node_result_writer writer;
     const uint32_t apexes[1][3] = {{1, 2, 3}};
     struct node_result_header header = {epoch, 0};
@@ -61,8 +58,7 @@ static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick)
 }
 
 /* Results of a job that is no more are counted as read, and dropped. */
-static void test_epochs(void **unused)
-{
+static void test_epochs(void **unused) {
     (void)unused;
     uint8_t data[128];
     struct host_error error = {0};
@@ -87,8 +83,7 @@ static void test_epochs(void **unused)
 }
 
 /* What comes after a message that was lost does not count, and is a loss. */
-static void test_gaps(void **unused)
-{
+static void test_gaps(void **unused) {
     (void)unused;
     static struct node_finished_message finished;
     uint8_t data[128];
@@ -113,8 +108,7 @@ static void test_gaps(void **unused)
 }
 
 static void answer(uint32_t start, uint32_t pinged, uint32_t received,
-                   uint32_t sent)
-{
+                   uint32_t sent) {
     struct node_pong_message pong = {
         .start = start, .pinged = pinged, .received = received, .sent = sent};
     struct host_error error = {0};
@@ -123,8 +117,7 @@ static void answer(uint32_t start, uint32_t pinged, uint32_t received,
 
 /* Messages that are missing, either way, and another start are losses; pings
  * that got lost before the first answer are none. */
-static void test_answers(void **unused)
-{
+static void test_answers(void **unused) {
     (void)unused;
     static const struct {
         uint32_t start, pinged, received, sent;
@@ -145,8 +138,7 @@ static void test_answers(void **unused)
 
 /* Statistics replace those of the same start, and add to those of others; of
  * what no statistics tell, the tetrahedra that came are counted. */
-static void test_starts(void **unused)
-{
+static void test_starts(void **unused) {
     (void)unused;
     static struct node_finished_message told;
     const struct incode_statistics *sum;
@@ -180,8 +172,7 @@ static void test_starts(void **unused)
     end();
 }
 
-static void test_fault(void **unused)
-{
+static void test_fault(void **unused) {
     (void)unused;
     struct host_error error = {0};
     begin();
@@ -192,8 +183,7 @@ static void test_fault(void **unused)
 }
 
 static int pong_of(unsigned i, uint32_t pinged, uint32_t start,
-                   struct host_error *error)
-{
+                   struct host_error *error) {
     struct node_pong_message pong = {.start = start,
                                      .pinged = pinged,
                                      .received = pinged,
@@ -205,8 +195,7 @@ static int pong_of(unsigned i, uint32_t pinged, uint32_t start,
  * a ping that was sent after it; a node that has started again is the loss.
  * What counts ends what nodes do together, then the node's part, then the
  * run. */
-static void test_doubtful_fault(void **unused)
-{
+static void test_doubtful_fault(void **unused) {
     static const char text[] = "page 1 to all, expected the one below 8";
     enum { A_LOSS, TOGETHER, ALONE, LAST, CASES };
     (void)unused;
@@ -252,8 +241,7 @@ static void test_doubtful_fault(void **unused)
 
 /* A list that nodes share may be too small where one that is a node's alone is
  * not: what is left is done by each node alone, and only then the run fails. */
-static void test_shared_list_too_small(void **unused)
-{
+static void test_shared_list_too_small(void **unused) {
     static const char text[] = "the active face list of one brick does not "
                                "fit; give the nodes more memory";
     (void)unused;
@@ -279,8 +267,7 @@ static void test_shared_list_too_small(void **unused)
 }
 
 /* What to do about it is said once, also where the node says it itself. */
-static void test_fault_with_its_cure(void **unused)
-{
+static void test_fault_with_its_cure(void **unused) {
     static const char *const texts[] = {
         "the list is too small; give the nodes more memory",
         "no memory for the list"};
@@ -305,8 +292,7 @@ static unsigned taken;
 
 /* Of a strategy that knows two types of message. */
 static int take_own(struct host_work *work, const struct cube_message *message,
-                    struct host_error *error)
-{
+                    struct host_error *error) {
     (void)work;
     if (message->type == NODE_UNSOUND) {
         return host_fail(error, HOST_CUBE, "node %u: tuple 5 of 3; look at it",
@@ -318,8 +304,7 @@ static int take_own(struct host_work *work, const struct cube_message *message,
 
 /* A strategy has the messages of its roles, none of which follows a gap or is
  * of a job that is no more; what it says of a wrong one is kept. */
-static void test_strategy(void **unused)
-{
+static void test_strategy(void **unused) {
     (void)unused;
     struct host_strategy strategy = host_spatial;
     strategy.take = take_own;
@@ -359,8 +344,7 @@ static void test_strategy(void **unused)
 
 /* Pages that one node leaves to the host go to another, behind those that this
  * one has asked for itself. */
-static void test_passed(void **unused)
-{
+static void test_passed(void **unused) {
     (void)unused;
     const uint32_t own = 1, passed[3] = {2, 0, 3};
     struct host_error error = {0};
@@ -379,8 +363,7 @@ static void test_passed(void **unused)
 
 /* A wrong page of another node's puts an end to pages between nodes, and names
  * both, as either may be at fault; one of the host's is refused. */
-static void test_wrong_pages(void **unused)
-{
+static void test_wrong_pages(void **unused) {
     (void)unused;
     static const struct {
         struct node_wrong_page_message wrong;
@@ -423,8 +406,7 @@ static void test_wrong_pages(void **unused)
 }
 
 /* What no node of this version sends is told in figures. */
-static void test_texts(void **unused)
-{
+static void test_texts(void **unused) {
     (void)unused;
     static struct node_ready_message ready = {.protocol = NODE_PROTOCOL - 1};
     static uint32_t many[HOST_PAGES_QUEUED_MAX + 1];
@@ -488,8 +470,7 @@ static void test_texts(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_any_bytes),
         cmocka_unit_test(test_epochs),

@@ -12,8 +12,7 @@
 
 #include "host/service/ledger.h"
 
-static void test_commits(void **unused)
-{
+static void test_commits(void **unused) {
     (void)unused;
     struct host_ledger ledger;
     struct host_error error = {0};
@@ -52,8 +51,7 @@ static struct host_region regions[4] = {{.first = 0, .last = 3},
                                         {.first = 3, .last = 8},
                                         {.first = 8, .last = 8}};
 
-static struct host_order make_order(void)
-{
+static struct host_order make_order(void) {
     struct host_order order = {0};
     for (uint32_t v = 0; v < 512; v++) {
         bricks[v / 64].x[v % 64] = v;
@@ -69,8 +67,7 @@ static struct host_order make_order(void)
 
 /* A tetrahedron for each of the vertices [0, 509), its vertices in any order
  * but the lowest that one. */
-static void fill(struct host_tetrahedra *tets)
-{
+static void fill(struct host_tetrahedra *tets) {
     struct host_error error = {0};
     for (uint32_t v = 0; v + 3 < 512; v++) {
         uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, &error);
@@ -82,8 +79,7 @@ static void fill(struct host_tetrahedra *tets)
     }
 }
 
-static void test_abandon(void **unused)
-{
+static void test_abandon(void **unused) {
     (void)unused;
     struct host_order order = make_order();
     struct host_ledger ledger;
@@ -135,8 +131,7 @@ static void test_abandon(void **unused)
 
 /* What is left is given out again, once, in ranges that are in order, within a
  * region, and no larger than they should be. */
-static void test_ranges(void **unused)
-{
+static void test_ranges(void **unused) {
     (void)unused;
     struct host_order order = make_order();
     struct host_tetrahedra none = {0};
@@ -183,8 +178,7 @@ static void test_ranges(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_commits),
         cmocka_unit_test(test_abandon),

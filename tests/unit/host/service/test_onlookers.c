@@ -19,8 +19,7 @@ static struct {
 } onlooker;
 
 static bool ask(void *context, uint64_t now_us,
-                struct host_onlookers_question *question)
-{
+                struct host_onlookers_question *question) {
     (void)context;
     assert_false(onlooker.asked);
     onlooker.asked = true;
@@ -34,8 +33,7 @@ static bool ask(void *context, uint64_t now_us,
 }
 
 static void answer(void *context, unsigned node, const uint8_t *data,
-                   size_t size)
-{
+                   size_t size) {
     (void)context, (void)data;
     assert_true(onlooker.asked);
     assert_true(host_node_set_has(&onlooker.nodes, node));
@@ -46,8 +44,7 @@ static void answer(void *context, unsigned node, const uint8_t *data,
 }
 
 static void answered(void *context, uint64_t now_us,
-                     const struct host_onlookers_progress *progress)
-{
+                     const struct host_onlookers_progress *progress) {
     uint64_t took_us = now_us - onlooker.asked_us;
     (void)context;
     assert_true(onlooker.asked);
@@ -61,8 +58,7 @@ static void answered(void *context, uint64_t now_us,
         took_us > onlooker.longest_us ? took_us : onlooker.longest_us;
 }
 
-static const char *holder(void *context)
-{
+static const char *holder(void *context) {
     (void)context;
     return "incode run a.xyz, process 12 of alice";
 }
@@ -70,23 +66,20 @@ static const char *holder(void *context)
 static const struct host_onlookers onlookers = {NULL, ask, answer, answered,
                                                 holder};
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     begin_runs(16000);
     return 0;
 }
 
-static void look_on(void)
-{
+static void look_on(void) {
     prepare();
     memset(&onlooker, 0, sizeof onlooker);
     host_node_set_all(&onlooker.nodes, NODES);
     world.onlookers = &onlookers;
 }
 
-static void test_each_strategy(void **unused)
-{
+static void test_each_strategy(void **unused) {
     static const struct host_strategy *const strategies[] = {
         &host_sequential, &host_spatial, &host_exchange};
     (void)unused;
@@ -105,8 +98,7 @@ static void test_each_strategy(void **unused)
 
 /* Who starts again has forgotten what it was asked, and is asked again; who is
  * gone is left out. */
-static void test_losses(void **unused)
-{
+static void test_losses(void **unused) {
     (void)unused;
     static const enum what events[] = {RESTART, KILL, CUT};
     for (unsigned k = 0; k < 12; k++) {
@@ -121,8 +113,7 @@ static void test_losses(void **unused)
 }
 
 /* A part of the nodes, and one question alone: the others hear nothing. */
-static void test_some(void **unused)
-{
+static void test_some(void **unused) {
     (void)unused;
     look_on();
     memset(&onlooker.nodes, 0, sizeof onlooker.nodes);
@@ -134,15 +125,13 @@ static void test_some(void **unused)
 
 /* Nobody asks: to the microsecond the same run as where nobody can. */
 static bool asks_not(void *context, uint64_t now_us,
-                     struct host_onlookers_question *question)
-{
+                     struct host_onlookers_question *question) {
     (void)context, (void)now_us, (void)question;
     onlooker.questions++;
     return false;
 }
 
-static void test_nobody(void **unused)
-{
+static void test_nobody(void **unused) {
     static const struct host_onlookers nobody = {NULL, asks_not, answer,
                                                  answered, holder};
     uint64_t took_us[2], before = state;
@@ -159,8 +148,7 @@ static void test_nobody(void **unused)
     assert_true(onlooker.questions <= took_us[1] / EVERY_US + 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_each_strategy),
         cmocka_unit_test(test_losses),

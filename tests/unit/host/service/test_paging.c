@@ -16,8 +16,7 @@ enum { NODES = 2, PAGES = 3226, FRAMES = 1105 };
 static char told[256];
 static unsigned lines;
 
-static void on_line(void *context, const char *line)
-{
+static void on_line(void *context, const char *line) {
     (void)context;
     snprintf(told, sizeof told, "%s", line);
     lines++;
@@ -29,8 +28,7 @@ static struct host_order order;
 static struct host_tetrahedra tets;
 static struct host_node_report reports[NODES];
 
-static void begin(uint64_t memory, uint64_t tetrahedra)
-{
+static void begin(uint64_t memory, uint64_t tetrahedra) {
     memset(&service, 0, sizeof service);
     memset(reports, 0, sizeof reports);
     order.tree.pages = PAGES;
@@ -45,15 +43,13 @@ static void begin(uint64_t memory, uint64_t tetrahedra)
     lines = 0;
 }
 
-static void send(uint64_t pages)
-{
+static void send(uint64_t pages) {
     while (pages-- > 0) {
         host_paging_sent(&service);
     }
 }
 
-static void test_told_once(void **unused)
-{
+static void test_told_once(void **unused) {
     (void)unused;
     begin(4 << 20, 1000);
     send(NODES * PAGES + HOST_PAGING_AGAIN_MIN - 1);
@@ -67,8 +63,7 @@ static void test_told_once(void **unused)
               "--memory 16M would hold all of them");
 }
 
-static void test_not_told(void **unused)
-{
+static void test_not_told(void **unused) {
     (void)unused;
     begin(4 << 20, 1200000); /* more came of it than it cost */
     send(NODES * PAGES + 199999);
@@ -86,8 +81,7 @@ static void test_not_told(void **unused)
 }
 
 /* What nodes have from each other shows at the end. */
-static void test_other_nodes(void **unused)
-{
+static void test_other_nodes(void **unused) {
     (void)unused;
     begin(4 << 20, 1000);
     reports[0].statistics.statistics.page_requests = 1000000;
@@ -95,8 +89,7 @@ static void test_other_nodes(void **unused)
     assert_int_equal(lines, 1);
 }
 
-static void test_cube(void **unused)
-{
+static void test_cube(void **unused) {
     (void)unused;
     begin(4 << 20, 1000);
     service.memory_of = "boxes.cube";
@@ -109,8 +102,7 @@ static void test_cube(void **unused)
               "again; nodes with 16M would hold all of them");
 }
 
-static void test_advice(void **unused)
-{
+static void test_advice(void **unused) {
     (void)unused;
     assert_int_equal(host_paging_memory(4 << 20, 1105, 1106), 8 << 20);
     assert_int_equal(host_paging_memory(4 << 20, 1105, 4420), 16 << 20);
@@ -127,8 +119,7 @@ static void test_advice(void **unused)
     assert_non_null(strstr(told, "; --memory 1G would hold more of them"));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_told_once),   cmocka_unit_test(test_not_told),
         cmocka_unit_test(test_other_nodes), cmocka_unit_test(test_cube),

@@ -6,15 +6,13 @@ enum { SECOND = 1000000, SLACK_US = 600000 };
 
 static const uint64_t patiences[] = {1, 2, 8, 10, 60};
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     begin_runs(4000);
     return 0;
 }
 
-static void show_told(void)
-{
+static void show_told(void) {
     for (unsigned i = 0; i < world.told_count; i++) {
         print_message("%8.3f %s\n", 1e-6 * (double)world.told[i].us,
                       world.told[i].line);
@@ -22,8 +20,7 @@ static void show_told(void)
 }
 
 /* The user was told so within SLACK_US after `us`. */
-static void told_at(const char *text, uint64_t us)
-{
+static void told_at(const char *text, uint64_t us) {
     uint64_t at = told_us(text);
     if (at < us || at > us + SLACK_US) {
         show_told();
@@ -34,8 +31,7 @@ static void told_at(const char *text, uint64_t us)
 
 /* A node that answers and never works: its work is done by others, as soon as
  * the patience is over. */
-static void test_idle(void **unused)
-{
+static void test_idle(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned i = 0; i < NODES; i += 5) {
@@ -58,8 +54,7 @@ static void test_idle(void **unused)
 
 /* A node that keeps pages and sends none holds up the one that waits for them,
  * who is not the idle one. */
-static void test_idle_holder(void **unused)
-{
+static void test_idle_holder(void **unused) {
     (void)unused;
     prepare();
     world.events[0] = (struct event){IDLE, 0.0, 3, 0};
@@ -71,8 +66,7 @@ static void test_idle_holder(void **unused)
 /* Whatever a strategy has it do, the node that never works is the one that is
  * named, and no other: not who waits for it, nor who waits for that one. */
 static void idles_in(const struct host_strategy *strategy, unsigned node,
-                     unsigned builders)
-{
+                     unsigned builders) {
     char name[16];
     prepare();
     world.patience_s = 2;
@@ -90,8 +84,7 @@ static void idles_in(const struct host_strategy *strategy, unsigned node,
     }
 }
 
-static void test_idle_in_each_strategy(void **unused)
-{
+static void test_idle_in_each_strategy(void **unused) {
     static const struct host_sharing usual;
     const struct host_strategy *row;
     (void)unused;
@@ -114,8 +107,7 @@ static void test_idle_in_each_strategy(void **unused)
 /* --- nodes that do not answer ----------------------------------------------
  */
 
-static void cut_off(unsigned node)
-{
+static void cut_off(unsigned node) {
     for (unsigned d = 0; d < DIMENSION; d++) {
         world.events[d] = (struct event){CUT, 0.4, node, d};
     }
@@ -124,8 +116,7 @@ static void cut_off(unsigned node)
 /* One that is killed, stopped or cut off is named within two seconds, and
  * given up when the patience is over, neither before nor later: whatever its
  * links are found to be meanwhile. */
-static void test_silent(void **unused)
-{
+static void test_silent(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned how = 0; how < 3; how++) {
@@ -156,8 +147,7 @@ static void test_silent(void **unused)
 }
 
 /* One that comes back in time is told of as well, and nothing is lost. */
-static void test_back(void **unused)
-{
+static void test_back(void **unused) {
     (void)unused;
     prepare();
     world.dead_us = 0;
@@ -185,8 +175,7 @@ static void test_back(void **unused)
 }
 
 /* The same of node 0: without it the cube cannot go on. */
-static void test_silent_gateway(void **unused)
-{
+static void test_silent_gateway(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         prepare();
@@ -203,8 +192,7 @@ static void test_silent_gateway(void **unused)
 /* --- nodes that never come -------------------------------------------------
  */
 
-static void test_never_started(void **unused)
-{
+static void test_never_started(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned i = 0; i < NODES; i += 3) {
@@ -230,15 +218,13 @@ static void test_never_started(void **unused)
     }
 }
 
-static uint64_t starving_us(void *unused, unsigned node)
-{
+static uint64_t starving_us(void *unused, unsigned node) {
     (void)unused;
     (void)node;
     return world.sim.now_us - world.sim.now_us / 20;
 }
 
-static uint64_t well_fed_us(void *unused, unsigned node)
-{
+static uint64_t well_fed_us(void *unused, unsigned node) {
     (void)unused;
     (void)node;
     return 0;
@@ -247,8 +233,7 @@ static uint64_t well_fed_us(void *unused, unsigned node)
 /* Of nodes that this machine has started: on a busy one they may take a minute,
  * where the processors were what they waited for; a program that says nothing
  * is found after nine seconds. */
-static void test_started_here(void **unused)
-{
+static void test_started_here(void **unused) {
     (void)unused;
     prepare();
     world.starved_us = starving_us;
@@ -266,8 +251,7 @@ static void test_started_here(void **unused)
 }
 
 /* Those who come late are told of, and who is still to come. */
-static void test_late(void **unused)
-{
+static void test_late(void **unused) {
     (void)unused;
     prepare();
     world.absent_s = 3;
@@ -287,8 +271,7 @@ static void test_late(void **unused)
 
 /* Where nobody works, the run ends; of the last one nobody says that others do
  * its work. */
-static void test_all_idle(void **unused)
-{
+static void test_all_idle(void **unused) {
     (void)unused;
     prepare();
     for (unsigned i = 0; i < NODES; i++) {
@@ -306,8 +289,7 @@ static void test_all_idle(void **unused)
     assert_int_equal(nobody, 1);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_idle),
         cmocka_unit_test(test_idle_holder),

@@ -5,8 +5,7 @@
 /* What cannot be is refused before it is used: the node is named, and has no
  * part in the run any more; where it was ended and started again, it gets no
  * second start. */
-static bool ends_node(void *context, unsigned node)
-{
+static bool ends_node(void *context, unsigned node) {
     (void)context;
     assert_int_equal(node, 1);
     return true;
@@ -15,8 +14,7 @@ static bool ends_node(void *context, unsigned node)
 /* 0: no one ends it; 1: it is ended and started again; 2: it had that, and is
  * excluded; 3: and no other node is left. */
 static void refuses_message(uint8_t type, const void *data, size_t size,
-                            const char *text)
-{
+                            const char *text) {
     for (int anew = 0; anew < 4; anew++) {
         struct host_error error = {0};
         begin();
@@ -47,15 +45,13 @@ static void refuses_message(uint8_t type, const void *data, size_t size,
     }
 }
 
-static void refuses(const uint32_t v[4], uint32_t brick, const char *text)
-{
+static void refuses(const uint32_t v[4], uint32_t brick, const char *text) {
     uint8_t data[128];
     size_t size = batch_of(data, v, brick);
     refuses_message(NODE_RESULT, data, size, text);
 }
 
-static void test_refused_results(void **unused)
-{
+static void test_refused_results(void **unused) {
     (void)unused;
     uint32_t first = order.region[1].first, v = first * INCODE_BRICK_POINTS;
     uint32_t loose = first, last = order.bricks - 1;
@@ -82,8 +78,7 @@ static void test_refused_results(void **unused)
 }
 
 /* A node that has not committed all its bricks is not done. */
-static void test_unfinished(void **unused)
-{
+static void test_unfinished(void **unused) {
     (void)unused;
     static struct node_finished_message finished;
     struct host_error error = {0};
@@ -99,8 +94,7 @@ static void test_unfinished(void **unused)
 }
 
 /* Spilled faces are of points, and marks of points of the job. */
-static void test_spilled(void **unused)
-{
+static void test_spilled(void **unused) {
     (void)unused;
     struct {
         struct node_spill_header header;
@@ -152,8 +146,7 @@ static void test_spilled(void **unused)
 /* A node that repeats a tetrahedron, or spills a face, without end makes the
  * host keep no more than a bound that its points give. */
 static void floods(uint8_t type, const void *data, size_t size,
-                   const char *text)
-{
+                   const char *text) {
     struct host_error error = {0};
     uint64_t bricks = order.region[1].last - order.region[1].first;
     unsigned sent = 0;
@@ -172,8 +165,7 @@ static void floods(uint8_t type, const void *data, size_t size,
     end();
 }
 
-static void test_floods(void **unused)
-{
+static void test_floods(void **unused) {
     (void)unused;
     uint32_t v = order.region[1].first * INCODE_BRICK_POINTS;
     const uint32_t row[4] = {v, v + 1, v + 2, v + 3};
@@ -195,8 +187,7 @@ static void test_floods(void **unused)
            "more spilled faces than its points allow");
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_refused_results),
         cmocka_unit_test(test_unfinished),

@@ -17,8 +17,7 @@ enum { NODE = 1, NODES = 2, WINDOW = 16, NODE_OWN = 100 };
 
 static unsigned sent; /* by the strategy */
 
-static bool send_always(struct host_work *work, unsigned node)
-{
+static bool send_always(struct host_work *work, unsigned node) {
     bool went = work->write(work->context, node, NODE_OWN, NULL, 0);
     sent += went;
     return went;
@@ -33,8 +32,7 @@ static bool lost[NODES];
 static struct sim_end nowhere; /* the wire: nobody is at its end */
 static void *arena;
 
-static void begin(const struct host_strategy *strategy)
-{
+static void begin(const struct host_strategy *strategy) {
     struct cube_config config = {
         .self = CUBE_HOST, .dimension = 1, .window = WINDOW, .epoch = 1};
     memset(&service, 0, sizeof service);
@@ -60,16 +58,14 @@ static void begin(const struct host_strategy *strategy)
     service.work.context = &service;
 }
 
-static void end(void)
-{
+static void end(void) {
     free(arena);
     arena = NULL;
 }
 
 /* A strategy that always has something to send has every other message, until
  * what the node has asked for is sent. */
-static void test_turns(void **unused)
-{
+static void test_turns(void **unused) {
     (void)unused;
     struct host_strategy strategy = *host_strategy_named("spatial");
     struct host_error error = {0};
@@ -94,8 +90,7 @@ static void test_turns(void **unused)
 }
 
 /* What a node has to know first comes first. */
-static void test_order(void **unused)
-{
+static void test_order(void **unused) {
     (void)unused;
     struct host_strategy strategy = *host_strategy_named("spatial");
     struct host_error error = {0};
@@ -113,22 +108,19 @@ static void test_order(void **unused)
     end();
 }
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     order = small_order(NODES);
     return 0;
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_order_free(&order);
     return 0;
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_turns),
         cmocka_unit_test(test_order),

@@ -3,16 +3,14 @@
  * cannot go on, the host says which node and link it is. */
 #include "service_world.h"
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     begin_runs(8000);
     return 0;
 }
 
 static void survives_restart(unsigned node, double when,
-                             const struct host_strategy *strategy)
-{
+                             const struct host_strategy *strategy) {
     prepare();
     world.events[0] = (struct event){RESTART, when, node, 0};
     survives(strategy);
@@ -20,8 +18,7 @@ static void survives_restart(unsigned node, double when,
 
 /* Boards that reset themselves: each in turn, while all are at work, and at any
  * time. */
-static void test_restarts(void **unused)
-{
+static void test_restarts(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         survives_restart(i, 0.05 * (i + 1), &host_spatial);
@@ -37,8 +34,7 @@ static void test_restarts(void **unused)
 }
 
 /* While the pages go to all, those behind the gap must blame nobody. */
-static void test_restarts_at_first(void **unused)
-{
+static void test_restarts_at_first(void **unused) {
     (void)unused;
     for (unsigned when = 1; when <= 15; when++) {
         for (unsigned node = 0; node < 4; node++) {
@@ -48,8 +44,7 @@ static void test_restarts_at_first(void **unused)
 }
 
 /* Any mixture of them; SERVICE_ROUNDS for more than a few. */
-static void test_mixtures(void **unused)
-{
+static void test_mixtures(void **unused) {
     (void)unused;
     const char *wanted = getenv("SERVICE_ROUNDS");
     for (long rounds = wanted == NULL ? 8 : atol(wanted); rounds > 0;
@@ -73,8 +68,7 @@ static void test_mixtures(void **unused)
 }
 
 /* A node that is only stopped is waited for. */
-static void test_stopped(void **unused)
-{
+static void test_stopped(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
@@ -87,8 +81,7 @@ static void test_stopped(void **unused)
 }
 
 /* One that never comes back is done without. */
-static void test_gone(void **unused)
-{
+static void test_gone(void **unused) {
     (void)unused;
     for (unsigned i = 1; i < NODES; i++) {
         prepare();
@@ -106,8 +99,7 @@ static void test_gone(void **unused)
 }
 
 /* Node 0 is done without where another has a wire to the host. */
-static void test_gateway(void **unused)
-{
+static void test_gateway(void **unused) {
     (void)unused;
     prepare();
     world.events[0] = (struct event){STOP, 0.4, 0, 0};
@@ -123,8 +115,7 @@ static void test_gateway(void **unused)
 }
 
 /* A board that resets itself whenever it has work does not go on for ever. */
-static void test_for_ever(void **unused)
-{
+static void test_for_ever(void **unused) {
     struct host_digest digest;
     struct host_error error;
     (void)unused;
@@ -138,8 +129,7 @@ static void test_for_ever(void **unused)
 }
 
 /* Nodes that were left in the midst of a run serve the next host. */
-static void test_next_host(void **unused)
-{
+static void test_next_host(void **unused) {
     (void)unused;
     for (unsigned k = 1; k < 7; k++) {
         struct host_digest digest;
@@ -162,8 +152,7 @@ static void test_next_host(void **unused)
 }
 
 /* Links that go dead are gone round. */
-static void test_cut(void **unused)
-{
+static void test_cut(void **unused) {
     unsigned lost = 0;
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
@@ -177,8 +166,7 @@ static void test_cut(void **unused)
 
 /* Wires that were never there are gone round as well, once all else is; one
  * that is on no node's way from or to node 0 is named all the same. */
-static void test_missing_wire(void **unused)
-{
+static void test_missing_wire(void **unused) {
     unsigned missed = 0;
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
@@ -216,8 +204,7 @@ static void test_missing_wire(void **unused)
 
 /* A node that comes late moves the search on, and not into the end of the
  * patience with nodes. */
-static void test_missing_wire_and_late_node(void **unused)
-{
+static void test_missing_wire_and_late_node(void **unused) {
     (void)unused;
     prepare();
     world.absent_s = 3;
@@ -231,8 +218,7 @@ static void test_missing_wire_and_late_node(void **unused)
 }
 
 /* The host's own wire to node 0, where it has another. */
-static void test_missing_host_port(void **unused)
-{
+static void test_missing_host_port(void **unused) {
     (void)unused;
     prepare();
     world.absent_s = 3;
@@ -254,8 +240,7 @@ static void test_missing_host_port(void **unused)
 
 /* A wire that nothing needs and that comes up late is no missing one, and what
  * a node sleeps is not its wire's time. */
-static void test_late_wire(void **unused)
-{
+static void test_late_wire(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < 2; k++) {
         uint64_t late_us = k == 0 ? 2500000 : 7000000;
@@ -275,8 +260,7 @@ static void test_late_wire(void **unused)
 }
 
 /* A node that is late is waited for, and all of its wires are used. */
-static void test_late_node(void **unused)
-{
+static void test_late_node(void **unused) {
     (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
@@ -296,8 +280,7 @@ static void test_late_node(void **unused)
 }
 
 static void swap(unsigned node, unsigned link, unsigned other,
-                 unsigned other_link)
-{
+                 unsigned other_link) {
     struct link_pipe *one = &world.sim.node[node].board.pipes[link];
     struct link_pipe *two = &world.sim.node[other].board.pipes[other_link];
     struct link_pipe pipe = *one;
@@ -306,8 +289,7 @@ static void swap(unsigned node, unsigned link, unsigned other,
 }
 
 /* A wire in the wrong place is named before anything is given out. */
-static void test_wrong_wire(void **unused)
-{
+static void test_wrong_wire(void **unused) {
     (void)unused;
     prepare();
     start_world();
@@ -321,8 +303,7 @@ static void test_wrong_wire(void **unused)
 
 /* However the ends of nodes and host fall together, nobody waits for a farewell
  * in vain: half a second at a node, two at the host. */
-static void test_ends_at_once(void **unused)
-{
+static void test_ends_at_once(void **unused) {
     (void)unused;
     for (unsigned k = 0; k < 100; k++) {
         struct host_run_options options;
@@ -350,8 +331,7 @@ static void test_ends_at_once(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_restarts),
         cmocka_unit_test(test_restarts_at_first),

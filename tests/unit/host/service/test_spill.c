@@ -20,8 +20,7 @@ struct model {
 
 static uint64_t state = 88172645463325252u;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
@@ -29,8 +28,7 @@ static uint32_t draw(uint32_t below)
 }
 
 static void put_some(struct host_spill *spill, struct model *model,
-                     struct host_error *error)
-{
+                     struct host_error *error) {
     struct incode_face faces[128];
     uint32_t node = draw(NODES), count = draw(129), kept = 0;
     for (uint32_t i = 0; i < count; i++) {
@@ -47,8 +45,7 @@ static void put_some(struct host_spill *spill, struct model *model,
 }
 
 static void take_some(struct host_spill *spill, struct model *model,
-                      struct host_error *error)
-{
+                      struct host_error *error) {
     struct incode_face faces[100];
     uint32_t node = draw(NODES), brick = draw(BRICKS), seen = 0, count;
     struct host_spill_list list = host_spill_detach(spill, node, brick);
@@ -65,8 +62,7 @@ static void take_some(struct host_spill *spill, struct model *model,
     model->count[node][brick] = 0;
 }
 
-static void run(uint32_t blocks_memory)
-{
+static void run(uint32_t blocks_memory) {
     static struct model model;
     struct host_spill spill;
     struct host_error error = {0};
@@ -85,22 +81,19 @@ static void run(uint32_t blocks_memory)
     host_spill_free(&spill);
 }
 
-static void test_in_memory(void **unused)
-{
+static void test_in_memory(void **unused) {
     (void)unused;
     run(0);
 }
 
-static void test_in_file(void **unused)
-{
+static void test_in_file(void **unused) {
     (void)unused;
     run(1);
     run(300);
 }
 
 /* A list taken out is apart from what is put afterwards. */
-static void test_detached(void **unused)
-{
+static void test_detached(void **unused) {
     (void)unused;
     struct host_spill spill;
     struct host_error error = {0};
@@ -127,8 +120,7 @@ static void test_detached(void **unused)
 
 /* Marks of a vertex that come many times over are one; they come back before
  * the faces, and the faces of one node can be seen without taking them. */
-static void test_marks(void **unused)
-{
+static void test_marks(void **unused) {
     (void)unused;
     struct host_spill spill;
     struct host_error error = {0};
@@ -164,8 +156,7 @@ static void test_marks(void **unused)
     host_spill_free(&spill);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_in_memory),
         cmocka_unit_test(test_in_file),

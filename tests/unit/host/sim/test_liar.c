@@ -33,8 +33,7 @@ struct cube {
 };
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
-               size_t size)
-{
+               size_t size) {
     assert_int_equal(dest, CUBE_HOST);
     assert_true(size <= CUBE_PAYLOAD_MAX);
     if (cube->room == 0) {
@@ -52,8 +51,7 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
 
 static struct host_liar liar;
 
-static void begin(enum host_lie way, uint32_t one_in)
-{
+static void begin(enum host_lie way, uint32_t one_in) {
     memset(&liar, 0, sizeof liar);
     liar.way = way;
     liar.one_in = one_in;
@@ -61,8 +59,7 @@ static void begin(enum host_lie way, uint32_t one_in)
 }
 
 /* Message k has vertices of its own. */
-static void row_of(uint32_t k, uint32_t i, uint32_t v[4])
-{
+static void row_of(uint32_t k, uint32_t i, uint32_t v[4]) {
     uint32_t base = 64 * k;
     v[0] = base + i / EACH;
     for (uint32_t j = 1; j < 4; j++) {
@@ -71,14 +68,12 @@ static void row_of(uint32_t k, uint32_t i, uint32_t v[4])
 }
 
 /* Every fourth star has been found by another node. */
-static uint16_t finder_of(uint32_t star)
-{
+static uint16_t finder_of(uint32_t star) {
     return star % 4 == 2 ? PEER : SELF;
 }
 
 /* Results with a commit behind each second star; their size. */
-static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4])
-{
+static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4]) {
     const struct node_result_header head = {9, k};
     struct node_result_writer writer;
     memcpy(data, &head, sizeof head);
@@ -105,8 +100,7 @@ struct seen {
 };
 
 static void read_back(const uint8_t *data, size_t size, uint32_t k,
-                      struct seen *seen)
-{
+                      struct seen *seen) {
     struct node_result_reader reader;
     enum node_result_event event;
     size_t count;
@@ -129,8 +123,7 @@ static void read_back(const uint8_t *data, size_t size, uint32_t k,
 }
 
 /* How many rows of message k or the one before are as v. */
-static unsigned times(uint32_t k, const uint32_t v[4])
-{
+static unsigned times(uint32_t k, const uint32_t v[4]) {
     unsigned same = 0;
     for (uint32_t m = k > 0 ? k - 1 : 0; m <= k; m++) {
         for (uint32_t i = 0; i < ROWS; i++) {
@@ -146,8 +139,7 @@ static unsigned times(uint32_t k, const uint32_t v[4])
 
 /* Rows of the true ones that are not there, and rows that are not of them, a
  * lie, for each way. */
-static void results_are_altered(void **unused)
-{
+static void results_are_altered(void **unused) {
     static const struct {
         enum host_lie way;
         int more, strange; /* rows a lie */
@@ -185,8 +177,7 @@ static void results_are_altered(void **unused)
 }
 
 /* An exchanged apex turns half of the tetrahedra over, or may. */
-static void both_orientations_are_told(void **unused)
-{
+static void both_orientations_are_told(void **unused) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     unsigned swapped = 0, kept = 0;
     struct seen seen;
@@ -205,8 +196,7 @@ static void both_orientations_are_told(void **unused)
 }
 
 /* What is full stays as it is, and so does what is no batch. */
-static void what_does_not_fit_is_not_told(void **unused)
-{
+static void what_does_not_fit_is_not_told(void **unused) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK] = {0};
     struct node_result_writer writer;
     uint32_t v = 5;
@@ -234,8 +224,7 @@ static void what_does_not_fit_is_not_told(void **unused)
 /* --- what nodes send each other ------------------------------------------- */
 
 /* Rows of so many vertices, every fourth of four at the hull. */
-static void fill(uint32_t *v, uint32_t rows, uint32_t width)
-{
+static void fill(uint32_t *v, uint32_t rows, uint32_t width) {
     for (uint32_t i = 0; i < rows * width; i++) {
         bool hull = width == 4 && i % 16 == 15;
         v[i] = hull ? INCODE_NONE : 7 * i + 1;
@@ -245,8 +234,7 @@ static void fill(uint32_t *v, uint32_t rows, uint32_t width)
 /* Alters a message whose rows begin at word `at`: how many rows differ; what is
  * before the rows, and of each row its first `same` vertices, does not. */
 static unsigned differ(uint8_t type, const void *data, size_t size, size_t at,
-                       uint32_t width, uint32_t same)
-{
+                       uint32_t width, uint32_t same) {
     uint32_t before[CUBE_PAYLOAD_MAX / 4], after[CUBE_PAYLOAD_MAX / 4];
     unsigned rows = 0;
     assert_int_equal(host_liar_alter(&liar, PEER, type, data, size), size);
@@ -261,15 +249,13 @@ static unsigned differ(uint8_t type, const void *data, size_t size, size_t at,
     return rows;
 }
 
-static struct incode_answers answers_of(void)
-{
+static struct incode_answers answers_of(void) {
     struct incode_answers answers = {INCODE_LIST_FACES, PEER, LISTED, {{0}}};
     fill(answers.v[0], LISTED, 4);
     return answers;
 }
 
-static void answers_are_altered(void **unused)
-{
+static void answers_are_altered(void **unused) {
     const struct incode_answers answers = answers_of();
     const size_t size = incode_answers_bytes(LISTED);
     unsigned hull = LISTED / 4;
@@ -290,8 +276,7 @@ static void answers_are_altered(void **unused)
     }
 }
 
-static void what_is_lent_is_altered(void **unused)
-{
+static void what_is_lent_is_altered(void **unused) {
     struct incode_list list = {INCODE_LIST_FACES, LISTED, {{0}}};
     struct incode_loan loan = {1, 2, LISTED, {{0}}};
     (void)unused;
@@ -308,8 +293,7 @@ static void what_is_lent_is_altered(void **unused)
 }
 
 /* A tuple is still a tuple, and another in its list or answers alone. */
-static void tuples_are_altered(void **unused)
-{
+static void tuples_are_altered(void **unused) {
     const struct incode_answers answers = answers_of();
     uint8_t data[CUBE_PAYLOAD_MAX] = {4};
     struct tuple tuple = {.count = 2, .keyed = true};
@@ -337,8 +321,7 @@ static void tuples_are_altered(void **unused)
     assert_memory_equal(liar.out, data, size);
 }
 
-static void findings_are_altered(void **unused)
-{
+static void findings_are_altered(void **unused) {
     static const int more[] = {
         [HOST_LIE_DROP] = -LISTED,  [HOST_LIE_EXCHANGE] = 0,
         [HOST_LIE_REPEAT] = LISTED, [HOST_LIE_INVENT] = LISTED / 4,
@@ -360,8 +343,7 @@ static void findings_are_altered(void **unused)
     }
 }
 
-static void shared_ones_are_altered(void **unused)
-{
+static void shared_ones_are_altered(void **unused) {
     struct node_shared shared[LISTED];
     (void)unused;
     fill(shared[0].v, LISTED, 4);
@@ -374,8 +356,7 @@ static void shared_ones_are_altered(void **unused)
     }
 }
 
-static size_t page_bytes(uint8_t *data, size_t bytes)
-{
+static size_t page_bytes(uint8_t *data, size_t bytes) {
     const size_t head = sizeof(struct node_page_head);
     for (size_t i = 0; i < bytes / sizeof(double); i++) {
         double x = i % INCODE_BRICK_POINTS < 10 ? 1 + (double)i / 64 : 7;
@@ -386,8 +367,7 @@ static size_t page_bytes(uint8_t *data, size_t bytes)
 
 /* One coordinate of one of its ten points and the repeated one, whatever stands
  * before the points; never on its way to the host, nor that of a box. */
-static void pages_are_altered(void **unused)
-{
+static void pages_are_altered(void **unused) {
     uint8_t data[CUBE_PAYLOAD_MAX] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
     unsigned kinds[3] = {0}, lies = 0;
     const size_t head = sizeof(struct node_page_head);
@@ -420,8 +400,7 @@ static void pages_are_altered(void **unused)
     assert_memory_equal(liar.out, data, size);
 }
 
-static void other_messages_are_true(void **unused)
-{
+static void other_messages_are_true(void **unused) {
     const struct node_finished_message finished = {.epoch = 3};
     (void)unused;
     for (int way = 0; way < HOST_LIES; way++) {
@@ -439,8 +418,7 @@ static void other_messages_are_true(void **unused)
 /* --- what leaves ---------------------------------------------------------- */
 
 /* A lie counts once its message has left. */
-static void lies_are_counted(void **unused)
-{
+static void lies_are_counted(void **unused) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     struct cube cube = {.room = 0};
     struct node_counted counted = {.cube = &cube};
@@ -460,8 +438,7 @@ static void lies_are_counted(void **unused)
 }
 
 /* As many messages as the link takes, the true one never; each counted. */
-static void floods_have_no_end(void **unused)
-{
+static void floods_have_no_end(void **unused) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     struct cube cube = {.room = MESSAGES};
     struct node_counted counted = {.cube = &cube};
@@ -500,8 +477,7 @@ static void floods_have_no_end(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(results_are_altered),
         cmocka_unit_test(both_orientations_are_told),

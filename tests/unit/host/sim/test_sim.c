@@ -20,8 +20,7 @@
 
 enum { STRIDE = 11, STRIDE_SANITIZED = 61, STRIDE_EMULATED = 97 };
 
-static uint64_t stride(void)
-{
+static uint64_t stride(void) {
     const char *given = getenv("INCODE_SIM_STRIDE");
     return given != NULL ? strtoull(given, NULL, 10)
            : emulated()  ? STRIDE_EMULATED
@@ -29,8 +28,7 @@ static uint64_t stride(void)
                          : STRIDE;
 }
 
-static struct host_sim_outcome run(const struct host_sim_plan *plan)
-{
+static struct host_sim_outcome run(const struct host_sim_plan *plan) {
     struct host_sim_outcome outcome;
     struct host_error error = {0};
     if (host_sim_run(plan, &outcome, &error) != 0) {
@@ -42,8 +40,7 @@ static struct host_sim_outcome run(const struct host_sim_plan *plan)
     return outcome;
 }
 
-static void the_same_seed_is_the_same_run(void **unused)
-{
+static void the_same_seed_is_the_same_run(void **unused) {
     uint64_t before = 0;
     (void)unused;
     for (uint64_t seed = 1; seed <= (emulated() ? 1 : 6); seed++) {
@@ -59,8 +56,7 @@ static void the_same_seed_is_the_same_run(void **unused)
 }
 
 /* Four nodes, a few points, and nothing goes wrong by itself. */
-static struct host_sim_plan small_run(void)
-{
+static struct host_sim_plan small_run(void) {
     struct host_sim_plan plan;
     host_sim_plan_draw(&plan, 1, 4);
     plan.kind = "uniform";
@@ -85,8 +81,7 @@ static struct host_sim_plan small_run(void)
     return plan;
 }
 
-static void each_frame_meets_each_fate(void **unused)
-{
+static void each_frame_meets_each_fate(void **unused) {
     struct host_sim_plan plan = small_run();
     struct host_sim_outcome clean = run(&plan);
     uint64_t runs = 0, changed = 0, step = stride();
@@ -108,8 +103,7 @@ static void each_frame_meets_each_fate(void **unused)
     assert_true(2 * changed > runs);
 }
 
-static void each_node_restarts_at_each_frame(void **unused)
-{
+static void each_node_restarts_at_each_frame(void **unused) {
     struct host_sim_plan plan = small_run();
     struct host_sim_outcome clean = run(&plan);
     uint64_t runs = 0, restarts = 0, step = stride();
@@ -133,8 +127,7 @@ static void each_node_restarts_at_each_frame(void **unused)
 
 /* Seed 151: nodes of an exchange that are done lend pages to those who are not,
  * also such as the shuffle keeps back, and nobody's patience ends. */
-static void who_is_done_lends_on(void **unused)
-{
+static void who_is_done_lends_on(void **unused) {
     struct host_sim_plan plan;
     (void)unused;
     host_sim_plan_draw(&plan, 151, 0);
@@ -143,15 +136,13 @@ static void who_is_done_lends_on(void **unused)
     assert_true(run(&plan).time_us < HOST_PATIENCE_US / 2);
 }
 
-static int one_thread(void **unused)
-{
+static int one_thread(void **unused) {
     (void)unused;
     host_threads_limit(1);
     return 0;
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_same_seed_is_the_same_run),
         cmocka_unit_test(who_is_done_lends_on),

@@ -21,16 +21,15 @@ static const struct host_sim_cube_options plain = {
 static uint64_t now_us;
 
 static void open_cube(struct host_sim_cube *cube,
-                      const struct host_sim_cube_options *options)
-{
+                      const struct host_sim_cube_options *options) {
     struct host_error error = {0};
     now_us = 1000;
     assert_int_equal(host_sim_cube_open(cube, options, &now_us, &error), 0);
 }
 
 /* The byte that comes to that link, or nothing: -1; closed: -2. */
-static int get(const struct host_sim_cube *cube, unsigned place, unsigned link)
-{
+static int get(const struct host_sim_cube *cube, unsigned place,
+               unsigned link) {
     uint8_t byte = 0;
     struct link_pipe pipe = host_sim_cube_pipe(cube, place, link);
     int got = pipe.receive(pipe.context, &byte, 1);
@@ -38,16 +37,14 @@ static int get(const struct host_sim_cube *cube, unsigned place, unsigned link)
 }
 
 static int put(const struct host_sim_cube *cube, unsigned place, unsigned link,
-               uint8_t byte)
-{
+               uint8_t byte) {
     struct link_pipe pipe = host_sim_cube_pipe(cube, place, link);
     return pipe.send(pipe.context, &byte, 1);
 }
 
 /* A byte goes from one end to the other and nowhere else. */
 static void check_wire(const struct host_sim_cube *cube, unsigned from,
-                       unsigned link, unsigned to, unsigned to_link)
-{
+                       unsigned link, unsigned to, unsigned to_link) {
     unsigned wire = host_sim_cube_wire(cube, from, link);
     assert_true(wire < cube->wires);
     assert_int_equal(wire, host_sim_cube_wire(cube, to, to_link));
@@ -62,8 +59,7 @@ static void check_wire(const struct host_sim_cube *cube, unsigned from,
     }
 }
 
-static void every_wire_leads_where_it_should(void **unused)
-{
+static void every_wire_leads_where_it_should(void **unused) {
     (void)unused;
     for (unsigned dimension = 0; dimension <= 5; dimension++) {
         struct host_sim_cube cube;
@@ -85,8 +81,7 @@ static void every_wire_leads_where_it_should(void **unused)
     }
 }
 
-static void a_host_may_have_more_wires(void **unused)
-{
+static void a_host_may_have_more_wires(void **unused) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
     (void)unused;
@@ -107,8 +102,7 @@ static void a_host_may_have_more_wires(void **unused)
 }
 
 /* What breaks a wire twice must be taken back twice. */
-static void a_wire_breaks_as_often_as_it_is_mended(void **unused)
-{
+static void a_wire_breaks_as_often_as_it_is_mended(void **unused) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
     (void)unused;
@@ -142,8 +136,7 @@ static void a_wire_breaks_as_often_as_it_is_mended(void **unused)
 }
 
 /* Node 0 sees the connection before break once, and has the other's bytes. */
-static void one_host_is_connected_at_a_time(void **unused)
-{
+static void one_host_is_connected_at_a_time(void **unused) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
     (void)unused;
@@ -172,16 +165,14 @@ static void one_host_is_connected_at_a_time(void **unused)
 static unsigned woken;
 static uint64_t woken_us;
 
-static void wake(void *context, unsigned place, uint64_t us)
-{
+static void wake(void *context, unsigned place, uint64_t us) {
     assert_ptr_equal(context, &woken);
     woken = place;
     woken_us = us;
 }
 
 /* Who is sent something is told when it comes; all that is sent is traced. */
-static void bytes_wake_and_leave_a_trace(void **unused)
-{
+static void bytes_wake_and_leave_a_trace(void **unused) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
     uint64_t traces[3];
@@ -204,8 +195,7 @@ static void bytes_wake_and_leave_a_trace(void **unused)
 }
 
 /* Each row of the table can be drawn, and is, and says what it does. */
-static void every_kind_of_fault_is_drawn(void **unused)
-{
+static void every_kind_of_fault_is_drawn(void **unused) {
     unsigned wanted[HOST_SIM_FAULTS] = {0};
     (void)unused;
     for (uint64_t seed = 1; seed <= 400; seed++) {
@@ -227,8 +217,7 @@ static void every_kind_of_fault_is_drawn(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_wire_leads_where_it_should),
         cmocka_unit_test(a_host_may_have_more_wires),

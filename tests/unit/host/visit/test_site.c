@@ -9,15 +9,13 @@
 
 #include "host/visit/site.h"
 
-static const char *told(struct host_site_options options, size_t size)
-{
+static const char *told(struct host_site_options options, size_t size) {
     static char text[200];
     host_site_text(&options, text, size);
     return text;
 }
 
-static void words_are_those_that_were_given(void **unused)
-{
+static void words_are_those_that_were_given(void **unused) {
     (void)unused;
     assert_string_equal(
         told((struct host_site_options){.cube = "my lab.cube"}, 200),
@@ -38,8 +36,7 @@ static void words_are_those_that_were_given(void **unused)
 }
 
 /* Half a word would be another. */
-static void what_does_not_fit_is_left_to_the_user(void **unused)
-{
+static void what_does_not_fit_is_left_to_the_user(void **unused) {
     (void)unused;
     for (size_t size = 12; size < 20; size++) {
         assert_string_equal(
@@ -48,8 +45,7 @@ static void what_does_not_fit_is_left_to_the_user(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(words_are_those_that_were_given),
         cmocka_unit_test(what_does_not_fit_is_left_to_the_user)};

@@ -5,8 +5,7 @@
 static const struct place eight = {.dimension = 3, .seed = 1};
 static const struct place boards = {.dimension = 3, .seed = 2, .bare = true};
 
-static void nodes_say_who_they_are(void **state)
-{
+static void nodes_say_who_they_are(void **state) {
     (void)state;
     open_place(&eight);
     come();
@@ -30,8 +29,7 @@ static void nodes_say_who_they_are(void **state)
     close_place();
 }
 
-static void nodes_answer_all_questions(void **state)
-{
+static void nodes_answer_all_questions(void **state) {
     struct node_link_state links[4];
     struct node_top top;
     struct node_ready_message memory;
@@ -80,8 +78,7 @@ static void nodes_answer_all_questions(void **state)
     close_place();
 }
 
-static void a_probe_of_who_is_silent_ends(void **state)
-{
+static void a_probe_of_who_is_silent_ends(void **state) {
     struct node_probe probe;
     (void)state;
     open_place(&eight);
@@ -97,8 +94,7 @@ static void a_probe_of_who_is_silent_ends(void **state)
     close_place();
 }
 
-static void the_next_host_comes_at_once(void **state)
-{
+static void the_next_host_comes_at_once(void **state) {
     (void)state;
     open_place(&eight);
     for (unsigned k = 0; k < 5; k++) {
@@ -112,8 +108,7 @@ static void the_next_host_comes_at_once(void **state)
     close_place();
 }
 
-static void a_host_that_vanished_is_waited_for(void **state)
-{
+static void a_host_that_vanished_is_waited_for(void **state) {
     (void)state;
     open_place(&eight);
     come();
@@ -138,8 +133,7 @@ static void a_host_that_vanished_is_waited_for(void **state)
     close_place();
 }
 
-static void starts_are_told_apart(void **state)
-{
+static void starts_are_told_apart(void **state) {
     (void)state;
     open_place(&eight);
     come();
@@ -153,8 +147,7 @@ static void starts_are_told_apart(void **state)
     close_place();
 }
 
-static void nodes_restart_when_told(void **state)
-{
+static void nodes_restart_when_told(void **state) {
     struct host_node_set set = all();
     (void)state;
     open_place(&boards);
@@ -171,8 +164,7 @@ static void nodes_restart_when_told(void **state)
 }
 
 /* Nodes that have just begun are asked of their wires before these are up. */
-static void wires_of_nodes_that_have_just_begun_are_waited_for(void **state)
-{
+static void wires_of_nodes_that_have_just_begun_are_waited_for(void **state) {
     struct host_node_set set = all();
     (void)state;
     open_place(&boards);
@@ -209,8 +201,7 @@ static void wires_of_nodes_that_have_just_begun_are_waited_for(void **state)
 
 /* A wire that is pulled, and put back. */
 static void pull_and_put_back(const struct place *as, unsigned node,
-                              unsigned link)
-{
+                              unsigned link) {
     open_place(as);
     come();
     wait_for(all(), 4 * S);
@@ -228,8 +219,7 @@ static void pull_and_put_back(const struct place *as, unsigned node,
     close_place();
 }
 
-static void a_pulled_wire_is_gone_round(void **state)
-{
+static void a_pulled_wire_is_gone_round(void **state) {
     struct place patient = eight;
     (void)state;
     pull_and_put_back(&boards, 0, 1);
@@ -239,8 +229,7 @@ static void a_pulled_wire_is_gone_round(void **state)
     pull_and_put_back(&patient, 2, 0);
 }
 
-static void a_wire_that_was_never_there(void **state)
-{
+static void a_wire_that_was_never_there(void **state) {
     (void)state;
     open_place(&boards);
     host_sim_cube_leave_out(&place.world.cube, wire_of(0, 2));
@@ -254,8 +243,7 @@ static void a_wire_that_was_never_there(void **state)
 }
 
 /* A node that is off, and comes while the host is there. */
-static void come_late(const struct place *as, unsigned node)
-{
+static void come_late(const struct place *as, unsigned node) {
     char text[300];
     open_place(as);
     host_world_late(&place.world, node, 30 * (uint64_t)S);
@@ -276,8 +264,7 @@ static void come_late(const struct place *as, unsigned node)
     close_place();
 }
 
-static void a_node_that_is_off(void **state)
-{
+static void a_node_that_is_off(void **state) {
     (void)state;
     come_late(&eight, 7);
     come_late(&eight, 1);
@@ -285,8 +272,7 @@ static void a_node_that_is_off(void **state)
     come_late(&boards, 3);
 }
 
-static void a_cube_of_one(void **state)
-{
+static void a_cube_of_one(void **state) {
     const struct place one = {.dimension = 0, .seed = 5, .bare = true};
     (void)state;
     open_place(&one);
@@ -296,8 +282,7 @@ static void a_cube_of_one(void **state)
     close_place();
 }
 
-static void a_node_that_loses_power_and_comes_back(void **state)
-{
+static void a_node_that_loses_power_and_comes_back(void **state) {
     (void)state;
     open_place(&boards);
     come();
@@ -314,8 +299,7 @@ static void a_node_that_loses_power_and_comes_back(void **state)
     close_place();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_say_who_they_are),
         cmocka_unit_test(nodes_answer_all_questions),

@@ -11,8 +11,7 @@ static struct {
     uint64_t until_us;
 } pulled[BLOWS];
 
-static void mend(uint64_t now_us)
-{
+static void mend(uint64_t now_us) {
     for (unsigned i = 0; i < BLOWS; i++) {
         if (pulled[i].until_us != 0 && pulled[i].until_us <= now_us) {
             pull(pulled[i].node, pulled[i].link, false);
@@ -21,8 +20,7 @@ static void mend(uint64_t now_us)
     }
 }
 
-static void strike(unsigned blow, const struct place *as)
-{
+static void strike(unsigned blow, const struct place *as) {
     unsigned node = draw(place.world.nodes), link = draw(as->dimension);
     struct host_node_set set = only(node);
     switch (draw(6)) {
@@ -51,8 +49,7 @@ static void strike(unsigned blow, const struct place *as)
     }
 }
 
-static void visit_in_a_storm(const struct place *as)
-{
+static void visit_in_a_storm(const struct place *as) {
     memset(pulled, 0, sizeof pulled);
     open_place(as);
     come();
@@ -75,8 +72,7 @@ static void visit_in_a_storm(const struct place *as)
     close_place();
 }
 
-static void storms(unsigned dimension, unsigned seeds, bool bare)
-{
+static void storms(unsigned dimension, unsigned seeds, bool bare) {
     for (uint64_t seed = 1; seed <= seeds; seed++) {
         struct place as = {.dimension = dimension, .seed = seed, .bare = bare};
         as.dead_us = !bare && seed % 2 == 0 ? 3 * S : 0;
@@ -86,27 +82,23 @@ static void storms(unsigned dimension, unsigned seeds, bool bare)
     }
 }
 
-static void small_cubes(void **state)
-{
+static void small_cubes(void **state) {
     (void)state;
     storms(4, SEEDS, false);
 }
 
-static void boards(void **state)
-{
+static void boards(void **state) {
     (void)state;
     storms(4, SEEDS, true);
 }
 
-static void large_cubes(void **state)
-{
+static void large_cubes(void **state) {
     (void)state;
     storms(6, LARGE, false);
     storms(6, LARGE, true);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(small_cubes),
         cmocka_unit_test(boards),

@@ -31,8 +31,7 @@ static struct {
     uint64_t random;
 } place;
 
-static inline uint32_t draw(uint32_t below)
-{
+static inline uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&place.random) >> 32) % below;
 }
 
@@ -44,8 +43,7 @@ struct place {
     struct sim_faults faults;
 };
 
-static inline void open_place(const struct place *as)
-{
+static inline void open_place(const struct place *as) {
     const struct host_world_options options = {
         .cube = {.dimension = as->dimension,
                  .seed = as->seed,
@@ -71,51 +69,44 @@ static inline void open_place(const struct place *as)
     }
 }
 
-static inline void good(int status)
-{
+static inline void good(int status) {
     if (status != 0) {
         fail_msg("%s", place.error.text);
     }
 }
 
 /* Comes to the cube as another start of the host. */
-static inline void come(void)
-{
+static inline void come(void) {
     place.machine = host_world_machine(&place.world);
     good(host_visit_open(&place.visit, &place.machine, &place.error));
 }
 
-static inline void close_place(void)
-{
+static inline void close_place(void) {
     host_visit_close(&place.visit);
     assert_null(host_world_damage(&place.world));
     host_world_close(&place.world);
 }
 
-static inline struct host_node_set all(void)
-{
+static inline struct host_node_set all(void) {
     struct host_node_set set;
     host_node_set_all(&set, place.world.nodes);
     return set;
 }
 
-static inline struct host_node_set but(unsigned node)
-{
+static inline struct host_node_set but(unsigned node) {
     struct host_node_set set = all();
     set.bits[node / 8] &= (uint8_t) ~(1u << node % 8);
     return set;
 }
 
-static inline struct host_node_set only(unsigned node)
-{
+static inline struct host_node_set only(unsigned node) {
     struct host_node_set set = {{0}};
     host_node_set_add(&set, node);
     return set;
 }
 
 /* Of a set, those that are there. */
-static inline unsigned there(const struct host_node_set *set)
-{
+static inline unsigned there(const struct host_node_set *set) {
     unsigned count = 0;
     for (unsigned i = 0; i < place.world.nodes; i++) {
         count += host_node_set_has(set, i) && place.visit.node[i].there;
@@ -123,8 +114,7 @@ static inline unsigned there(const struct host_node_set *set)
     return count;
 }
 
-static inline void wait_for(struct host_node_set set, uint64_t us)
-{
+static inline void wait_for(struct host_node_set set, uint64_t us) {
     good(host_visit_wait(&place.visit, &set, us, &place.error));
     if (there(&set) != host_node_set_count(&set)) {
         fail_msg("%u of %u are there after %llu ms", there(&set),
@@ -132,8 +122,7 @@ static inline void wait_for(struct host_node_set set, uint64_t us)
     }
 }
 
-static inline void stay(uint64_t us)
-{
+static inline void stay(uint64_t us) {
     uint64_t end_us = place.world.now_us + us;
     while (place.world.now_us < end_us) {
         good(host_visit_round(&place.visit, end_us - place.world.now_us,
@@ -143,8 +132,7 @@ static inline void stay(uint64_t us)
 
 /* Asks all of them, of whom every one has to answer. */
 static inline void ask(struct host_node_set set, enum node_question what,
-                       unsigned target, uint64_t us)
-{
+                       unsigned target, uint64_t us) {
     good(host_visit_ask(&place.visit, &set, what, target, us, &place.error));
     for (unsigned i = 0; i < place.world.nodes; i++) {
         if (host_node_set_has(&set, i) && !place.visit.node[i].answered) {
@@ -153,14 +141,12 @@ static inline void ask(struct host_node_set set, enum node_question what,
     }
 }
 
-static inline unsigned wire_of(unsigned node, unsigned link)
-{
+static inline unsigned wire_of(unsigned node, unsigned link) {
     return host_sim_cube_wire(&place.world.cube, node, link);
 }
 
 /* Both ways: what is sent is lost, and nobody is told. */
-static inline void pull(unsigned node, unsigned link, bool out)
-{
+static inline void pull(unsigned node, unsigned link, bool out) {
     for (unsigned side = 0; side < 2; side++) {
         host_sim_cube_deaf(&place.world.cube, wire_of(node, link), side, out);
     }

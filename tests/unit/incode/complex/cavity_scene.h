@@ -15,8 +15,7 @@
 /* Whether p is in a cell's sphere or beyond its facet; in the facet's plane its
  * circle decides.  A sphere that has been released holds nothing that comes. */
 static inline bool scene_holds(struct scene *s, const struct incode_cell *c,
-                               const double p[3])
-{
+                               const double p[3]) {
     const double *q[4];
     unsigned k = incode_cell_index(c, INCODE_COMPLEX_INFINITE);
     for (unsigned i = 0; i < 4; i++)
@@ -35,13 +34,11 @@ static inline bool scene_holds(struct scene *s, const struct incode_cell *c,
 }
 
 /* What an owner puts down of a cell here: 1 to 3. */
-static inline unsigned scene_proof(uint32_t cell)
-{
+static inline unsigned scene_proof(uint32_t cell) {
     return 1 + cell % 3;
 }
 
-static inline void scene_prove_all(struct scene *s)
-{
+static inline void scene_prove_all(struct scene *s) {
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++) {
         struct incode_cell *c = incode_complex_cell(&s->x, i);
         if (!incode_cell_is_free(c))
@@ -49,8 +46,7 @@ static inline void scene_prove_all(struct scene *s)
     }
 }
 
-static inline void scene_prove_none(struct scene *s)
-{
+static inline void scene_prove_none(struct scene *s) {
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++) {
         struct incode_cell *c = incode_complex_cell(&s->x, i);
         if (!incode_cell_is_free(c))
@@ -59,8 +55,7 @@ static inline void scene_prove_none(struct scene *s)
 }
 
 /* Every byte of the cells, the first at the end. */
-static inline struct incode_cell *scene_cells(const struct scene *s)
-{
+static inline struct incode_cell *scene_cells(const struct scene *s) {
     struct incode_cell *copy = malloc(s->x.cells * sizeof *copy);
     assert_non_null(copy);
     memcpy(copy, incode_complex_cell(&s->x, s->x.cells - 1),
@@ -70,8 +65,7 @@ static inline struct incode_cell *scene_cells(const struct scene *s)
 
 /* Which cells hold p: 1 in `hold`; how many. */
 static inline uint32_t scene_cavity(struct scene *s, const double p[3],
-                                    uint8_t *hold)
-{
+                                    uint8_t *hold) {
     uint32_t count = 0;
     memset(hold, 0, s->x.cells);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++) {
@@ -85,8 +79,7 @@ static inline uint32_t scene_cavity(struct scene *s, const double p[3],
 /* Those of `hold` are listed, each once, or there are too many; no cell is
  * touched. */
 static inline bool scene_check_listed(struct scene *s, const double p[3],
-                                      const uint8_t *hold, uint32_t count)
-{
+                                      const uint8_t *hold, uint32_t count) {
     uint32_t cells[INCODE_COMPLEX_CAVITY];
     uint8_t *left = malloc(s->x.cells);
     struct incode_cell *before = scene_cells(s);
@@ -115,8 +108,7 @@ static inline bool scene_check_listed(struct scene *s, const double p[3],
 /* Of the cells of `hold` nothing is put down any more; nothing else is another,
  * but for what is of a walk. */
 static inline void scene_check_disproved(struct scene *s, const double p[3],
-                                         const uint8_t *hold)
-{
+                                         const uint8_t *hold) {
     struct incode_cell *before = scene_cells(s);
     uint32_t were, hold_it = 0, proved = 0;
     uint32_t count =
@@ -143,8 +135,7 @@ static inline void scene_check_disproved(struct scene *s, const double p[3],
  * whether they were listed.  What has been put down is as scene_prove_all
  * says, before and after. */
 static inline uint32_t scene_check_cavity(struct scene *s, const double p[3],
-                                          bool *listed)
-{
+                                          bool *listed) {
     uint8_t *hold = malloc(s->x.cells);
     assert_non_null(hold);
     uint32_t count = scene_cavity(s, p, hold);

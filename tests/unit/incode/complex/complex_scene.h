@@ -36,8 +36,7 @@ struct scene {
     uint8_t *block;
 };
 
-static inline uint32_t scene_draw(uint64_t *seed, uint32_t below)
-{
+static inline uint32_t scene_draw(uint64_t *seed, uint32_t below) {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
     *seed ^= *seed << 17;
@@ -45,8 +44,7 @@ static inline uint32_t scene_draw(uint64_t *seed, uint32_t below)
                       32);
 }
 
-static inline double scene_unit(uint64_t *seed)
-{
+static inline double scene_unit(uint64_t *seed) {
     return (scene_draw(seed, UINT32_MAX) +
             scene_draw(seed, 1 << 20) * 0x1p-20) *
            0x1p-32;
@@ -55,21 +53,18 @@ static inline double scene_unit(uint64_t *seed)
 /* ---- memory ---- */
 
 /* So many points and cells fill it. */
-static inline size_t scene_used(uint32_t points, uint32_t cells)
-{
+static inline size_t scene_used(uint32_t points, uint32_t cells) {
     return points * sizeof(struct incode_complex_point) +
            cells * sizeof(struct incode_cell);
 }
 
 /* Ample memory for n points, be it that they are not on skew lines. */
-static inline size_t scene_bytes(uint32_t n)
-{
+static inline size_t scene_bytes(uint32_t n) {
     return scene_used(n + 1, 16 * n + 64);
 }
 
 /* bytes: any; the memory begins where 8 divides the address. */
-static inline void scene_open(struct scene *s, size_t bytes)
-{
+static inline void scene_open(struct scene *s, size_t bytes) {
     s->bytes = bytes;
     s->block = malloc(bytes + 2 * SCENE_GUARD);
     assert_non_null(s->block);
@@ -77,8 +72,7 @@ static inline void scene_open(struct scene *s, size_t bytes)
     incode_complex_init(&s->x, s->block + SCENE_GUARD, bytes);
 }
 
-static inline void scene_close(struct scene *s)
-{
+static inline void scene_close(struct scene *s) {
     for (size_t i = 0; i < SCENE_GUARD; i++) {
         assert_int_equal(s->block[i], SCENE_FILL);
         assert_int_equal(s->block[SCENE_GUARD + s->bytes + i], SCENE_FILL);
@@ -90,8 +84,7 @@ static inline void scene_close(struct scene *s)
 /* ---- what must hold ---- */
 
 static inline int scene_orient(struct scene *s, const struct incode_cell *c,
-                               unsigned i, uint32_t v)
-{
+                               unsigned i, uint32_t v) {
     const double *p[4];
     for (unsigned k = 0; k < 4; k++)
         p[k] = s->x.point[k == i ? v : c->v[k]].p;
@@ -99,8 +92,7 @@ static inline int scene_orient(struct scene *s, const struct incode_cell *c,
 }
 
 static inline bool scene_outside(struct scene *s, const struct incode_cell *c,
-                                 uint32_t v)
-{
+                                 uint32_t v) {
     const struct incode_complex_point *q = s->x.point;
     return incode_in_sphere(&s->tally, q[c->v[0]].p, q[c->v[1]].p, q[c->v[2]].p,
                             q[c->v[3]].p, q[v].p) < 0;
@@ -109,8 +101,7 @@ static inline bool scene_outside(struct scene *s, const struct incode_cell *c,
 /* The cells that are reached from the infinite vertex, each once; `state`: 1 of
  * theirs, 0 of the others. */
 static inline uint32_t scene_reach(const struct scene *s, uint8_t *state,
-                                   uint32_t *list)
-{
+                                   uint32_t *list) {
     uint32_t count = 1;
     memset(state, 0, s->x.cells);
     list[0] = s->x.point[INCODE_COMPLEX_INFINITE].cell;
@@ -131,8 +122,7 @@ static inline uint32_t scene_reach(const struct scene *s, uint8_t *state,
 
 /* The free ones are all others, and each is in the list once. */
 static inline void scene_check_free(const struct scene *s, uint8_t *state,
-                                    uint32_t live)
-{
+                                    uint32_t live) {
     uint32_t at = s->x.free;
     assert_int_equal(live + s->x.free_count + INCODE_COMPLEX_CELLS_FIRST,
                      s->x.cells);
@@ -147,8 +137,7 @@ static inline void scene_check_free(const struct scene *s, uint8_t *state,
 /* The vertex of cell c's neighbour i that c has not.  The two share a facet,
  * which they see from opposite sides. */
 static inline uint32_t scene_across(const struct scene *s, uint32_t at,
-                                    unsigned i)
-{
+                                    unsigned i) {
     const struct incode_cell *c = incode_complex_cell(&s->x, at);
     const struct incode_cell *d = incode_complex_cell(&s->x, c->n[i].cell);
     unsigned back = 0, shared = 0, place[4], swaps = 0;
@@ -172,8 +161,7 @@ static inline uint32_t scene_across(const struct scene *s, uint32_t at,
 }
 
 /* Positive orientation, empty spheres, a convex hull. */
-static inline void scene_check_cell(struct scene *s, uint32_t at)
-{
+static inline void scene_check_cell(struct scene *s, uint32_t at) {
     const struct incode_cell *c = incode_complex_cell(&s->x, at);
     unsigned beyond = incode_cell_index(c, INCODE_COMPLEX_INFINITE);
     for (unsigned i = 0; i < 4; i++) {
@@ -202,8 +190,7 @@ static inline void scene_check_cell(struct scene *s, uint32_t at)
  * n / 2 + 2 corners.  Returns n. */
 static inline uint32_t scene_check_link(const struct scene *s, uint32_t v,
                                         uint32_t *cell_seen,
-                                        uint32_t *point_seen, uint32_t *list)
-{
+                                        uint32_t *point_seen, uint32_t *list) {
     uint32_t count = 1, corners = 0;
     list[0] = s->x.point[v].cell;
     cell_seen[list[0]] = v;
@@ -226,8 +213,7 @@ static inline uint32_t scene_check_link(const struct scene *s, uint32_t v,
 }
 
 static inline void scene_check_links(const struct scene *s, uint8_t *state,
-                                     uint32_t *list, uint32_t live)
-{
+                                     uint32_t *list, uint32_t live) {
     uint32_t *seen = malloc((s->x.cells + s->x.points) * sizeof *seen);
     uint32_t corners = 0;
     assert_non_null(seen);
@@ -245,8 +231,7 @@ static inline void scene_check_links(const struct scene *s, uint8_t *state,
 
 /* Whether all is the Delaunay triangulation of the vertices, by its local
  * properties. */
-static inline void scene_check(struct scene *s)
-{
+static inline void scene_check(struct scene *s) {
     uint8_t *state = malloc(s->x.cells);
     uint32_t *list = malloc(s->x.cells * sizeof *list);
     assert_non_null(state);
@@ -264,8 +249,7 @@ static inline void scene_check(struct scene *s)
 
 /* The first four of n points from `first` on that span space; false: none. */
 static inline bool scene_four(struct scene *s, uint32_t first, uint32_t n,
-                              uint32_t four[4])
-{
+                              uint32_t four[4]) {
     const struct incode_complex_point *q = s->x.point;
     uint32_t i = first + 2, k;
     while (i < first + n &&
@@ -283,8 +267,7 @@ static inline bool scene_four(struct scene *s, uint32_t first, uint32_t n,
 }
 
 /* An inserted vertex by chance. */
-static inline uint32_t scene_near(struct scene *s)
-{
+static inline uint32_t scene_near(struct scene *s) {
     uint32_t v;
     do {
         v = scene_draw(&s->seed, s->x.points);
@@ -295,8 +278,7 @@ static inline uint32_t scene_near(struct scene *s)
 /* Adds the n rows in this order and inserts them, four that span space first;
  * false: there are none. */
 static inline bool scene_build(struct scene *s, const double (*p)[3],
-                               const uint32_t *row, uint32_t n)
-{
+                               const uint32_t *row, uint32_t n) {
     uint32_t four[4], first = s->x.points;
     for (uint32_t i = 0; i < n; i++) {
         uint32_t v = incode_complex_add(&s->x, p[row[i]], row[i]);
@@ -321,8 +303,7 @@ static inline bool scene_build(struct scene *s, const double (*p)[3],
 /* ---- what came of it ---- */
 
 static inline void scene_append(struct host_tetrahedra *tets, uint32_t a,
-                                uint32_t b, uint32_t c, uint32_t d)
-{
+                                uint32_t b, uint32_t c, uint32_t d) {
     struct host_error error = {0};
     uint32_t(*to)[4] = host_tetrahedra_room(tets, 1, &error);
     const uint32_t t[4] = {a, b, c, d};
@@ -333,8 +314,7 @@ static inline void scene_append(struct host_tetrahedra *tets, uint32_t a,
 
 /* The finite cells as rows, in canonical order. */
 static inline void scene_tetrahedra(const struct scene *s,
-                                    struct host_tetrahedra *tets)
-{
+                                    struct host_tetrahedra *tets) {
     const struct incode_complex_point *q = s->x.point;
     uint8_t *state = malloc(s->x.cells);
     uint32_t *list = malloc(s->x.cells * sizeof *list);
@@ -354,8 +334,7 @@ static inline void scene_tetrahedra(const struct scene *s,
 
 /* Whether its finite cells are these. */
 static inline void scene_compare(const struct scene *s,
-                                 const struct host_tetrahedra *expected)
-{
+                                 const struct host_tetrahedra *expected) {
     struct host_tetrahedra tets = {0};
     scene_tetrahedra(s, &tets);
     assert_int_equal(tets.count, expected->count);
@@ -364,8 +343,7 @@ static inline void scene_compare(const struct scene *s,
 }
 
 /* 0 to n - 1, shuffled. */
-static inline void scene_shuffle(uint64_t *seed, uint32_t *row, uint32_t n)
-{
+static inline void scene_shuffle(uint64_t *seed, uint32_t *row, uint32_t n) {
     for (uint32_t i = 0; i < n; i++) {
         uint32_t k = scene_draw(seed, i + 1);
         row[i] = row[k];

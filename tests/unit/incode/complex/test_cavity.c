@@ -18,8 +18,7 @@ enum {
 
 static uint64_t seed;
 
-static int begin(void **unused)
-{
+static int begin(void **unused) {
     (void)unused;
     seed = 88172645463325252u;
     return 0;
@@ -27,28 +26,24 @@ static int begin(void **unused)
 
 /* ---- sets, of which points may be the same ---- */
 
-static void volume(uint32_t i, double p[3])
-{
+static void volume(uint32_t i, double p[3]) {
     (void)i;
     for (int d = 0; d < 3; d++)
         p[d] = scene_unit(&seed);
 }
 
-static void grid(uint32_t i, double p[3])
-{
+static void grid(uint32_t i, double p[3]) {
     (void)i;
     for (int d = 0; d < 3; d++)
         p[d] = scene_draw(&seed, 7);
 }
 
-static void plane(uint32_t i, double p[3])
-{
+static void plane(uint32_t i, double p[3]) {
     volume(i, p);
     p[2] = i % 50 == 0 ? p[2] : 0.5 * p[0] - 0.25 * p[1];
 }
 
-static void sphere(uint32_t i, double p[3])
-{
+static void sphere(uint32_t i, double p[3]) {
     double r = 0;
     volume(i, p);
     for (int d = 0; d < 3; d++) {
@@ -60,8 +55,7 @@ static void sphere(uint32_t i, double p[3])
 }
 
 /* The whole numbers with the squares' sum 101, and some within. */
-static void lattice_sphere(uint32_t i, double p[3])
-{
+static void lattice_sphere(uint32_t i, double p[3]) {
     do {
         for (int d = 0; d < 3; d++)
             p[d] = (double)scene_draw(&seed, 21) - 10;
@@ -69,15 +63,13 @@ static void lattice_sphere(uint32_t i, double p[3])
 }
 
 /* Two, each of whose pieces sees each of the other. */
-static void skew_lines(uint32_t i, double p[3])
-{
+static void skew_lines(uint32_t i, double p[3]) {
     p[0] = i % 2 == 0 ? scene_draw(&seed, 60) : 0;
     p[1] = i % 2 == 0 ? 0 : scene_draw(&seed, 60);
     p[2] = i % 2;
 }
 
-static void lumps(uint32_t i, double p[3])
-{
+static void lumps(uint32_t i, double p[3]) {
     volume(i, p);
     for (int d = 0; d < 3; d++)
         p[d] = i % 2 == 0 ? 3 + p[d] : p[d] * 0x1p-40;
@@ -85,8 +77,7 @@ static void lumps(uint32_t i, double p[3])
 
 typedef void drawing(uint32_t i, double p[3]);
 
-static bool is_there(const double (*p)[3], uint32_t n, const double at[3])
-{
+static bool is_there(const double (*p)[3], uint32_t n, const double at[3]) {
     bool there = false;
     for (uint32_t i = 0; i < n; i++)
         there = there || incode_lexicographic(p[i], at) == 0;
@@ -94,8 +85,7 @@ static bool is_there(const double (*p)[3], uint32_t n, const double at[3])
 }
 
 static uint32_t draw_set(drawing *draw, int exponent, double (*p)[3],
-                         uint32_t n)
-{
+                         uint32_t n) {
     uint32_t count = 0;
     for (uint32_t i = 0; i < n; i++) {
         draw(i, p[count]);
@@ -109,8 +99,7 @@ static uint32_t draw_set(drawing *draw, int exponent, double (*p)[3],
 /* ---- what is shown ---- */
 
 /* A vertex gives none, and nothing is put down of no cell. */
-static void show_vertices(struct scene *s)
-{
+static void show_vertices(struct scene *s) {
     uint32_t cells[INCODE_COMPLEX_CAVITY];
     uint8_t *none = calloc(s->x.cells, 1);
     assert_non_null(none);
@@ -128,8 +117,8 @@ static void show_vertices(struct scene *s)
 
 /* Most of a set's points are built, the others shown, and some far off; then
  * these are inserted.  Says which numbers of cells there were. */
-static void show_others(drawing *draw, int exponent, bool *seen, bool *refused)
-{
+static void show_others(drawing *draw, int exponent, bool *seen,
+                        bool *refused) {
     static double p[POINTS][3];
     struct scene s = {.seed = 7};
     uint32_t row[POINTS], n = draw_set(draw, exponent, p, POINTS);
@@ -163,8 +152,7 @@ static void show_others(drawing *draw, int exponent, bool *seen, bool *refused)
     scene_close(&s);
 }
 
-static void those_that_hold_a_point(void **unused)
-{
+static void those_that_hold_a_point(void **unused) {
     static drawing *const draw[] = {volume,         grid,       plane, sphere,
                                     lattice_sphere, skew_lines, lumps};
     static const int exponents[] = {0, -300, 300, -1000, 900};
@@ -184,8 +172,7 @@ static void those_that_hold_a_point(void **unused)
 
 /* All cells within a sphere of many points hold its hub, which comes after it
  * was shown; returns how many there are. */
-static uint32_t show_hub(double (*p)[3], uint32_t n, bool *listed)
-{
+static uint32_t show_hub(double (*p)[3], uint32_t n, bool *listed) {
     struct scene s = {.seed = 7};
     uint32_t *row = malloc(n * sizeof *row);
     const double hub[3] = {0, 0, 0};
@@ -205,8 +192,7 @@ static uint32_t show_hub(double (*p)[3], uint32_t n, bool *listed)
     return count;
 }
 
-static void hubs_of_each_size(void **unused)
-{
+static void hubs_of_each_size(void **unused) {
     static double p[SPHERE][3];
     uint32_t listed_most = 0, refused = 0, most = SANITIZED ? 120 : 300;
     (void)unused;
@@ -223,8 +209,7 @@ static void hubs_of_each_size(void **unused)
 }
 
 /* On a sphere but for rounding, and exactly, where all spheres are one. */
-static void a_hub_of_thousands(void **unused)
-{
+static void a_hub_of_thousands(void **unused) {
     static double p[SPHERE][3];
     uint32_t n = SANITIZED ? SPHERE / 3 : SPHERE;
     bool listed;
@@ -249,8 +234,7 @@ static void a_hub_of_thousands(void **unused)
 /* A facet of many points, seen at once from far above it, where all cells that
  * give way are infinite; in its plane their circles tell, from outside and from
  * within. */
-static void one_side_of_many_points(void **unused)
-{
+static void one_side_of_many_points(void **unused) {
     static double p[DISC * DISC + 1][3];
     uint32_t row[DISC * DISC + 1], n = DISC * DISC + 1, sides;
     struct scene s = {.seed = 7};
@@ -284,8 +268,7 @@ static void one_side_of_many_points(void **unused)
     scene_close(&s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(those_that_hold_a_point, begin),
         cmocka_unit_test_setup(hubs_of_each_size, begin),

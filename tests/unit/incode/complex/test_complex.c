@@ -8,15 +8,13 @@ enum { SMALL = 14, LARGE = 1000, LINE = 20, DISC = 12 };
 
 static uint64_t seed;
 
-static int begin(void **unused)
-{
+static int begin(void **unused) {
     (void)unused;
     seed = 88172645463325252u;
     return 0;
 }
 
-static double whole(int from, int to)
-{
+static double whole(int from, int to) {
     return from + (int)scene_draw(&seed, (uint32_t)(to - from + 1));
 }
 
@@ -43,15 +41,13 @@ enum family {
     FAMILIES
 };
 
-static void set_point(double p[3], double x, double y, double z)
-{
+static void set_point(double p[3], double x, double y, double z) {
     p[0] = x;
     p[1] = y;
     p[2] = z;
 }
 
-static void draw_whole(enum family family, uint32_t i, double p[3])
-{
+static void draw_whole(enum family family, uint32_t i, double p[3]) {
     static const int8_t circle[12][2] = {{5, 0},   {4, 3},  {3, 4},  {0, 5},
                                          {-3, 4},  {-4, 3}, {-5, 0}, {-4, -3},
                                          {-3, -4}, {0, -5}, {3, -4}, {4, -3}};
@@ -89,8 +85,7 @@ static void draw_whole(enum family family, uint32_t i, double p[3])
     }
 }
 
-static void draw_point(enum family family, uint32_t i, double p[3])
-{
+static void draw_point(enum family family, uint32_t i, double p[3]) {
     double x = scene_unit(&seed) - 0.5, y = scene_unit(&seed) - 0.5,
            z = scene_unit(&seed) - 0.5, r = sqrt(x * x + y * y + z * z);
     switch (family) {
@@ -122,8 +117,7 @@ static void draw_point(enum family family, uint32_t i, double p[3])
 }
 
 /* n points, all different. */
-static void draw_set(enum family family, double (*p)[3], uint32_t n)
-{
+static void draw_set(enum family family, double (*p)[3], uint32_t n) {
     for (uint32_t i = 0; i < n; i++) {
         bool again = false;
         draw_point(family, i, p[i]);
@@ -135,8 +129,7 @@ static void draw_set(enum family family, double (*p)[3], uint32_t n)
 
 /* Each four whose sphere holds no other. */
 static void by_definition(const double (*p)[3], uint32_t n,
-                          struct host_tetrahedra *tets)
-{
+                          struct host_tetrahedra *tets) {
     struct incode_tally tally = {0};
     for (uint32_t m = 0; m < 1u << n; m++) {
         uint32_t t[4], count = 0;
@@ -164,8 +157,7 @@ static void by_definition(const double (*p)[3], uint32_t n,
 
 /* ---- small sets, looked at after each insertion ---- */
 
-static void all_orders_are_one(void **unused)
-{
+static void all_orders_are_one(void **unused) {
     struct scene s = {.each = true, .seed = 7};
     double p[SMALL][3];
     uint32_t row[SMALL], built = 0;
@@ -192,8 +184,7 @@ static void all_orders_are_one(void **unused)
 }
 
 /* Powers of two change nothing, down to denormals. */
-static void all_scales_are_one(void **unused)
-{
+static void all_scales_are_one(void **unused) {
     static const int power[] = {-1074, -1073, -1000, -540, -358, -214,
                                 204,   340,   511,   900,  1015};
     double p[SMALL][3], q[SMALL][3];
@@ -224,8 +215,7 @@ static void all_scales_are_one(void **unused)
 
 /* In the given order, in the opposite one, and in others; returns how many
  * tetrahedra there are. */
-static uint64_t one_whatever_the_order(double (*p)[3], uint32_t n)
-{
+static uint64_t one_whatever_the_order(double (*p)[3], uint32_t n) {
     struct host_tetrahedra tets = {0};
     uint32_t *row = malloc(n * sizeof *row);
     assert_non_null(row);
@@ -249,8 +239,7 @@ static uint64_t one_whatever_the_order(double (*p)[3], uint32_t n)
     return count;
 }
 
-static uint32_t cube(double (*p)[3], int side, bool hollow)
-{
+static uint32_t cube(double (*p)[3], int side, bool hollow) {
     uint32_t n = 0;
     for (int i = 0; i < side * side * side; i++) {
         const int at[3] = {i / side / side, i / side % side, i % side};
@@ -263,8 +252,7 @@ static uint32_t cube(double (*p)[3], int side, bool hollow)
     return n;
 }
 
-static void cubes(void **unused)
-{
+static void cubes(void **unused) {
     static double p[LARGE][3];
     (void)unused;
     for (int side = 2; side < 6; side++)
@@ -274,8 +262,7 @@ static void cubes(void **unused)
     (void)one_whatever_the_order(p, cube(p, 6, true));
 }
 
-static void points_of_spheres(void **unused)
-{
+static void points_of_spheres(void **unused) {
     double p[31][3];
     (void)unused;
     draw_set(SPHERE, p, 30);
@@ -288,8 +275,7 @@ static void points_of_spheres(void **unused)
 
 /* Each piece of one line sees each of the other, until a point between them
  * takes many of them away. */
-static void skew_lines(void **unused)
-{
+static void skew_lines(void **unused) {
     double p[2 * LINE + 1][3];
     (void)unused;
     for (int i = 0; i < LINE; i++) {
@@ -304,8 +290,7 @@ static void skew_lines(void **unused)
 
 /* A hull facet of many points, those of it that come later outside it, and what
  * sees all of it at once, first or last. */
-static void one_side_of_many_points(void **unused)
-{
+static void one_side_of_many_points(void **unused) {
     double p[DISC * DISC + 2][3];
     uint32_t n = DISC * DISC;
     (void)unused;
@@ -320,8 +305,7 @@ static void one_side_of_many_points(void **unused)
                      4 * (DISC - 1) * (DISC - 1));
 }
 
-static void points_at_random(void **unused)
-{
+static void points_at_random(void **unused) {
     static double p[LARGE][3];
     (void)unused;
     draw_set(UNIFORM, p, LARGE);
@@ -330,8 +314,7 @@ static void points_at_random(void **unused)
     (void)one_whatever_the_order(p, LARGE / 5);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(all_orders_are_one, begin),
         cmocka_unit_test_setup(all_scales_are_one, begin),

@@ -8,16 +8,14 @@ enum { HUB_MAX = 80, SPHERE = 3000, LATTICE = 2000, EPOCHS = 700 };
 
 static uint64_t seed;
 
-static int begin(void **unused)
-{
+static int begin(void **unused) {
     (void)unused;
     seed = 88172645463325252u;
     return 0;
 }
 
 /* On a sphere of radius 1 about 0, but for rounding; all different. */
-static void draw_sphere(double (*p)[3], uint32_t n)
-{
+static void draw_sphere(double (*p)[3], uint32_t n) {
     for (uint32_t i = 0; i < n; i++) {
         double x = scene_unit(&seed) - 0.5, y = scene_unit(&seed) - 0.5,
                z = scene_unit(&seed) - 0.5, r = sqrt(x * x + y * y + z * z);
@@ -28,8 +26,7 @@ static void draw_sphere(double (*p)[3], uint32_t n)
 }
 
 /* The whole numbers with the squares' sum n. */
-static uint32_t lattice_sphere(double (*p)[3], int n)
-{
+static uint32_t lattice_sphere(double (*p)[3], int n) {
     uint32_t count = 0;
     int most = (int)sqrt(n);
     for (int x = -most; x <= most; x++)
@@ -46,8 +43,7 @@ static uint32_t lattice_sphere(double (*p)[3], int n)
 
 /* Finite cells with the vertex of this id, and without. */
 static void count_with(const struct host_tetrahedra *tets, uint32_t id,
-                       uint64_t count[2])
-{
+                       uint64_t count[2]) {
     count[0] = count[1] = 0;
     for (uint64_t i = 0; i < tets->count; i++) {
         const uint32_t *t = tets->v[i];
@@ -59,8 +55,7 @@ static void count_with(const struct host_tetrahedra *tets, uint32_t id,
 /* n points in a sphere and a last one, their hub, that comes after `before` of
  * them; appends the tetrahedra. */
 static void build_hub(double (*p)[3], uint32_t n, uint32_t before,
-                      struct host_tetrahedra *tets)
-{
+                      struct host_tetrahedra *tets) {
     struct scene s = {.seed = 7};
     uint32_t *row = malloc((n + 1) * sizeof *row);
     assert_non_null(row);
@@ -75,8 +70,7 @@ static void build_hub(double (*p)[3], uint32_t n, uint32_t before,
 
 /* The last comes into a cavity of 2 n - 4 facets: all numbers of them, where
  * there is room for their edges on the stack and where there is not. */
-static void cavities_of_each_size(void **unused)
-{
+static void cavities_of_each_size(void **unused) {
     double p[HUB_MAX + 1][3] = {{0}};
     (void)unused;
     for (uint32_t n = 4; n <= HUB_MAX; n++) {
@@ -98,8 +92,7 @@ static void cavities_of_each_size(void **unused)
     }
 }
 
-static void a_hub_of_thousands(void **unused)
-{
+static void a_hub_of_thousands(void **unused) {
     static double p[SPHERE + 1][3];
     struct host_tetrahedra tets[3] = {{0}};
     static const uint32_t before[3] = {0, SPHERE, SPHERE / 2};
@@ -119,8 +112,7 @@ static void a_hub_of_thousands(void **unused)
 }
 
 /* All spheres are one, and it holds the hub. */
-static void a_hub_of_ties(void **unused)
-{
+static void a_hub_of_ties(void **unused) {
     static double p[LATTICE + 1][3];
     struct host_tetrahedra first = {0}, last = {0};
     uint64_t count[2];
@@ -140,8 +132,7 @@ static void a_hub_of_ties(void **unused)
 
 /* What an owner has put down of a cell stays until the cell gives way; of the
  * new cells, which are the new point's, nothing is put down. */
-static void what_is_proved(void **unused)
-{
+static void what_is_proved(void **unused) {
     static double p[SPHERE][3];
     struct scene s = {.seed = 7};
     uint8_t state[2048];
@@ -174,8 +165,7 @@ static void what_is_proved(void **unused)
 
 /* Cells that nobody has looked at for any number of insertions: one corner is
  * filled, then the other. */
-static void marks_do_not_come_back(void **unused)
-{
+static void marks_do_not_come_back(void **unused) {
     static double p[2 * EPOCHS][3];
     struct scene s = {.seed = 7};
     uint32_t row[2 * EPOCHS], n = 0;
@@ -192,8 +182,7 @@ static void marks_do_not_come_back(void **unused)
     scene_close(&s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(cavities_of_each_size, begin),
         cmocka_unit_test_setup(a_hub_of_thousands, begin),

@@ -14,8 +14,7 @@ enum {
 
 static uint64_t seed;
 
-static int begin(void **unused)
-{
+static int begin(void **unused) {
     (void)unused;
     seed = 88172645463325252u;
     return 0;
@@ -23,8 +22,7 @@ static int begin(void **unused)
 
 /* Two skew lines, and between them what takes many of their cells away; then
  * some of a grid. */
-static void draw_set(double (*p)[3])
-{
+static void draw_set(double (*p)[3]) {
     memset(p, 0, ROWS * sizeof *p);
     for (int i = 0; i < 7; i++) {
         p[2 * i][0] = p[2 * i + 1][1] = i;
@@ -48,8 +46,7 @@ struct state {
 };
 
 /* All but marks; the list of free cells is in their neighbours. */
-static void take_state(const struct scene *s, struct state *to)
-{
+static void take_state(const struct scene *s, struct state *to) {
     const struct incode_complex *x = &s->x;
     uint8_t used[MEMORY_MAX / sizeof(struct incode_cell)];
     uint32_t list[MEMORY_MAX / sizeof(struct incode_cell)];
@@ -81,8 +78,7 @@ static void take_state(const struct scene *s, struct state *to)
 }
 
 /* Inserts a point; where it does not fit, twice, and compares. */
-static bool try_insert(struct scene *s, uint32_t v)
-{
+static bool try_insert(struct scene *s, uint32_t v) {
     static struct state before, after;
     uint32_t near = scene_near(s);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++)
@@ -106,8 +102,7 @@ static bool try_insert(struct scene *s, uint32_t v)
 /* ---- memory of each size ---- */
 
 /* The point's index where there is room for it, INCODE_NONE where not. */
-static uint32_t try_add(struct scene *s, const double p[3], uint32_t row)
-{
+static uint32_t try_add(struct scene *s, const double p[3], uint32_t row) {
     size_t used = scene_used(s->x.points + 1, s->x.cells);
     uint32_t expected = used <= s->bytes ? s->x.points : INCODE_NONE;
     uint32_t v = incode_complex_add(&s->x, p, row);
@@ -119,8 +114,7 @@ static uint32_t try_add(struct scene *s, const double p[3], uint32_t row)
  * point is added when its turn comes, else all are at first.  cells: so many
  * there are with each row, and all before. */
 static uint32_t fill(struct scene *s, const double (*p)[3], bool late,
-                     const uint32_t *cells, uint32_t *row)
-{
+                     const uint32_t *cells, uint32_t *row) {
     const uint32_t four[4] = {1, 2, 3, 4};
     uint32_t added = 0, count = 0, most = late ? 4 : ROWS;
     while (added < most && try_add(s, p[added], added) != INCODE_NONE)
@@ -151,8 +145,7 @@ static uint32_t fill(struct scene *s, const double (*p)[3], bool late,
     return count;
 }
 
-static void each_size_of_memory(void **unused)
-{
+static void each_size_of_memory(void **unused) {
     double p[ROWS][3];
     const double(*xyz)[3] = (const double(*)[3])p;
     uint32_t cells[ROWS], row[ROWS], taken[ROWS + 1] = {0}, four[4];
@@ -194,8 +187,7 @@ static void each_size_of_memory(void **unused)
 }
 
 /* What is left over of 8 bytes is not used. */
-static void odd_sizes_of_memory(void **unused)
-{
+static void odd_sizes_of_memory(void **unused) {
     double p[ROWS][3];
     (void)unused;
     draw_set(p);
@@ -216,8 +208,7 @@ static void odd_sizes_of_memory(void **unused)
 
 /* The hub of a sphere, whose cavity is a large one, is refused any number of
  * times, which leaves no traces in the marks that its neighbours meet. */
-static void refused_again_and_again(void **unused)
-{
+static void refused_again_and_again(void **unused) {
     static double p[SPHERE + 1][3];
     uint32_t row[SPHERE], cells = 0, hub = SPHERE + 1;
     (void)unused;
@@ -252,8 +243,7 @@ static void refused_again_and_again(void **unused)
 }
 
 /* Indices have 16 bits. */
-static void points_without_number(void **unused)
-{
+static void points_without_number(void **unused) {
     struct scene s = {.seed = 7};
     uint32_t v = 0, points = 1;
     (void)unused;
@@ -276,8 +266,7 @@ static void points_without_number(void **unused)
 /* ---- the first four ---- */
 
 /* Any order of four is the one tetrahedron. */
-static void either_orientation(void **unused)
-{
+static void either_orientation(void **unused) {
     const double p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     struct host_tetrahedra tets = {0};
     (void)unused;
@@ -308,8 +297,7 @@ static void either_orientation(void **unused)
 
 /* Four of a plane are none, on a circle or a line or not, and others may be
  * tried. */
-static void four_in_a_plane(void **unused)
-{
+static void four_in_a_plane(void **unused) {
     const double p[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                             {2, 0, 0}, {3, 0, 0}, {5, 7, 0}, {1, 2, 3}};
     static const uint32_t flat[3][4] = {
@@ -339,8 +327,7 @@ static void four_in_a_plane(void **unused)
 }
 
 /* What was there before leaves no traces. */
-static void all_is_forgotten(void **unused)
-{
+static void all_is_forgotten(void **unused) {
     double p[ROWS][3];
     struct scene s = {.each = true, .seed = 7};
     struct host_tetrahedra tets = {0};
@@ -361,8 +348,7 @@ static void all_is_forgotten(void **unused)
     scene_close(&s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(each_size_of_memory, begin),
         cmocka_unit_test_setup(odd_sizes_of_memory, begin),

@@ -10,8 +10,7 @@ enum { MOST = 400, BRICK = 20, KINDS = 5 };
 
 static uint64_t seed = 88172645463325252u;
 
-static void draw_set(unsigned kind, double (*p)[3])
-{
+static void draw_set(unsigned kind, double (*p)[3]) {
     for (uint32_t i = 0; i < MOST; i++)
         for (int d = 0; d < 3; d++) {
             double x = scene_unit(&seed);
@@ -30,8 +29,7 @@ static void draw_set(unsigned kind, double (*p)[3])
 /* Whether no point to come is in a cell's sphere or beyond its facet. */
 static bool is_final(struct scene *s, const struct incode_cell *c,
                      const double (*p)[3], const uint32_t *row, uint32_t from,
-                     uint32_t n)
-{
+                     uint32_t n) {
     unsigned k = incode_cell_index(c, INCODE_COMPLEX_INFINITE);
     const double *q[4];
     for (unsigned i = 0; i < 4; i++)
@@ -48,8 +46,7 @@ static bool is_final(struct scene *s, const struct incode_cell *c,
 }
 
 /* What is there of a cell's facets. */
-static void check_left(struct scene *s)
-{
+static void check_left(struct scene *s) {
     struct incode_complex *x = &s->x;
     uint32_t free = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
@@ -79,8 +76,7 @@ static void check_left(struct scene *s)
 }
 
 static void append(const struct scene *s, const struct incode_cell *c,
-                   struct host_tetrahedra *tets)
-{
+                   struct host_tetrahedra *tets) {
     const struct incode_complex_point *q = s->x.point;
     if (!incode_cell_is_infinite(c))
         scene_append(tets, q[c->v[0]].id, q[c->v[1]].id, q[c->v[2]].id,
@@ -91,8 +87,7 @@ static void append(const struct scene *s, const struct incode_cell *c,
  * how many. */
 static uint32_t release(struct scene *s, const double (*p)[3],
                         const uint32_t *row, uint32_t from, uint32_t n,
-                        struct host_tetrahedra *tets)
-{
+                        struct host_tetrahedra *tets) {
     struct incode_complex *x = &s->x;
     uint32_t count = 0, part = 1 + scene_draw(&seed, 8);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
@@ -113,8 +108,7 @@ static uint32_t release(struct scene *s, const double (*p)[3],
 
 /* Some of the points to come, each of which a cell holds that is left. */
 static void show(struct scene *s, const double (*p)[3], const uint32_t *row,
-                 uint32_t from, uint32_t n)
-{
+                 uint32_t from, uint32_t n) {
     bool listed;
     scene_prove_all(s);
     for (uint32_t i = from; i < n; i += 1 + scene_draw(&seed, 2 * BRICK))
@@ -126,8 +120,8 @@ static void show(struct scene *s, const double (*p)[3], const uint32_t *row,
 /* Bricks of points in slabs along an axis, these in any order; after some of
  * them what is final is released.  Returns the scans. */
 static uint64_t stream(const double (*p)[3], const uint32_t *row, uint32_t n,
-                       const struct host_tetrahedra *expected, uint32_t *points)
-{
+                       const struct host_tetrahedra *expected,
+                       uint32_t *points) {
     struct scene s = {.seed = 7};
     struct host_tetrahedra tets = {0};
     uint32_t four[4], v[MOST];
@@ -169,16 +163,14 @@ static uint64_t stream(const double (*p)[3], const uint32_t *row, uint32_t n,
 static double (*sorted)[3];
 static int axis;
 
-static int compare(const void *a, const void *b)
-{
+static int compare(const void *a, const void *b) {
     double x = sorted[*(const uint32_t *)a][axis];
     double y = sorted[*(const uint32_t *)b][axis];
     return x < y ? -1 : x > y;
 }
 
 /* Slabs of a brick each along an axis, in order or in any. */
-static void put_in_order(double (*p)[3], uint32_t *row, int along, bool mixed)
-{
+static void put_in_order(double (*p)[3], uint32_t *row, int along, bool mixed) {
     uint32_t slab[MOST / BRICK], copy[MOST];
     sorted = p;
     axis = along;
@@ -191,8 +183,7 @@ static void put_in_order(double (*p)[3], uint32_t *row, int along, bool mixed)
         row[i] = copy[slab[i / BRICK] * BRICK + i % BRICK];
 }
 
-static void any_order_of_bricks(void **unused)
-{
+static void any_order_of_bricks(void **unused) {
     static double p[MOST][3];
     uint32_t row[MOST], points, taken_again = 0;
     uint64_t scans = 0;
@@ -215,8 +206,7 @@ static void any_order_of_bricks(void **unused)
     assert_true(taken_again > 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_order_of_bricks),
     };

@@ -15,8 +15,7 @@ enum { FACES = 300, BRICKS = 40, GUARD = 64 };
 
 static uint64_t state;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (uint32_t)((state >> 33) % below);
 }
@@ -27,8 +26,7 @@ struct plain {
 };
 
 static uint32_t find(const struct plain *p, uint32_t key, uint32_t b,
-                     uint32_t c)
-{
+                     uint32_t c) {
     uint32_t i = 0;
     while (i < p->count &&
            (p->face[i][0] != key || p->face[i][1] != b || p->face[i][2] != c))
@@ -36,8 +34,7 @@ static uint32_t find(const struct plain *p, uint32_t key, uint32_t b,
     return i;
 }
 
-static bool take_out(struct plain *p, uint32_t key, uint32_t b, uint32_t c)
-{
+static bool take_out(struct plain *p, uint32_t key, uint32_t b, uint32_t c) {
     uint32_t i = find(p, key, b, c);
     if (i == p->count)
         return false;
@@ -45,8 +42,7 @@ static bool take_out(struct plain *p, uint32_t key, uint32_t b, uint32_t c)
     return true;
 }
 
-static uint32_t faces_at(const struct plain *p, uint32_t first, uint32_t end)
-{
+static uint32_t faces_at(const struct plain *p, uint32_t first, uint32_t end) {
     uint32_t n = 0;
     for (uint32_t i = 0; i < p->count; i++)
         n += p->face[i][0] >= first && p->face[i][0] < end;
@@ -54,8 +50,7 @@ static uint32_t faces_at(const struct plain *p, uint32_t first, uint32_t end)
 }
 
 /* Whether a face that is held shares an edge at the key. */
-static bool meets_held(const struct plain *p, uint32_t i)
-{
+static bool meets_held(const struct plain *p, uint32_t i) {
     const uint32_t *f = p->face[i];
     for (uint32_t k = 0; k < p->count; k++) {
         const uint32_t *g = p->face[k];
@@ -67,8 +62,7 @@ static bool meets_held(const struct plain *p, uint32_t i)
 }
 
 /* Faces at a vertex that can be taken, or that can be held as well. */
-static uint32_t free_at(const struct plain *p, uint32_t v, bool apart)
-{
+static uint32_t free_at(const struct plain *p, uint32_t v, bool apart) {
     uint32_t n = 0;
     for (uint32_t i = 0; i < p->count; i++)
         n += p->face[i][0] == v && p->face[i][3] == 0 &&
@@ -76,8 +70,7 @@ static uint32_t free_at(const struct plain *p, uint32_t v, bool apart)
     return n;
 }
 
-static uint32_t held_of(const struct plain *p)
-{
+static uint32_t held_of(const struct plain *p) {
     uint32_t n = 0;
     for (uint32_t i = 0; i < p->count; i++)
         n += p->face[i][3] != 0;
@@ -85,8 +78,7 @@ static uint32_t held_of(const struct plain *p)
 }
 
 static uint8_t *open_list(struct incode_afl *afl, uint32_t faces,
-                          uint32_t bricks)
-{
+                          uint32_t bricks) {
     size_t bytes = incode_afl_bytes(faces, bricks);
     uint8_t *memory = aligned_alloc(64, (bytes + GUARD + 63) / 64 * 64);
     assert_non_null(memory);
@@ -95,8 +87,7 @@ static uint8_t *open_list(struct incode_afl *afl, uint32_t faces,
     return memory;
 }
 
-static void close_list(uint8_t *memory, uint32_t faces, uint32_t bricks)
-{
+static void close_list(uint8_t *memory, uint32_t faces, uint32_t bricks) {
     size_t bytes = incode_afl_bytes(faces, bricks);
     for (size_t i = bytes; i < bytes + GUARD; i++)
         assert_int_equal(memory[i], 0xa5);
@@ -104,8 +95,7 @@ static void close_list(uint8_t *memory, uint32_t faces, uint32_t bricks)
 }
 
 /* What is known of every brick agrees with the faces. */
-static void compare(const struct incode_afl *afl, const struct plain *p)
-{
+static void compare(const struct incode_afl *afl, const struct plain *p) {
     assert_int_equal(afl->count, p->count);
     assert_int_equal(afl->count_max, p->most);
     assert_int_equal(afl->held_count, held_of(p));
@@ -124,13 +114,11 @@ static void compare(const struct incode_afl *afl, const struct plain *p)
 }
 
 /* A vertex of few bricks, so that faces meet their twins. */
-static uint32_t draw_vertex(void)
-{
+static uint32_t draw_vertex(void) {
     return draw(BRICKS) * INCODE_BRICK_POINTS + draw(2);
 }
 
-static void toggle_one(struct incode_afl *afl, struct plain *p)
-{
+static void toggle_one(struct incode_afl *afl, struct plain *p) {
     uint32_t f[3];
     if (p->count > 0 && draw(8) < 3) { /* the twin of an open one */
         uint32_t i = draw(p->count);
@@ -159,8 +147,7 @@ static void toggle_one(struct incode_afl *afl, struct plain *p)
     p->most = p->count > p->most ? p->count : p->most;
 }
 
-static void take_some(struct incode_afl *afl, struct plain *p)
-{
+static void take_some(struct incode_afl *afl, struct plain *p) {
     uint32_t v = draw_vertex(), pairs[8][2], limit = draw(8) + 1;
     uint32_t n = free_at(p, v, false);
     bool more = true;
@@ -175,8 +162,7 @@ static void take_some(struct incode_afl *afl, struct plain *p)
         assert_int_equal(entry->pending >> (v % INCODE_BRICK_POINTS) & 1, 0);
 }
 
-static void hold_some(struct incode_afl *afl, struct plain *p)
-{
+static void hold_some(struct incode_afl *afl, struct plain *p) {
     uint32_t v = draw_vertex(), pairs[8][2], limit = draw(8) + 1;
     uint32_t n = incode_afl_hold(afl, v, pairs, limit);
     for (uint32_t i = 0; i < n; i++) {
@@ -190,8 +176,7 @@ static void hold_some(struct incode_afl *afl, struct plain *p)
         assert_int_equal(free_at(p, v, true), 0);
 }
 
-static void hold_one(struct incode_afl *afl, struct plain *p)
-{
+static void hold_one(struct incode_afl *afl, struct plain *p) {
     uint32_t none[3] = {draw_vertex(), 9, 9};
     assert_false(incode_afl_hold_face(afl, none[0], none[1], none[2]));
     if (p->count == 0)
@@ -201,8 +186,7 @@ static void hold_one(struct incode_afl *afl, struct plain *p)
     f[3] = 1;
 }
 
-static void let_go(struct incode_afl *afl, struct plain *p)
-{
+static void let_go(struct incode_afl *afl, struct plain *p) {
     uint32_t v = draw_vertex(), held = 0;
     for (uint32_t i = 0; i < p->count; i++) {
         held += p->face[i][0] == v && p->face[i][3] != 0;
@@ -212,8 +196,7 @@ static void let_go(struct incode_afl *afl, struct plain *p)
     assert_int_equal(incode_afl_let_go(afl, v), held);
 }
 
-static void drop_one(struct incode_afl *afl, const struct plain *p)
-{
+static void drop_one(struct incode_afl *afl, const struct plain *p) {
     uint32_t brick = draw(BRICKS), first = brick * INCODE_BRICK_POINTS;
     if (faces_at(p, first, first + INCODE_BRICK_POINTS) > 0)
         return;
@@ -221,8 +204,7 @@ static void drop_one(struct incode_afl *afl, const struct plain *p)
     assert_null(incode_afl_find(afl, brick));
 }
 
-static void against_plain(void **unused)
-{
+static void against_plain(void **unused) {
     (void)unused;
     for (uint32_t round = 0; round < 4; round++) {
         struct incode_afl afl;
@@ -257,8 +239,7 @@ static void against_plain(void **unused)
 }
 
 /* To the last face and the last brick, and back. */
-static void full(void **unused)
-{
+static void full(void **unused) {
     (void)unused;
     static const uint32_t sizes[][2] = {
         {1, 1}, {2, 1}, {3, 5}, {64, 32}, {100, 100}};
@@ -287,8 +268,7 @@ static void full(void **unused)
 }
 
 /* A long list is noticed, once, and not before it is long. */
-static void crowded(void **unused)
-{
+static void crowded(void **unused) {
     (void)unused;
     enum { MANY = 1024 };
     struct incode_afl afl;
@@ -312,8 +292,7 @@ static void crowded(void **unused)
 /* Where a vertex has thousands of faces, as it does when all hubs are in use,
  * lending some of them takes a look or two at each; and all are lent in the
  * end. */
-static void held_of_a_long_list(void **unused)
-{
+static void held_of_a_long_list(void **unused) {
     (void)unused;
     enum { MANY = 6000, LIMIT = 96 };
     struct incode_afl afl;
@@ -341,8 +320,7 @@ static void held_of_a_long_list(void **unused)
 /* Where hubs do not help, one vertex after another gets thousands of faces: a
  * search looks at few of them, as do all that close them; and take, tell and
  * let go miss none. */
-static void searches_of_long_lists(void **unused)
-{
+static void searches_of_long_lists(void **unused) {
     (void)unused;
     enum { MANY = 6000, VERTICES = 3 * INCODE_AFL_WIDE, LIMIT = 96 };
     struct incode_afl afl;
@@ -380,8 +358,7 @@ static void searches_of_long_lists(void **unused)
 
 /* Ways through lists of 0, 1 and 3 faces end in that order, and change nothing;
  * one of them leads past every face of its list. */
-static void fetched_lists(void **context)
-{
+static void fetched_lists(void **context) {
     (void)context;
     enum { LISTS = 3 };
     static const uint32_t faces[LISTS] = {0, 3, 1}, left[] = {2, 1, 1, 0, 0};
@@ -408,8 +385,7 @@ static void fetched_lists(void **context)
     free(memory);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(against_plain),
         cmocka_unit_test(full),

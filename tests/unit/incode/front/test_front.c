@@ -43,8 +43,7 @@ struct world {
     uint64_t kept;
 };
 
-static bool by_chance(struct world *w, uint32_t one_in)
-{
+static bool by_chance(struct world *w, uint32_t one_in) {
     if (w->chance == 0)
         return false;
     w->chance ^= w->chance << 13;
@@ -53,21 +52,18 @@ static bool by_chance(struct world *w, uint32_t one_in)
     return (w->chance >> 32) % one_in == 0;
 }
 
-static const double *at(const struct world *w, uint32_t v)
-{
+static const double *at(const struct world *w, uint32_t v) {
     return w->points.xyz + 3 * (size_t)v;
 }
 
 /* ---- outside ---- */
 
-static size_t emit_room(void *context)
-{
+static size_t emit_room(void *context) {
     return by_chance(context, 8) ? 3 : by_chance(context, 2) ? 20 : 4096;
 }
 
 static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count)
-{
+                 size_t count) {
     struct world *w = context;
     struct host_error error = {0};
     uint32_t(*v)[4] = host_tetrahedra_room(&w->got, count, &error);
@@ -85,16 +81,15 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
     host_tetrahedra_keep(&w->got, count);
 }
 
-static void commit(void *context, uint32_t brick)
-{
+static void commit(void *context, uint32_t brick) {
     struct world *w = context;
     assert_in_range(brick, w->front.job.first, w->front.job.last - 1);
     assert_false(w->committed[brick]);
     w->committed[brick] = true;
 }
 
-static bool spill(void *context, const struct incode_face *faces, size_t count)
-{
+static bool spill(void *context, const struct incode_face *faces,
+                  size_t count) {
     struct world *w = context;
     if (by_chance(w, 4))
         return false;
@@ -106,8 +101,7 @@ static bool spill(void *context, const struct incode_face *faces, size_t count)
     return true;
 }
 
-static bool unspill(void *context, uint32_t brick)
-{
+static bool unspill(void *context, uint32_t brick) {
     struct world *w = context;
     if (by_chance(w, 4))
         return false;
@@ -117,8 +111,7 @@ static bool unspill(void *context, uint32_t brick)
 }
 
 /* Gives the brick that is wanted back. */
-static bool return_spilled(struct world *w)
-{
+static bool return_spilled(struct world *w) {
     uint32_t brick = w->wanted;
     size_t left = 0;
     if (brick == INCODE_NONE)
@@ -145,8 +138,7 @@ struct answer {
 };
 
 static struct answer answer_of(const struct world *w, uint32_t a, uint32_t b,
-                               uint32_t c)
-{
+                               uint32_t c) {
     const uint32_t f[3] = {a, b, c};
     uint32_t apex = oracle_apex(&w->oracle, f);
     return (struct answer){{a, b, c, apex},
@@ -155,8 +147,7 @@ static struct answer answer_of(const struct world *w, uint32_t a, uint32_t b,
 }
 
 /* Any tetrahedron at a vertex, turned so that it comes first. */
-static bool run_seed(struct world *w, uint32_t v)
-{
+static bool run_seed(struct world *w, uint32_t v) {
     if (incode_front_is_reached(&w->front, v))
         return true;
     if (by_chance(w, 4))
@@ -178,8 +169,7 @@ static bool run_seed(struct world *w, uint32_t v)
 }
 
 /* False: an answer is not there. */
-static bool run_star(struct world *w, uint32_t v)
-{
+static bool run_star(struct world *w, uint32_t v) {
     /* Whatever a hint says, it comes back with its vertex. */
     struct incode_star_face face;
     bool all = true;
@@ -210,8 +200,7 @@ static bool run_star(struct world *w, uint32_t v)
     return all;
 }
 
-static bool run_face(struct world *w, unsigned task, uint32_t v)
-{
+static bool run_face(struct world *w, unsigned task, uint32_t v) {
     uint32_t *f = w->asked[task];
     if (!w->asks[task] && !incode_front_face(&w->front, v, f))
         return true;
@@ -224,8 +213,7 @@ static bool run_face(struct world *w, unsigned task, uint32_t v)
     return true;
 }
 
-static void run(struct world *w, unsigned task)
-{
+static void run(struct world *w, unsigned task) {
     uint32_t v = w->front.task[task].v;
     bool done;
     incode_front_run(&w->front, UINT32_MAX);
@@ -241,14 +229,12 @@ static void run(struct world *w, unsigned task)
 
 /* ---- jobs ---- */
 
-static uint32_t count_of(const struct world *w, uint32_t brick)
-{
+static uint32_t count_of(const struct world *w, uint32_t brick) {
     uint64_t left = w->points.count - (uint64_t)brick * INCODE_BRICK_POINTS;
     return left < INCODE_BRICK_POINTS ? (uint32_t)left : INCODE_BRICK_POINTS;
 }
 
-static enum incode_turn step(struct world *w)
-{
+static enum incode_turn step(struct world *w) {
     uint32_t task = 0;
     uint32_t waiting = by_chance(w, 2) ? (uint32_t)w->chance : 0;
     enum incode_turn turn = incode_front_turn(&w->front, waiting, &task);
@@ -267,8 +253,7 @@ static enum incode_turn step(struct world *w)
     return turn;
 }
 
-static void do_job(struct world *w, const struct incode_job *job)
-{
+static void do_job(struct world *w, const struct incode_job *job) {
     uint32_t idle = 0, steps = 0;
     memset(w->committed, 0, w->bricks * sizeof *w->committed);
     incode_front_start(&w->front, job);
@@ -307,15 +292,13 @@ static void do_job(struct world *w, const struct incode_job *job)
     assert_int_equal(w->wanted, INCODE_NONE);
 }
 
-static int by_x(const void *a, const void *b)
-{
+static int by_x(const void *a, const void *b) {
     return incode_lexicographic(a, b);
 }
 
 /* A vertex's number is its row: along x, or, for a hub, at random, with the hub
  * after a third of the others. */
-static void number(struct host_points *points, bool hub)
-{
+static void number(struct host_points *points, bool hub) {
     double first[3], *third = points->xyz + points->count / 3 * 3;
     if (!hub) {
         qsort(points->xyz, points->count, sizeof first, by_x);
@@ -326,8 +309,7 @@ static void number(struct host_points *points, bool hub)
     memcpy(third, first, sizeof first);
 }
 
-static void open_world(struct world *w, const char *kind, uint64_t n)
-{
+static void open_world(struct world *w, const char *kind, uint64_t n) {
     const struct incode_front_share share = {INCODE_FACES_MIN,
                                              INCODE_ENTRIES_MIN};
     const struct incode_front_outside outside = {w,      emit_room, emit,
@@ -354,8 +336,7 @@ static void open_world(struct world *w, const char *kind, uint64_t n)
                       &outside, NULL);
 }
 
-static void close_world(struct world *w)
-{
+static void close_world(struct world *w) {
     for (size_t i = 0; i < GUARD; i++)
         assert_int_equal(w->memory[w->bytes + i], 0xa5);
     host_tetrahedra_free(&w->known);
@@ -368,8 +349,7 @@ static void close_world(struct world *w)
 }
 
 /* Region after region of the set, by one front; the whole must come of it. */
-static void triangulate(struct world *w)
-{
+static void triangulate(struct world *w) {
     struct host_digest known, got;
     for (uint32_t r = 0; r < w->regions; r++) {
         struct incode_job job = {.first = w->bricks * r / w->regions,
@@ -392,8 +372,7 @@ static void triangulate(struct world *w)
 
 /* ---- tests ---- */
 
-static void sets(void **unused)
-{
+static void sets(void **unused) {
     (void)unused;
     static const char *const kinds[] = {"uniform", "bubbles", "grid", "sphere",
                                         "hub"};
@@ -412,8 +391,7 @@ static void sets(void **unused)
 }
 
 /* Little may be open at a time: the rest goes out and comes back in order. */
-static void spilling(void **unused)
-{
+static void spilling(void **unused) {
     (void)unused;
     for (uint32_t k = 0; k < 16; k++) {
         struct world w = {.regions = k & 1 ? 2 : 1,
@@ -430,8 +408,7 @@ static void spilling(void **unused)
 }
 
 /* A vertex with a list far longer than a star holds at hand. */
-static void hub(void **unused)
-{
+static void hub(void **unused) {
     (void)unused;
     for (uint32_t k = 0; k < 4; k++) {
         struct world w = {.regions = k & 1 ? 2 : 1, .chance = k & 2 ? 5 : 0};
@@ -443,8 +420,7 @@ static void hub(void **unused)
 }
 
 /* A job that is abandoned midway leaves nothing behind. */
-static void abandoned(void **unused)
-{
+static void abandoned(void **unused) {
     (void)unused;
     struct world w = {.regions = 1, .chance = 9};
     open_world(&w, "uniform", 300);
@@ -465,8 +441,7 @@ static void abandoned(void **unused)
 }
 
 /* Nothing was asked for that it does not ask for. */
-static void refusals(void **unused)
-{
+static void refusals(void **unused) {
     (void)unused;
     struct world w = {.regions = 1};
     uint32_t task;
@@ -480,8 +455,7 @@ static void refusals(void **unused)
 }
 
 /* Of four corners, however they are turned, one is the owner. */
-static void one_owner(void **unused)
-{
+static void one_owner(void **unused) {
     (void)unused;
     static const double corner[4][3] = {
         {1, -2, 7}, {1, -2, 6}, {1, 3, -9}, {2, -9, -9}};
@@ -500,8 +474,7 @@ static void one_owner(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sets),     cmocka_unit_test(spilling),
         cmocka_unit_test(hub),      cmocka_unit_test(abandoned),

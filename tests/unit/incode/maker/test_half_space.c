@@ -20,23 +20,20 @@
 
 static uint64_t state;
 
-static double draw(void)
-{
+static double draw(void) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
     return (double)(state >> 11) * 0x1p-53;
 }
 
-static size_t below(size_t n)
-{
+static size_t below(size_t n) {
     return (size_t)(draw() * (double)n);
 }
 
 /* A lattice of side x side points in a plane that no axis is parallel to: each
  * coordinate is rounded, so the plane is rough in the last place. */
-static size_t lattice(double (*p)[3], size_t side, double size)
-{
+static size_t lattice(double (*p)[3], size_t side, double size) {
     static const double u[3] = {20, 20, -10}, v[3] = {-4, 22, 20};
     size_t n = 0;
     for (size_t i = 0; i < side; i++) {
@@ -51,8 +48,7 @@ static size_t lattice(double (*p)[3], size_t side, double size)
 
 /* A random face of four points near each other, the last beyond it. */
 static bool draw_face(const double *f[4], double (*p)[3], size_t n, size_t near,
-                      struct incode_tally *tally)
-{
+                      struct incode_tally *tally) {
     size_t at = below(n - near);
     for (int i = 0; i < 4; i++) {
         f[i] = p[at + below(near)];
@@ -62,8 +58,7 @@ static bool draw_face(const double *f[4], double (*p)[3], size_t n, size_t near,
 }
 
 static bool in_ball(const struct incode_ball *ball, const double v[3],
-                    const double p[3], double scale)
-{
+                    const double p[3], double scale) {
     double square = 0;
     for (int d = 0; d < 3; d++) {
         double gap = (p[d] - v[d]) * scale - ball->centre[d];
@@ -72,9 +67,9 @@ static bool in_ball(const struct incode_ball *ball, const double v[3],
     return sqrt(square) <= ball->radius;
 }
 
-static struct incode_half_space
-half_space_of(const double *const f[4], double (*p)[3], size_t n, double scale)
-{
+static struct incode_half_space half_space_of(const double *const f[4],
+                                              double (*p)[3], size_t n,
+                                              double scale) {
     struct incode_half_space s = {.scale = scale};
     double b[3], c[3];
     for (int d = 0; d < 3; d++) {
@@ -94,8 +89,7 @@ half_space_of(const double *const f[4], double (*p)[3], size_t n, double scale)
     return s;
 }
 
-static void ball_on_a_rough_plane(void **unused)
-{
+static void ball_on_a_rough_plane(void **unused) {
     enum { SIDE = 24, POINTS = SIDE * SIDE };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
@@ -143,8 +137,7 @@ static void ball_on_a_rough_plane(void **unused)
 
 /* Four points of a square of the lattice: in double precision their determinant
  * may cancel to nothing at all, and in twice the precision must not. */
-static void spheres_of_rough_squares(void **unused)
-{
+static void spheres_of_rough_squares(void **unused) {
     enum { SIDE = 24, POINTS = SIDE * SIDE };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
@@ -182,8 +175,7 @@ static void spheres_of_rough_squares(void **unused)
 /* The pencil of the face (0, b, c), but for its size; false: the square of the
  * face's sine is no more than `least`, by the maximum norm. */
 static bool set_pencil(struct incode_pencil *pencil, const double b[3],
-                       const double c[3], double least)
-{
+                       const double c[3], double least) {
     double n[3], cn[3], nb[3];
     incode_cross(n, b, c);
     double nn = incode_dot(n, n);
@@ -202,8 +194,7 @@ static bool set_pencil(struct incode_pencil *pencil, const double b[3],
 }
 
 /* The places of points in a pencil against the predicates. */
-static void places_in_a_pencil(void **unused)
-{
+static void places_in_a_pencil(void **unused) {
     struct incode_tally tally = {0};
     size_t compared = 0;
     (void)unused;
@@ -242,8 +233,7 @@ static void places_in_a_pencil(void **unused)
 
 /* The first of the local points, in float: none that is left out may come
  * before the bound. */
-static void first_of_the_local_points(void **unused)
-{
+static void first_of_the_local_points(void **unused) {
     static struct incode_local_points g;
     static const double lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1};
     uint16_t out[INCODE_NEAR_ALL];
@@ -294,8 +284,7 @@ static void first_of_the_local_points(void **unused)
 
 /* The point that comes first by the predicates alone, or NULL. */
 static const double *first_of(const double *const f[3], const double *const *p,
-                              size_t n, struct incode_tally *tally)
-{
+                              size_t n, struct incode_tally *tally) {
     const double *first = NULL;
     for (size_t i = 0; i < n; i++) {
         if (incode_orient3d(tally, f[0], f[1], f[2], p[i]) > 0 &&
@@ -309,8 +298,7 @@ static const double *first_of(const double *const f[3], const double *const *p,
 
 /* A random face of a cubic lattice that is turned and rounded, and the other
  * corners of its cell: all on one sphere but for the rounding. */
-static void close_candidates_of_a_rough_lattice(void **unused)
-{
+static void close_candidates_of_a_rough_lattice(void **unused) {
     static const double turn[3][3] = {
         {20, 20, -10}, {-4, 22, 20}, {22, -4, 20}};
     struct incode_tally tally = {0};
@@ -356,8 +344,7 @@ static void close_candidates_of_a_rough_lattice(void **unused)
 
 /* A tetrahedron of n points on a facet of their hull: its sphere is empty. */
 static void draw_empty(const double *t[4], double (*p)[3], size_t n,
-                       struct incode_tally *tally)
-{
+                       struct incode_tally *tally) {
     const double *others[64];
     size_t count;
     do {
@@ -377,8 +364,7 @@ static void draw_empty(const double *t[4], double (*p)[3], size_t n,
 
 /* Points on a sphere up to rounding: what a radical plane rules out is outside.
  */
-static void radical_bounds_on_a_rough_sphere(void **unused)
-{
+static void radical_bounds_on_a_rough_sphere(void **unused) {
     enum { POINTS = 24 };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
@@ -435,8 +421,7 @@ static void radical_bounds_on_a_rough_sphere(void **unused)
 
 /* A sphere of much larger scale: what a radical plane by it rules out is
  * outside, and where the products leave the range of doubles there is none. */
-static void radical_bounds_across_scales(void **unused)
-{
+static void radical_bounds_across_scales(void **unused) {
     struct incode_tally tally = {0};
     size_t set = 0, out = 0;
     (void)unused;
@@ -476,8 +461,7 @@ static void radical_bounds_across_scales(void **unused)
 
 /* A point so near the vertex that their difference is lost when it is scaled:
  * where it lies in the pencil is not known, so it lessens nothing. */
-static void a_difference_that_vanishes(void **unused)
-{
+static void a_difference_that_vanishes(void **unused) {
     (void)unused;
     const double v[3] = {0, 0, 0}, b[3] = {0x1p60, 0, 0}, c[3] = {0, 0x1p60, 0};
     const double near[3] = {0, 0, 0x1p-1060}, within[3] = {0x1p58, 0x1p58, 1};
@@ -494,8 +478,7 @@ static void a_difference_that_vanishes(void **unused)
 
 /* A face so small beside its units that products vanish: the sphere's centre is
  * lost, and a box that holds the sphere may hold the apex. */
-static void a_sphere_that_vanishes(void **unused)
-{
+static void a_sphere_that_vanishes(void **unused) {
     (void)unused;
     for (int power = -1074; power < 0; power++) {
         double size = ldexp(1, power);
@@ -519,8 +502,7 @@ static void a_sphere_that_vanishes(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(ball_on_a_rough_plane),
         cmocka_unit_test(spheres_of_rough_squares),

@@ -7,8 +7,7 @@
 /* Bricks that are reached, or pages above that have no box of their own for
  * what is beneath. */
 static void mark(const struct scene *s, const struct reached *r, bool full,
-                 uint16_t *where)
-{
+                 uint16_t *where) {
     const struct incode_tree *tree = &s->order.tree;
     for (uint32_t b = 0; b < tree->bricks; b++)
         where[b] = NO_BOX;
@@ -33,8 +32,7 @@ static void mark(const struct scene *s, const struct reached *r, bool full,
 }
 
 /* No coordinate in a box is beyond its farness, of which errors are parts. */
-static void check_far(const struct incode_horizon *h)
-{
+static void check_far(const struct incode_horizon *h) {
     for (uint32_t i = 0; i < h->count; i++) {
         for (int d = 0; d < 3; d++) {
             assert_true(h->lo[d][i] <= h->hi[d][i]);
@@ -47,8 +45,7 @@ static void check_far(const struct incode_horizon *h)
 /* in: the points of each brick that are in the cap, one bit each.  False: there
  * was no room to look into all pages. */
 static bool check_cap(struct scene *s, const struct incode_horizon_cap *cap,
-                      const uint64_t *in, const char *what)
-{
+                      const uint64_t *in, const char *what) {
     const done_boxes none = {0};
     struct reached r;
     bool full = !split_all(s, cap);
@@ -85,8 +82,7 @@ struct face {
 
 /* A vertex of the set: of the horizon's brick, of one that is listed, or
  * anywhere. */
-static uint32_t draw_near(const struct scene *s)
-{
+static uint32_t draw_near(const struct scene *s) {
     double chance = draw();
     uint32_t brick = s->h->centre;
     if (chance < 0.3) {
@@ -99,8 +95,7 @@ static uint32_t draw_near(const struct scene *s)
 }
 
 /* False: it is no face, or nothing is beyond it. */
-static bool draw_face(struct scene *s, struct face *f)
-{
+static bool draw_face(struct scene *s, struct face *f) {
     double *const p[4] = {f->v, f->b, f->c, f->a};
     double extent = 0;
     for (int i = 0; i < 4; i++) {
@@ -122,23 +117,20 @@ static bool draw_face(struct scene *s, struct face *f)
     return side != 0;
 }
 
-static void relative(double r[3], const struct face *f, const double p[3])
-{
+static void relative(double r[3], const struct face *f, const double p[3]) {
     for (int d = 0; d < 3; d++)
         r[d] = (p[d] - f->v[d]) * f->scale;
 }
 
 /* Errors vanish among the roundings to single precision. */
-static bool is_sure(const double a[3], const double bound[3])
-{
+static bool is_sure(const double a[3], const double bound[3]) {
     return INCODE_SPHERE_EPS * incode_max_norm(bound) <
            0x1p-26 * incode_max_norm(a);
 }
 
 /* That of the face's sphere or, without an apex, of all its spheres. */
 static bool face_cap(const struct scene *s, const struct face *f, bool apex,
-                     struct incode_horizon_cap *cap)
-{
+                     struct incode_horizon_cap *cap) {
     struct incode_sphere q;
     double b[3], c[3], a[3];
     relative(b, f, f->b);
@@ -159,8 +151,7 @@ static bool face_cap(const struct scene *s, const struct face *f, bool apex,
 
 /* What is beyond the face and inside its sphere, ties included. */
 static uint64_t points_of_face(struct scene *s, const struct face *f, bool apex,
-                               uint32_t brick)
-{
+                               uint32_t brick) {
     uint64_t in = 0;
     for (uint32_t slot = 0; slot < s->order.fill[brick]; slot++) {
         uint32_t id = brick * INCODE_BRICK_POINTS + slot;
@@ -180,8 +171,7 @@ static uint64_t points_of_face(struct scene *s, const struct face *f, bool apex,
 
 /* A sphere of any radius from far below to far above the horizon's, or a
  * half-space. */
-static void draw_ball(const struct scene *s, struct ball *q)
-{
+static void draw_ball(const struct scene *s, struct ball *q) {
     double radius = ldexp(1, (int)below(50) - 15),
            any = ldexp(1, (int)below(99));
     host_vertex(&s->order, draw_near(s), q->v);
@@ -199,8 +189,7 @@ static void draw_ball(const struct scene *s, struct ball *q)
 }
 
 static bool ball_cap(const struct scene *s, const struct ball *q,
-                     struct incode_horizon_cap *cap)
-{
+                     struct incode_horizon_cap *cap) {
     if (!incode_horizon_cap(s->h, cap, q->v, q->scale, q->m, q->det, q->n))
         return false;
     if (q->radical.set)
@@ -217,8 +206,7 @@ struct tried {
 };
 
 static void try_cap(struct scene *s, uint64_t *in, const char *name,
-                    struct tried *tried)
-{
+                    struct tried *tried) {
     struct incode_horizon_cap cap;
     struct face f;
     struct ball q;
@@ -243,8 +231,7 @@ static void try_cap(struct scene *s, uint64_t *in, const char *name,
 
 /* The walk down the tree, with what it knows of boxes: by the sphere of the
  * best so far, as a box and a ball or not. */
-static void try_walk(struct scene *s, const char *name, struct tried *tried)
-{
+static void try_walk(struct scene *s, const char *name, struct tried *tried) {
     struct face f;
     struct seen seen = {{0}};
     struct incode_query q = {.question = INCODE_QUERY_APEX,
@@ -279,8 +266,7 @@ static void try_walk(struct scene *s, const char *name, struct tried *tried)
 }
 
 static void check_set(making *make, const char *name, uint32_t n,
-                      uint32_t horizons, struct tried *tried)
-{
+                      uint32_t horizons, struct tried *tried) {
     struct scene s;
     open_scene(&s, make, n);
     uint64_t *in = malloc(s.order.bricks * sizeof *in);
@@ -296,8 +282,7 @@ static void check_set(making *make, const char *name, uint32_t n,
     close_scene(&s);
 }
 
-static void no_point_is_lost(void **unused)
-{
+static void no_point_is_lost(void **unused) {
     (void)unused;
     static const struct {
         making *make;
@@ -329,8 +314,7 @@ static void no_point_is_lost(void **unused)
 }
 
 /* More bricks than there is room for boxes; three levels of box pages. */
-static void no_point_is_lost_where_it_is_full(void **unused)
-{
+static void no_point_is_lost_where_it_is_full(void **unused) {
     (void)unused;
     struct tried tried = {0};
     check_set(terrain, "large terrain", 70000, 1, &tried);
@@ -338,8 +322,7 @@ static void no_point_is_lost_where_it_is_full(void **unused)
 }
 
 /* Planes through the horizon, of sets in which most is beyond all bounds. */
-static void half_spaces_hold_what_is_far(void **unused)
-{
+static void half_spaces_hold_what_is_far(void **unused) {
     (void)unused;
     struct scene s;
     open_scene(&s, all_scales, 2000);
@@ -363,8 +346,7 @@ static void half_spaces_hold_what_is_far(void **unused)
     close_scene(&s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_point_is_lost),
         cmocka_unit_test(no_point_is_lost_where_it_is_full),

@@ -6,15 +6,13 @@
 
 /* All points but the vertex, or those on one side of its plane. */
 static void half_space(const struct scene *s, uint32_t v, const double m[3],
-                       struct incode_horizon_cap *cap)
-{
+                       struct incode_horizon_cap *cap) {
     double pv[3];
     host_vertex(&s->order, v, pv);
     assert_true(incode_horizon_cap(s->h, cap, pv, s->h->scale, m, 0, m));
 }
 
-static void a_missing_page_is_named(void **unused)
-{
+static void a_missing_page_is_named(void **unused) {
     (void)unused;
     struct scene s;
     uint32_t missing = 0, waits = 0, brick;
@@ -64,8 +62,7 @@ static void a_missing_page_is_named(void **unused)
     close_scene(&s);
 }
 
-static void too_many_bricks_are_told(void **unused)
-{
+static void too_many_bricks_are_told(void **unused) {
     (void)unused;
     struct scene s;
     uint32_t missing, brick = 7;
@@ -81,8 +78,7 @@ static void too_many_bricks_are_told(void **unused)
 }
 
 /* What is done is not reached, and all else is. */
-static void what_is_done_is_left_out(void **unused)
-{
+static void what_is_done_is_left_out(void **unused) {
     (void)unused;
     struct scene s;
     const double up[3] = {0.1, 0.2, 1};
@@ -114,8 +110,7 @@ static void what_is_done_is_left_out(void **unused)
 /* ---- copies ---- */
 
 /* As many copies as there is room for, no two the same. */
-static void check_copies(const struct incode_horizon *h)
-{
+static void check_copies(const struct incode_horizon *h) {
     bool taken[COPIES] = {false};
     for (uint32_t i = 0; i < h->count; i++) {
         uint32_t copy = h->copy[i];
@@ -126,8 +121,7 @@ static void check_copies(const struct incode_horizon *h)
     }
 }
 
-static void copies_give_way(void **unused)
-{
+static void copies_give_way(void **unused) {
     (void)unused;
     struct scene s;
     const double up[3] = {0.1, 0.2, 1}, down[3] = {-0.1, -0.2, -1};
@@ -165,8 +159,7 @@ static void copies_give_way(void **unused)
 
 /* ---- by a box ---- */
 
-static void a_box_misses_no_leaf(void **unused)
-{
+static void a_box_misses_no_leaf(void **unused) {
     (void)unused;
     static making *const sets[] = {volume, tiny_cluster, large, denormal};
     for (size_t k = 0; k < sizeof sets / sizeof *sets; k++) {
@@ -205,8 +198,7 @@ static void a_box_misses_no_leaf(void **unused)
 
 /* Bricks that the ball of some radius reaches which touches the unit sphere at
  * a vertex, from within (side 1) or from without (-1); on average. */
-static double touched(struct scene *s, double radius, double side)
-{
+static double touched(struct scene *s, double radius, double side) {
     uint32_t tries = 60, bricks = 0;
     for (uint32_t i = 0; i < tries; i++) {
         struct incode_horizon_cap cap;
@@ -228,8 +220,7 @@ static double touched(struct scene *s, double radius, double side)
     return (double)bricks / tries;
 }
 
-static void a_cap_beside_a_surface_reaches_little(void **unused)
-{
+static void a_cap_beside_a_surface_reaches_little(void **unused) {
     (void)unused;
     static const struct {
         double radius, side, most; /* twice what was counted */
@@ -244,8 +235,7 @@ static void a_cap_beside_a_surface_reaches_little(void **unused)
     close_scene(&s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_missing_page_is_named),
         cmocka_unit_test(too_many_bricks_are_told),

@@ -33,8 +33,7 @@ struct bench {
     uint64_t waits;
 };
 
-static uint32_t draw(struct bench *b, uint32_t below)
-{
+static uint32_t draw(struct bench *b, uint32_t below) {
     b->chance ^= b->chance << 13;
     b->chance ^= b->chance >> 7;
     b->chance ^= b->chance << 17;
@@ -43,8 +42,7 @@ static uint32_t draw(struct bench *b, uint32_t below)
 
 /* ---- pages ---- */
 
-static bool request(void *context, uint32_t page)
-{
+static bool request(void *context, uint32_t page) {
     struct bench *b = context;
     if (b->pages == QUEUE || (b->chance != 0 && draw(b, 4) == 0))
         return false;
@@ -55,8 +53,7 @@ static bool request(void *context, uint32_t page)
 }
 
 /* One of the pages under way comes. */
-static void deliver(struct bench *b)
-{
+static void deliver(struct bench *b) {
     uint8_t page[INCODE_PAGE_BYTES];
     if (b->pages == 0)
         return;
@@ -69,8 +66,7 @@ static void deliver(struct bench *b)
 
 /* ---- the bench ---- */
 
-static int by_first(const void *a, const void *b)
-{
+static int by_first(const void *a, const void *b) {
     const uint32_t *f = a, *g = b;
     return f[0] != g[0] ? (f[0] > g[0]) - (f[0] < g[0])
                         : memcmp(f, g, 3 * sizeof *f);
@@ -78,8 +74,7 @@ static int by_first(const void *a, const void *b)
 
 /* The faces of one tetrahedron in `every`, and all of the hull from within and
  * from without. */
-static void list_faces(struct bench *b, uint32_t every)
-{
+static void list_faces(struct bench *b, uint32_t every) {
     const struct host_tetrahedra *tets = &b->solo.tets;
     b->face = malloc(8 * tets->count * sizeof *b->face);
     assert_non_null(b->face);
@@ -100,8 +95,7 @@ static void list_faces(struct bench *b, uint32_t every)
 }
 
 /* Tetrahedra of rows become such of vertices. */
-static void number_by_vertices(struct solo *s)
-{
+static void number_by_vertices(struct solo *s) {
     uint32_t *vertex = malloc(s->order.rows * sizeof *vertex);
     assert_non_null(vertex);
     for (uint32_t v = 0; v < s->order.bricks * INCODE_BRICK_POINTS; v++)
@@ -112,8 +106,7 @@ static void number_by_vertices(struct solo *s)
 }
 
 static void open_bench(struct bench *b, const struct host_points *set,
-                       enum incode_index index, uint32_t frames)
-{
+                       enum incode_index index, uint32_t frames) {
     b->solo = (struct solo){.index = (uint8_t)index, .regions = 1};
     solo_run(&b->solo, set->xyz, set->count);
     number_by_vertices(&b->solo);
@@ -133,8 +126,7 @@ static void open_bench(struct bench *b, const struct host_points *set,
     incode_maker_init(&b->maker, b->memory, &share, &points, &source, &nobody);
 }
 
-static void close_bench(struct bench *b)
-{
+static void close_bench(struct bench *b) {
     assert_null(b->maker.fault);
     for (size_t i = 0; i < GUARD; i++)
         assert_int_equal(b->memory[b->bytes + i], 0xa5);
@@ -145,8 +137,7 @@ static void close_bench(struct bench *b)
 }
 
 static void check_answer(const struct bench *b, const uint32_t f[3],
-                         const struct incode_answer *a)
-{
+                         const struct incode_answer *a) {
     uint32_t apex = oracle_apex(&b->oracle, f);
     if (a->f[3] != apex)
         fail_msg("(%u, %u, %u): %u, expected %u", f[0], f[1], f[2], a->f[3],
@@ -168,8 +159,7 @@ struct batch {
 };
 
 /* Lets several searches answer some faces each, in turn. */
-static void answer_all(struct bench *b)
-{
+static void answer_all(struct bench *b) {
     static struct batch batch[SLOTS];
     uint32_t next = 0, open = 0, idle = 0;
     memset(batch, 0, sizeof batch);
@@ -209,8 +199,7 @@ static void answer_all(struct bench *b)
 }
 
 static void answer_set(const struct host_points *set, enum incode_index index,
-                       uint64_t chance, uint32_t frames, uint32_t every)
-{
+                       uint64_t chance, uint32_t frames, uint32_t every) {
     struct bench b = {.chance = chance};
     open_bench(&b, set, index, frames);
     list_faces(&b, every);
@@ -222,8 +211,7 @@ static void answer_set(const struct host_points *set, enum incode_index index,
     close_bench(&b);
 }
 
-static void real_sets(void **unused)
-{
+static void real_sets(void **unused) {
     (void)unused;
     static const struct {
         const char *name;
@@ -248,8 +236,7 @@ static void real_sets(void **unused)
     }
 }
 
-static void made_sets(void **unused)
-{
+static void made_sets(void **unused) {
     (void)unused;
     static const char *const kinds[] = {"uniform", "bluntfin", "rotated",
                                         "sphere", "hub"};
@@ -267,15 +254,13 @@ static void made_sets(void **unused)
 
 /* ---- a first tetrahedron, and what else is asked ---- */
 
-static void made(struct host_points *points, uint64_t n)
-{
+static void made(struct host_points *points, uint64_t n) {
     struct host_error error = {0};
     if (host_gen("uniform", n, 2, points, &error) != 0)
         fail_msg("%s", error.text);
 }
 
-static void first_tetrahedra(void **unused)
-{
+static void first_tetrahedra(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct bench b = {.chance = 77};
@@ -300,8 +285,7 @@ static void first_tetrahedra(void **unused)
 }
 
 /* A search that is abandoned anywhere leaves nothing to the next one. */
-static void abandoned(void **unused)
-{
+static void abandoned(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct bench b = {.chance = 5};
@@ -326,8 +310,7 @@ static void abandoned(void **unused)
 }
 
 /* Which searches wait is known, and a page that is fetched ahead is there. */
-static void waiting_and_ahead(void **unused)
-{
+static void waiting_and_ahead(void **unused) {
     (void)unused;
     struct host_points points = {0};
     struct bench b = {.chance = 0};
@@ -375,8 +358,7 @@ static void waiting_and_ahead(void **unused)
 }
 
 /* What fits is what the bytes say. */
-static void memory(void **unused)
-{
+static void memory(void **unused) {
     (void)unused;
     for (size_t bytes = 0; bytes < 3 << 20; bytes += 12345) {
         for (uint32_t copies = 16; copies <= INCODE_HORIZON_COPIES;
@@ -392,8 +374,7 @@ static void memory(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(real_sets),         cmocka_unit_test(made_sets),
         cmocka_unit_test(first_tetrahedra),  cmocka_unit_test(abandoned),

@@ -15,8 +15,7 @@
 
 static uint64_t state = 1;
 
-static double even(void)
-{
+static double even(void) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-52 - 1;
 }
@@ -27,8 +26,7 @@ enum { POINTS = 5 }; /* v, b, c, a and p */
 
 static mpq_t point[POINTS][3], square[POINTS], sum, term, part;
 
-static void start(void)
-{
+static void start(void) {
     for (int i = 0; i < POINTS; i++) {
         mpq_init(square[i]);
         for (int d = 0; d < 3; d++)
@@ -37,8 +35,7 @@ static void start(void)
     mpq_inits(sum, term, part, NULL);
 }
 
-static void stop(void)
-{
+static void stop(void) {
     for (int i = 0; i < POINTS; i++) {
         mpq_clear(square[i]);
         for (int d = 0; d < 3; d++)
@@ -48,8 +45,7 @@ static void stop(void)
 }
 
 /* Relative to the first, and scaled. */
-static void load(double p[POINTS][3], double scale)
-{
+static void load(double p[POINTS][3], double scale) {
     for (int i = POINTS - 1; i >= 0; i--) {
         mpq_set_ui(square[i], 0, 1);
         for (int d = 0; d < 3; d++) {
@@ -65,8 +61,7 @@ static void load(double p[POINTS][3], double scale)
 }
 
 /* term = i . (j x k) */
-static void set_product(int i, int j, int k)
-{
+static void set_product(int i, int j, int k) {
     mpq_set_ui(term, 0, 1);
     for (int d = 0; d < 6; d++) {
         int x = d % 3, y = (x + 1 + d / 3) % 3, z = 3 - x - y;
@@ -77,16 +72,14 @@ static void set_product(int i, int j, int k)
 }
 
 /* sum += sign * square[s] times a product. */
-static void add(int sign, int s, int i, int j, int k)
-{
+static void add(int sign, int s, int i, int j, int k) {
     set_product(i, j, k);
     mpq_mul(term, term, square[s]);
     (sign > 0 ? mpq_add : mpq_sub)(sum, sum, term);
 }
 
 /* m . p - det |p|^2 */
-static void set_sphere(void)
-{
+static void set_sphere(void) {
     mpq_set_ui(sum, 0, 1);
     add(1, 1, 4, 2, 3);
     add(1, 2, 4, 3, 1);
@@ -95,15 +88,13 @@ static void set_sphere(void)
 }
 
 /* n . p */
-static void set_plane(void)
-{
+static void set_plane(void) {
     set_product(4, 1, 2);
     mpq_set(sum, term);
 }
 
 /* |value - sum| <= bound */
-static bool holds(double value, double bound)
-{
+static bool holds(double value, double bound) {
     mpq_set_d(term, value);
     mpq_sub(term, term, sum);
     mpq_abs(term, term);
@@ -115,8 +106,7 @@ static bool holds(double value, double bound)
 
 /* Returns how much smaller the sphere's bound becomes without twice the
  * precision, which leaves no more of a bound than the value. */
-static double check(double p[POINTS][3])
-{
+static double check(double p[POINTS][3]) {
     struct incode_sphere s;
     double r[POINTS][3], extent = 0;
     for (int i = 1; i < POINTS; i++)
@@ -145,8 +135,7 @@ static double check(double p[POINTS][3])
 /* Points of all kinds: drawn freely, or close to the face's vertices and to
  * each other, the last now and then far off.  Returns the share of the former
  * whose bounds become much smaller. */
-static double check_scales(const double axis[3], double offset)
-{
+static double check_scales(const double axis[3], double offset) {
     const int all = emulated() ? 300 : 1500;
     int sharper = 0;
     for (int tries = 0; tries < all; tries++) {
@@ -168,8 +157,7 @@ static double check_scales(const double axis[3], double offset)
     return 3. * sharper / all;
 }
 
-static void bounds_hold(void **unused)
-{
+static void bounds_hold(void **unused) {
     (void)unused;
     static const double axes[][3] = {{1, 1, 1},       {1e6, 1, 1},
                                      {1e6, 1e6, 1},   {1e3, 1, 1e-3},
@@ -183,8 +171,7 @@ static void bounds_hold(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bounds_hold),
     };

@@ -16,8 +16,7 @@
 
 static uint64_t state = 1;
 
-static double draw(void)
-{
+static double draw(void) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-53;
 }
@@ -31,8 +30,7 @@ struct set {
 };
 
 /* Boxes of random corners, one coordinate from `a number`. */
-static void fill(struct set *set, unsigned count, double (*number)(int d))
-{
+static void fill(struct set *set, unsigned count, double (*number)(int d)) {
     set->count = count;
     for (int d = 0; d < 3; d++) {
         set->all_lo[d] = INFINITY;
@@ -47,16 +45,14 @@ static void fill(struct set *set, unsigned count, double (*number)(int d))
     }
 }
 
-static void make(struct incode_boxes *boxes, const struct set *set)
-{
+static void make(struct incode_boxes *boxes, const struct set *set) {
     incode_boxes_init(boxes, set->all_lo, set->all_hi);
     for (unsigned i = 0; i < set->count; i++)
         incode_boxes_set(boxes, i, set->lo[i], set->hi[i]);
 }
 
 /* A page of `count` boxes over as many bricks. */
-static bool is_sound(const struct incode_boxes *boxes, const struct set *set)
-{
+static bool is_sound(const struct incode_boxes *boxes, const struct set *set) {
     struct incode_tree tree;
     incode_tree_init(&tree, set->count, 0);
     return incode_page_is_sound(&tree, set->all_lo, set->all_hi, tree.base[1],
@@ -64,8 +60,7 @@ static bool is_sound(const struct incode_boxes *boxes, const struct set *set)
 }
 
 /* In it and no farther out than rounding to 24 bits of a page's unit. */
-static void check(const struct set *set)
-{
+static void check(const struct set *set) {
     struct incode_boxes boxes;
     double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
     make(&boxes, set);
@@ -94,68 +89,57 @@ static void check(const struct set *set)
     assert_true(is_sound(&boxes, set));
 }
 
-static double ordinary(int d)
-{
+static double ordinary(int d) {
     return d - draw();
 }
 
-static double far_away(int d)
-{
+static double far_away(int d) {
     (void)d;
     return 1e6 + draw();
 }
 
-static double clusters(int d)
-{
+static double clusters(int d) {
     (void)d;
     return rint(draw() * 3) + ldexp(draw(), -(int)(draw() * 60));
 }
 
-static double scales(int d)
-{
+static double scales(int d) {
     (void)d;
     return ldexp(draw() - 0.5, (int)(draw() * 2090) - 1070);
 }
 
-static double whole_range(int d)
-{
+static double whole_range(int d) {
     (void)d;
     return draw() < 0.2   ? copysign(DBL_MAX, draw() - 0.5)
            : draw() < 0.2 ? 0
                           : (draw() * 2 - 1) * DBL_MAX;
 }
 
-static double large(int d)
-{
+static double large(int d) {
     (void)d;
     return 1e300 * draw();
 }
 
-static double small(int d)
-{
+static double small(int d) {
     (void)d;
     return 1e-300 * draw();
 }
 
-static double denormal(int d)
-{
+static double denormal(int d) {
     return d == 0 ? 0x1p-1074 * rint(draw() * 9) : draw() * 0x1p-1022;
 }
 
-static double skew(int d)
-{
+static double skew(int d) {
     return d == 0   ? 1e300 + rint(draw()) * 0x1p960
            : d == 1 ? draw() * 1e-200
                     : 1e250;
 }
 
-static double one_point(int d)
-{
+static double one_point(int d) {
     return 1.1 * d;
 }
 
-static void boxes_hold_what_was_set(void **unused)
-{
+static void boxes_hold_what_was_set(void **unused) {
     (void)unused;
     double (*const numbers[])(int) = {ordinary, far_away,    clusters, scales,
                                       large,    whole_range, small,    denormal,
@@ -170,8 +154,7 @@ static void boxes_hold_what_was_set(void **unused)
 }
 
 /* A grid of whole numbers is told exactly, and so is a page of one point. */
-static void what_fits_is_exact(void **unused)
-{
+static void what_fits_is_exact(void **unused) {
     (void)unused;
     struct set set = {.count = 2,
                       .lo = {{-3, 5, 7}, {0, 0, 7}},
@@ -198,8 +181,7 @@ static void what_fits_is_exact(void **unused)
 
 /* ---- lifted ---- */
 
-static void one_lifted(struct incode_boxes *boxes)
-{
+static void one_lifted(struct incode_boxes *boxes) {
     struct set set = {.count = 2,
                       .lo = {{-4, -4, -4}, {0, -1, 1}},
                       .hi = {{4, 4, 4}, {4, 0, 1}},
@@ -217,8 +199,7 @@ static void one_lifted(struct incode_boxes *boxes)
     boxes->lid[1] = -8192;
 }
 
-static void what_a_lifted_box_says(void **unused)
-{
+static void what_a_lifted_box_says(void **unused) {
     (void)unused;
     struct incode_boxes boxes;
     struct incode_lifted l;
@@ -246,8 +227,7 @@ static void what_a_lifted_box_says(void **unused)
     }
 }
 
-static void axes_are_orthonormal(void **unused)
-{
+static void axes_are_orthonormal(void **unused) {
     (void)unused;
     struct incode_boxes boxes;
     double axis[3][3];
@@ -281,8 +261,7 @@ static void axes_are_orthonormal(void **unused)
 
 /* ---- on arrival ---- */
 
-static void what_is_not_sound(void **unused)
-{
+static void what_is_not_sound(void **unused) {
     (void)unused;
     struct set set = {.count = 2, .all_lo = {-4, -4, -4}, .all_hi = {4, 4, 4}};
     struct incode_boxes good, bad;
@@ -318,8 +297,7 @@ static void what_is_not_sound(void **unused)
 #undef REFUSED
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(boxes_hold_what_was_set),
         cmocka_unit_test(what_fits_is_exact),

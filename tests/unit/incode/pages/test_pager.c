@@ -16,8 +16,7 @@ enum { FRAMES_MAX = 64, PAGES_MAX = 400, BRICKS = 300 };
 
 static uint64_t state;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (uint32_t)((state >> 33) % below);
 }
@@ -36,22 +35,19 @@ struct model {
     uint32_t asked; /* the last page asked for, or INCODE_NONE */
 };
 
-static void take_out(struct model *m, uint32_t i)
-{
+static void take_out(struct model *m, uint32_t i) {
     memmove(m->page + i, m->page + i + 1,
             (m->count - i - 1) * sizeof m->page[0]);
     m->count--;
 }
 
-static void put_first(struct model *m, uint32_t page)
-{
+static void put_first(struct model *m, uint32_t page) {
     memmove(m->page + 1, m->page, m->count * sizeof m->page[0]);
     m->page[0] = page;
     m->count++;
 }
 
-static void model_ask(struct model *m, uint32_t page)
-{
+static void model_ask(struct model *m, uint32_t page) {
     if (m->loading + m->held >= m->loading_max || !m->credit)
         return;
     if (m->count == m->frames) {
@@ -70,8 +66,7 @@ static void model_ask(struct model *m, uint32_t page)
     m->requests++;
 }
 
-static bool model_get(struct model *m, uint32_t page)
-{
+static bool model_get(struct model *m, uint32_t page) {
     if (m->place[page] == ABSENT) {
         model_ask(m, page);
         return false;
@@ -89,19 +84,16 @@ static bool model_get(struct model *m, uint32_t page)
 /* ---- pages ---- */
 
 /* In no order within a leaf. */
-static double coordinate(uint32_t page, uint32_t slot, int d)
-{
+static double coordinate(uint32_t page, uint32_t slot, int d) {
     uint32_t mixed = (page * 64 + slot) * UINT32_C(2654435761);
     return (double)(mixed * (uint32_t)(2 * d + 1) >> 8) * 0.37 - 2000000;
 }
 
-static uint32_t points_of(uint32_t page)
-{
+static uint32_t points_of(uint32_t page) {
     return page % 5 == 0 ? page % 64 + 1 : 64;
 }
 
-static size_t fill(uint32_t page, uint8_t *data)
-{
+static size_t fill(uint32_t page, uint8_t *data) {
     if (page >= BRICKS) {
         memset(data, (int)(page & 0xff), INCODE_PAGE_BYTES);
         return INCODE_PAGE_BYTES;
@@ -117,8 +109,7 @@ static size_t fill(uint32_t page, uint8_t *data)
 }
 
 /* Boxes made of the frame's points against those of the points sent. */
-static void check_boxes(const struct incode_frame *f, uint32_t page)
-{
+static void check_boxes(const struct incode_frame *f, uint32_t page) {
     _Alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
         leaf_hi[3][INCODE_BRICK_LEAVES];
     double lo[3], hi[3], extent = 0;
@@ -145,8 +136,7 @@ static void check_boxes(const struct incode_frame *f, uint32_t page)
     assert_true(longest == extent);
 }
 
-static void check_frame(const struct incode_frame *f, uint32_t page)
-{
+static void check_frame(const struct incode_frame *f, uint32_t page) {
     assert_int_equal(f->number, page);
     if (page >= BRICKS) {
         uint8_t data[INCODE_PAGE_BYTES];
@@ -167,15 +157,14 @@ static void check_frame(const struct incode_frame *f, uint32_t page)
 
 /* ---- traces ---- */
 
-static bool request(void *context, uint32_t page)
-{
+static bool request(void *context, uint32_t page) {
     struct model *m = context;
     m->asked = page;
     return m->credit;
 }
 
-static void get_one(struct incode_pager *pager, struct model *m, uint32_t pages)
-{
+static void get_one(struct incode_pager *pager, struct model *m,
+                    uint32_t pages) {
     uint32_t page = draw(4) == 0 ? draw(pages) : draw(pages / 8 + 1);
     m->credit = draw(8) != 0;
     m->asked = INCODE_NONE;
@@ -189,8 +178,7 @@ static void get_one(struct incode_pager *pager, struct model *m, uint32_t pages)
 }
 
 static void deliver_one(struct incode_pager *pager, struct model *m,
-                        uint32_t pages)
-{
+                        uint32_t pages) {
     uint8_t data[INCODE_PAGE_BYTES + 64];
     uint32_t page = draw(pages);
     for (uint32_t i = 0; i < pages && m->place[page] != LOADING; i++)
@@ -213,8 +201,8 @@ static void deliver_one(struct incode_pager *pager, struct model *m,
 
 /* One that comes unasked is taken where it is on its way, or where nothing has
  * to make room for it. */
-static void put_one(struct incode_pager *pager, struct model *m, uint32_t pages)
-{
+static void put_one(struct incode_pager *pager, struct model *m,
+                    uint32_t pages) {
     uint8_t data[INCODE_PAGE_BYTES + 64];
     uint32_t page = draw(pages);
     size_t bytes = fill(page, data);
@@ -237,8 +225,7 @@ static void put_one(struct incode_pager *pager, struct model *m, uint32_t pages)
 
 /* A page that is there goes out as it came, and that is no use of it. */
 static void copy_one(const struct incode_pager *pager, const struct model *m,
-                     uint32_t pages)
-{
+                     uint32_t pages) {
     uint8_t data[INCODE_PAGE_BYTES + 64], copy[INCODE_PAGE_BYTES];
     uint32_t page = draw(pages);
     size_t bytes = fill(page, data), had = incode_pager_copy(pager, page, copy);
@@ -255,8 +242,7 @@ static void copy_one(const struct incode_pager *pager, const struct model *m,
 }
 
 /* Which page comes out is the pager's choice; one does at once if told so. */
-static void release(struct incode_pager *pager, struct model *m)
-{
+static void release(struct incode_pager *pager, struct model *m) {
     bool now = draw(2) == 0;
     bool released = incode_pager_release(pager, now);
     if (m->held == 0)
@@ -279,8 +265,7 @@ static void release(struct incode_pager *pager, struct model *m)
 }
 
 static void compare(const struct incode_pager *pager, const struct model *m,
-                    uint32_t pages)
-{
+                    uint32_t pages) {
     assert_int_equal(pager->requests, m->requests);
     assert_int_equal(pager->evictions, m->evictions);
     assert_int_equal(pager->loading, m->loading);
@@ -304,8 +289,7 @@ static void compare(const struct incode_pager *pager, const struct model *m,
     assert_int_equal(pager->frames_used, m->count);
 }
 
-static void trace(uint32_t frames, uint32_t pages, bool shuffled)
-{
+static void trace(uint32_t frames, uint32_t pages, bool shuffled) {
     size_t bytes = (incode_pager_bytes(frames) + 63) / 64 * 64;
     uint8_t *memory = aligned_alloc(64, bytes + 64);
     assert_non_null(memory);
@@ -342,8 +326,7 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled)
     free(memory);
 }
 
-static void least_recently_used(void **unused)
-{
+static void least_recently_used(void **unused) {
     (void)unused;
     static const uint32_t frames[] = {1, 2, 3, 4, 7, 16, 48, 64};
     for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
@@ -353,8 +336,7 @@ static void least_recently_used(void **unused)
     }
 }
 
-static void shuffled(void **unused)
-{
+static void shuffled(void **unused) {
     (void)unused;
     static const uint32_t frames[] = {4, 16, 48};
     for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
@@ -365,8 +347,7 @@ static void shuffled(void **unused)
 }
 
 /* Page numbers up to the end of their range, which share hash chains. */
-static void large_numbers(void **unused)
-{
+static void large_numbers(void **unused) {
     (void)unused;
     enum { FRAMES = 8 };
     uint8_t data[INCODE_PAGE_BYTES] = {7};
@@ -398,8 +379,7 @@ static void large_numbers(void **unused)
     free(memory);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(least_recently_used),
         cmocka_unit_test(shuffled),

@@ -34,8 +34,7 @@ struct points_scene {
 
 /* ---- pages ---- */
 
-static inline bool points_request(void *context, uint32_t page)
-{
+static inline bool points_request(void *context, uint32_t page) {
     struct points_scene *s = context;
     if (s->pages == s->limit)
         return false;
@@ -43,8 +42,7 @@ static inline bool points_request(void *context, uint32_t page)
     return true;
 }
 
-static inline void points_deliver(struct points_scene *s)
-{
+static inline void points_deliver(struct points_scene *s) {
     uint8_t page[INCODE_PAGE_BYTES];
     assert_true(s->pages > 0);
     while (s->pages > 0) {
@@ -57,8 +55,7 @@ static inline void points_deliver(struct points_scene *s)
 
 /* No page is there. */
 static inline void points_forget(struct points_scene *s, uint32_t frames,
-                                 uint32_t limit)
-{
+                                 uint32_t limit) {
     uint32_t all = s->set.order.tree.pages;
     const struct incode_page_source source = {s, points_request};
     incode_pager_init(&s->maker.pager, s->set.frames,
@@ -74,15 +71,13 @@ static inline void points_forget(struct points_scene *s, uint32_t frames,
 static making *points_kind;
 static double points_scale, points_off;
 
-static inline void points_scaled(double p[3])
-{
+static inline void points_scaled(double p[3]) {
     points_kind(p);
     for (int d = 0; d < 3; d++)
         p[d] = (p[d] + points_off) * points_scale;
 }
 
-static inline void whole_numbers(double p[3])
-{
+static inline void whole_numbers(double p[3]) {
     for (int d = 0; d < 3; d++)
         p[d] = below(12);
 }
@@ -90,8 +85,7 @@ static inline void whole_numbers(double p[3])
 /* Points of a kind, times a power of two and as far off: the same whatever was
  * drawn before. */
 static inline void points_open(struct points_scene *s, making *make,
-                               int exponent, double far, uint32_t n)
-{
+                               int exponent, double far, uint32_t n) {
     memset(s, 0, sizeof *s);
     state = 1;
     points_kind = make;
@@ -106,8 +100,7 @@ static inline void points_open(struct points_scene *s, making *make,
     incode_complex_init(&s->x, s->memory, POINTS_BYTES);
 }
 
-static inline void points_close(struct points_scene *s)
-{
+static inline void points_close(struct points_scene *s) {
     free(s->memory);
     close_scene(&s->set);
 }
@@ -115,8 +108,7 @@ static inline void points_close(struct points_scene *s)
 /* Each kind at each scale. */
 typedef void points_of_kind(making *make, int exponent, double far);
 
-static inline void points_of_all_kinds(points_of_kind *check)
-{
+static inline void points_of_all_kinds(points_of_kind *check) {
     static making *const kinds[] = {
         volume,       plane,       sphere,        cylinder,   terrain,
         tiny_cluster, uneven_axes, whole_numbers, all_scales, far_plane};
@@ -130,8 +122,7 @@ static inline void points_of_all_kinds(points_of_kind *check)
 
 /* Where squares of coordinates lose digits, or all of them; and where products
  * with a facet's normal overflow. */
-static inline void points_that_underflow(points_of_kind *check)
-{
+static inline void points_that_underflow(points_of_kind *check) {
     for (int e = 509; e < 541; e += SANITIZED ? 9 : 3)
         for (int sign = -1; sign < 2; sign += 2)
             check(e % 2 ? volume : cylinder, sign * e, 0);
@@ -139,8 +130,7 @@ static inline void points_that_underflow(points_of_kind *check)
 
 /* By how many bricks to go on: more where the test has the sanitizers in it,
  * but for sets that are not scaled, of which more is claimed. */
-static inline uint32_t points_step(int exponent)
-{
+static inline uint32_t points_step(int exponent) {
     return 1 + below(SANITIZED && exponent != 0 ? 20 : 5);
 }
 
@@ -148,8 +138,7 @@ static inline uint32_t points_step(int exponent)
 
 /* The last of the bricks [before, from); false: they do not span space. */
 static inline bool points_build(struct points_scene *s, uint32_t before,
-                                uint32_t from)
-{
+                                uint32_t from) {
     struct incode_complex *x = &s->x;
     const struct incode_complex_point *q = x->point;
     uint32_t four[4] = {1, 2, 0, 0};
@@ -182,8 +171,7 @@ static inline bool points_build(struct points_scene *s, uint32_t before,
 /* Whether a point is in the cell's sphere, or beyond its facet or in its plane.
  */
 static inline bool points_holds(struct points_scene *s, uint32_t cell,
-                                const double p[3])
-{
+                                const double p[3]) {
     const struct incode_cell *c = incode_complex_cell(&s->x, cell);
     const double *q[4];
     unsigned k = incode_cell_index(c, INCODE_COMPLEX_INFINITE);
@@ -196,8 +184,7 @@ static inline bool points_holds(struct points_scene *s, uint32_t cell,
 
 /* Whether one of a brick is. */
 static inline bool points_touch(struct points_scene *s, uint32_t cell,
-                                uint32_t brick)
-{
+                                uint32_t brick) {
     for (uint32_t i = 0; i < s->set.order.fill[brick]; i++) {
         double p[3];
         host_vertex(&s->set.order, brick * INCODE_BRICK_POINTS + i, p);

@@ -31,15 +31,13 @@ static struct world {
     uint32_t emitted, committed, calls;
 } world;
 
-static size_t emit_room(void *context)
-{
+static size_t emit_room(void *context) {
     (void)context;
     return world.room;
 }
 
 static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count)
-{
+                 size_t count) {
     struct solo *s = context;
     struct incode_tally tally = {0};
     double p[4][3];
@@ -62,16 +60,14 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
     solo_emit(context, vertex, apexes, count);
 }
 
-static void commit(void *context, uint32_t brick)
-{
+static void commit(void *context, uint32_t brick) {
     assert_in_range(brick, 0, world.n.to - 1);
     assert_true(incode_insertion_has_committed(&world.n, brick));
     world.committed++;
     solo_commit(context, brick);
 }
 
-static void open_points(const double *xyz, uint64_t n)
-{
+static void open_points(const double *xyz, uint64_t n) {
     memset(&world, 0, sizeof world);
     world.solo.index = INCODE_KD;
     world.solo.build = INCODE_BUILD_FACES;
@@ -86,8 +82,7 @@ static void open_points(const double *xyz, uint64_t n)
 
 /* What a set comes to by brute force, and how many of the tetrahedra each brick
  * owns. */
-static void expect(const double *xyz, uint32_t n)
-{
+static void expect(const double *xyz, uint32_t n) {
     const struct host_order *order = &world.solo.order;
     struct host_tetrahedra *t = &world.expected;
     reference_delaunay(xyz, n, t);
@@ -110,8 +105,7 @@ static void expect(const double *xyz, uint32_t n)
     }
 }
 
-static void open_made(const char *kind, uint64_t count)
-{
+static void open_made(const char *kind, uint64_t count) {
     struct host_points points = {0};
     struct host_error error = {0};
     if (host_gen(kind, count, 5, &points, &error) != 0)
@@ -121,8 +115,7 @@ static void open_made(const char *kind, uint64_t count)
     host_points_free(&points);
 }
 
-static void close_world(void)
-{
+static void close_world(void) {
     free(world.memory);
     free(world.bits);
     free(world.brick);
@@ -131,8 +124,7 @@ static void close_world(void)
     solo_close(&world.solo);
 }
 
-static void start(size_t bytes, uint32_t first, uint32_t last)
-{
+static void start(size_t bytes, uint32_t first, uint32_t last) {
     size_t words = ((size_t)world.n.maker->tree.bricks + 63) / 64;
     free(world.memory);
     free(world.bits);
@@ -148,15 +140,13 @@ static void start(size_t bytes, uint32_t first, uint32_t last)
                            last);
 }
 
-static enum incode_insertion_step one_step(uint32_t units)
-{
+static enum incode_insertion_step one_step(uint32_t units) {
     world.solo.t->maker.walker.left = units;
     return incode_insertion_step(&world.n);
 }
 
 /* Of cells that are about to be emitted, none gives way to a point. */
-static void check_final(void)
-{
+static void check_final(void) {
     const struct incode_complex *x = &world.n.complex;
     const struct host_order *order = &world.solo.order;
     struct incode_tally tally = {0};
@@ -176,8 +166,7 @@ static void check_final(void)
 }
 
 /* To its end: finished, or full. */
-static enum incode_insertion_step finish(uint32_t units)
-{
+static enum incode_insertion_step finish(uint32_t units) {
     enum incode_insertion_step r = INCODE_INSERTION_WORKED;
     for (uint32_t i = 0; r <= INCODE_INSERTION_WAITING; i++) {
         assert_in_range(i, 0, 10000000);
@@ -191,8 +180,7 @@ static enum incode_insertion_step finish(uint32_t units)
     return r;
 }
 
-static void compare(void)
-{
+static void compare(void) {
     struct solo *s = &world.solo;
     struct host_digest digest;
     host_tetrahedra_map(&s->tets, s->order.row);
@@ -207,8 +195,7 @@ static void compare(void)
 
 /* After it is full: none of what was emitted is wrong or there twice, and what
  * is committed is complete. */
-static void compare_part(void)
-{
+static void compare_part(void) {
     struct solo *s = &world.solo;
     const struct host_tetrahedra *all = &world.expected;
     uint32_t bricks = s->order.bricks, *got = calloc(bricks, sizeof *got);
@@ -237,8 +224,7 @@ static void compare_part(void)
 
 enum outcome { NOTHING, SOME, STREAMED, AT_ONCE, OUTCOMES };
 
-static enum outcome try_memory(size_t bytes)
-{
+static enum outcome try_memory(size_t bytes) {
     uint32_t bricks = world.solo.order.bricks;
     start(bytes, 0, bricks);
     uint64_t releases = world.n.releases, vertices = world.n.vertices;
@@ -262,8 +248,7 @@ static enum outcome try_memory(size_t bytes)
 
 /* It is full with nothing emitted, or with something, or it comes to an end;
  * that, once there is as much as stated. */
-static void each_size_of_memory(void **unused)
-{
+static void each_size_of_memory(void **unused) {
     static const struct {
         const char *kind;
         uint32_t points, step;
@@ -303,8 +288,7 @@ static void each_size_of_memory(void **unused)
 
 /* ---- jobs ---- */
 
-static void each_range_of_bricks(void **unused)
-{
+static void each_range_of_bricks(void **unused) {
     (void)unused;
     open_made("uniform", 500);
     uint32_t bricks = world.solo.order.bricks;
@@ -338,8 +322,7 @@ static void each_range_of_bricks(void **unused)
 }
 
 /* One that is left in the middle, at any step, is forgotten by the next. */
-static void jobs_that_are_left(void **unused)
-{
+static void jobs_that_are_left(void **unused) {
     (void)unused;
     open_made("bubbles", 300);
     uint32_t bricks = world.solo.order.bricks;
@@ -359,8 +342,7 @@ static void jobs_that_are_left(void **unused)
 
 /* ---- outside ---- */
 
-static void rooms(void **unused)
-{
+static void rooms(void **unused) {
     (void)unused;
     open_made("hub", 400);
     for (size_t room = 1; room < 300; room += room < 8 ? 1 : 71) {
@@ -387,8 +369,7 @@ static void rooms(void **unused)
 
 /* Pages by one credit at a time, and refused by chance: each is asked for, and
  * none in vain. */
-static void pages(void **unused)
-{
+static void pages(void **unused) {
     (void)unused;
     open_made("grid", 27 * 64);
     for (uint64_t chance = 0; chance < 6; chance++) {
@@ -413,8 +394,7 @@ static void pages(void **unused)
 }
 
 /* With a unit of work, one point, or a few cells, or a few tetrahedra. */
-static void steps_are_short(void **unused)
-{
+static void steps_are_short(void **unused) {
     (void)unused;
     open_made("uniform", 700);
     start(WHOLE, 0, world.solo.order.bricks);
@@ -449,8 +429,7 @@ static void steps_are_short(void **unused)
 
 /* ---- stack ---- */
 
-static void *insert_all(void *unused)
-{
+static void *insert_all(void *unused) {
     (void)unused;
     while (one_step(UINT32_MAX) == INCODE_INSERTION_WORKED)
         continue;
@@ -458,8 +437,7 @@ static void *insert_all(void *unused)
 }
 
 /* The least stack that a board has is enough for cavities of each size. */
-static void little_stack(void **unused)
-{
+static void little_stack(void **unused) {
     enum { STACK_BYTES = SANITIZED ? 1 << 20 : 48 << 10 };
     static const char *const kinds[] = {"sphere", "hub", "grid", "lines"};
     (void)unused;
@@ -494,16 +472,14 @@ struct bare {
     uint32_t n, asked[16], count;
 };
 
-static bool bare_request(void *context, uint32_t page)
-{
+static bool bare_request(void *context, uint32_t page) {
     struct bare *b = context;
     b->asked[b->count++] = page;
     return true;
 }
 
 /* Points past what the host's order takes, brick after brick. */
-static void bare_deliver(struct incode_triangulator *t, struct bare *b)
-{
+static void bare_deliver(struct incode_triangulator *t, struct bare *b) {
     while (b->count > 0) {
         uint32_t brick = b->asked[--b->count], first = brick * 64;
         uint32_t points = b->n - first < 64 ? b->n - first : 64;
@@ -516,8 +492,7 @@ static void bare_deliver(struct incode_triangulator *t, struct bare *b)
     }
 }
 
-static void expect_no_space(const double (*p)[3], uint32_t n)
-{
+static void expect_no_space(const double (*p)[3], uint32_t n) {
     struct bare bare = {p, n, {0}, 0};
     const struct incode_setup setup = {
         .bricks = (n + 63) / 64, .index = INCODE_KD, .hi = {1000, 1000, 1000}};
@@ -546,8 +521,7 @@ static void expect_no_space(const double (*p)[3], uint32_t n)
 }
 
 /* Fewer than four, or a line, or a plane. */
-static void no_space(void **unused)
-{
+static void no_space(void **unused) {
     enum { MOST = 200 };
     static double p[MOST][3];
     (void)unused;
@@ -563,8 +537,7 @@ static void no_space(void **unused)
 }
 
 /* All of a plane but the first, the last, or one between. */
-static void hardly_any_space(void **unused)
-{
+static void hardly_any_space(void **unused) {
     enum { SIDE = 12, COUNT = SIDE * SIDE };
     static double p[COUNT][3];
     (void)unused;
@@ -583,8 +556,7 @@ static void hardly_any_space(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_size_of_memory),
         cmocka_unit_test(each_range_of_bricks),

@@ -17,18 +17,15 @@ struct bricks {
     uint64_t bits[WORDS];
 };
 
-static bool has(const struct bricks *b, uint32_t brick)
-{
+static bool has(const struct bricks *b, uint32_t brick) {
     return (b->bits[brick / 64] >> brick % 64 & 1) != 0;
 }
 
-static void put(struct bricks *b, uint32_t brick)
-{
+static void put(struct bricks *b, uint32_t brick) {
     b->bits[brick / 64] |= UINT64_C(1) << brick % 64;
 }
 
-static uint32_t count(const struct bricks *b)
-{
+static uint32_t count(const struct bricks *b) {
     uint32_t n = 0;
     for (int i = 0; i < WORDS; i++)
         n += (uint32_t)__builtin_popcountll(b->bits[i]);
@@ -42,8 +39,7 @@ struct batch {
     uint32_t pass_first, pass_last;
 };
 
-static bool is_passed(const struct batch *b, uint32_t brick)
-{
+static bool is_passed(const struct batch *b, uint32_t brick) {
     return has(&b->passed, brick) ||
            (brick >= b->pass_first && brick < b->pass_last);
 }
@@ -57,8 +53,7 @@ struct told {
 
 /* Looks at cells [first, end) of a batch. */
 static void look_at(struct points_scene *s, const struct batch *b, bool every,
-                    uint32_t first, uint32_t end, struct told *told)
-{
+                    uint32_t first, uint32_t end, struct told *told) {
     enum incode_look_result r;
     incode_look_init(&look, &s->maker, b->passed.bits, told->wanted.bits);
     incode_look_begin(&look, every, b->pass_first, b->pass_last);
@@ -82,14 +77,11 @@ static void look_at(struct points_scene *s, const struct batch *b, bool every,
 /* Of cells: those whose spheres hold a point of a brick that is not passed, the
  * others, which of these are let go, and for which of these boxes along the
  * axes would not do. */
-static struct counts {
-    uint64_t reached, free, final, lifted;
-} counts;
+static struct counts { uint64_t reached, free, final, lifted; } counts;
 
 /* Whether cell i of the last look meets a brick's box along the axes. */
 static bool meets_a_box(const struct points_scene *s, const struct batch *b,
-                        uint32_t i)
-{
+                        uint32_t i) {
     const struct host_order *order = &s->set.order;
     alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
     for (uint32_t brick = 0; brick < order->bricks; brick++) {
@@ -107,8 +99,7 @@ static bool meets_a_box(const struct points_scene *s, const struct batch *b,
 
 /* Which bricks that are not passed have a point of a cell. */
 static struct bricks touched_by(struct points_scene *s, const struct batch *b,
-                                uint32_t cell)
-{
+                                uint32_t cell) {
     struct bricks touched = {{0}};
     for (uint32_t brick = 0; brick < s->set.order.bricks; brick++)
         if (!is_passed(b, brick) && points_touch(s, cell, brick))
@@ -117,8 +108,7 @@ static struct bricks touched_by(struct points_scene *s, const struct batch *b,
 }
 
 static void check_passed(const struct points_scene *s, const struct batch *b,
-                         const struct bricks *wanted)
-{
+                         const struct bricks *wanted) {
     for (uint32_t brick = 0; brick < BRICKS_MAX; brick++)
         if (has(wanted, brick))
             assert_true(brick < s->set.order.bricks && !is_passed(b, brick));
@@ -126,8 +116,7 @@ static void check_passed(const struct points_scene *s, const struct batch *b,
 
 /* One brick for each cell, and all bricks for all. */
 static void check_batch(struct points_scene *s, const struct batch *b,
-                        struct told *one, struct told *every)
-{
+                        struct told *one, struct told *every) {
     look_at(s, b, false, 0, b->count, one);
     look_at(s, b, true, 0, b->count, every);
     check_passed(s, b, &one->wanted);
@@ -154,8 +143,7 @@ static void check_batch(struct points_scene *s, const struct batch *b,
 /* The same in batches of `size`, with few frames, one page at a time. */
 static void check_pieces(struct points_scene *s, const struct batch *b,
                          uint32_t size, uint32_t frames, const struct told *one,
-                         const struct told *every, struct told *last)
-{
+                         const struct told *every, struct told *last) {
     struct told piece = {0}, all = {0};
     uint64_t reached = 0;
     for (uint32_t first = 0; first < b->count; first += size) {
@@ -179,8 +167,7 @@ static void check_pieces(struct points_scene *s, const struct batch *b,
 
 /* Some of the cells, and their own bricks are passed. */
 static void draw_batch(const struct points_scene *s, uint32_t before,
-                       uint32_t from, uint32_t one_of, struct batch *b)
-{
+                       uint32_t from, uint32_t one_of, struct batch *b) {
     uint32_t cells = s->x.cells - INCODE_COMPLEX_CELLS_FIRST;
     uint32_t first = below(cells);
     memset(b, 0, sizeof *b);
@@ -196,8 +183,7 @@ static void draw_batch(const struct points_scene *s, uint32_t before,
 
 /* Of the bricks before the own ones, or of all. */
 static void pass_some(const struct points_scene *s, struct batch *b,
-                      uint32_t first, uint32_t last, uint32_t one_of)
-{
+                      uint32_t first, uint32_t last, uint32_t one_of) {
     for (uint32_t brick = first; brick < last; brick++)
         if (below(one_of) == 0)
             put(&b->passed, brick);
@@ -207,8 +193,7 @@ static void pass_some(const struct points_scene *s, struct batch *b,
 /* All are passed that come before the own ones, or some of any; or these are
  * the first. */
 static void look_at_some(struct points_scene *s, uint32_t before, uint32_t from,
-                         bool in_order)
-{
+                         bool in_order) {
     struct batch b;
     struct told one = {0}, every = {0}, last = {0};
     draw_batch(s, before, from, 20, &b);
@@ -225,8 +210,7 @@ static void look_at_some(struct points_scene *s, uint32_t before, uint32_t from,
 }
 
 static void no_cell_that_reaches_is_let_go(making *make, int exponent,
-                                           double far)
-{
+                                           double far) {
     points_open(&scene, make, exponent, far, POINTS);
     for (int in_order = 0; in_order < 2; in_order++) {
         memset(&counts, 0, sizeof counts);
@@ -248,14 +232,12 @@ static void no_cell_that_reaches_is_let_go(making *make, int exponent,
         assert_true(counts.lifted > 0);
 }
 
-static void kinds_and_scales(void **unused)
-{
+static void kinds_and_scales(void **unused) {
     (void)unused;
     points_of_all_kinds(no_cell_that_reaches_is_let_go);
 }
 
-static void squares_that_underflow(void **unused)
-{
+static void squares_that_underflow(void **unused) {
     (void)unused;
     points_that_underflow(no_cell_that_reaches_is_let_go);
 }
@@ -263,8 +245,7 @@ static void squares_that_underflow(void **unused)
 /* ---- many levels ---- */
 
 /* Some pages of boxes have no brick that is not passed. */
-static void through_many_levels(making *make, uint32_t frames)
-{
+static void through_many_levels(making *make, uint32_t frames) {
     struct told resumed = {0};
     memset(&counts, 0, sizeof counts);
     points_open(&scene, make, 0, 0, MANY);
@@ -294,21 +275,18 @@ static void through_many_levels(making *make, uint32_t frames)
     assert_true(counts.final > counts.free * (make == volume ? 6 : 4) / 10);
 }
 
-static void volumes_of_many_levels(void **unused)
-{
+static void volumes_of_many_levels(void **unused) {
     (void)unused;
     through_many_levels(volume, 3);
 }
 
-static void surfaces_of_many_levels(void **unused)
-{
+static void surfaces_of_many_levels(void **unused) {
     (void)unused;
     through_many_levels(terrain, 5);
 }
 
 /* Some of the infinite cells, from all over. */
-static void draw_infinite(const struct points_scene *s, struct batch *b)
-{
+static void draw_infinite(const struct points_scene *s, struct batch *b) {
     uint32_t all = 0, seen = 0;
     memset(b, 0, sizeof *b);
     for (int pass = 0; pass < 2; pass++)
@@ -325,8 +303,7 @@ static void draw_infinite(const struct points_scene *s, struct batch *b)
 
 /* Half-spaces that hold nearly all points: whatever pages are there, one call
  * does not look at all that are needed. */
-static void more_than_a_call_looks_at(void **unused)
-{
+static void more_than_a_call_looks_at(void **unused) {
     (void)unused;
     points_open(&scene, sphere, 0, 0, MANY);
     uint32_t bricks = scene.set.order.bricks;
@@ -355,8 +332,7 @@ static void more_than_a_call_looks_at(void **unused)
 
 /* Bricks that are wanted stay so; they need no look where all are asked for,
  * and one where cells are told. */
-static void what_was_wanted_before(void **unused)
-{
+static void what_was_wanted_before(void **unused) {
     struct batch b;
     uint32_t again = 0;
     (void)unused;
@@ -383,8 +359,7 @@ static void what_was_wanted_before(void **unused)
 }
 
 /* Nothing is wanted of no cells, nor where all is passed, either way. */
-static void nothing_to_look_at(void **unused)
-{
+static void nothing_to_look_at(void **unused) {
     struct batch b;
     struct told told = {0};
     (void)unused;
@@ -405,8 +380,7 @@ static void nothing_to_look_at(void **unused)
     points_close(&scene);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kinds_and_scales),
         cmocka_unit_test(squares_that_underflow),

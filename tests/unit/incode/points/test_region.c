@@ -60,14 +60,12 @@ static uint64_t wrong[BOUNDS];
 
 static uint64_t state = 1;
 
-static double draw(void)
-{
+static double draw(void) {
     state = state * UINT64_C(6364136223846793005) + 1442695040888963407u;
     return (double)(state >> 11) * 0x1p-53;
 }
 
-static double even(void)
-{
+static double even(void) {
     return 2 * draw() - 1;
 }
 
@@ -80,8 +78,7 @@ struct corner {
     struct incode_lifted lifted;
 };
 
-static void set_radius(struct incode_lifted *l, const double q[3])
-{
+static void set_radius(struct incode_lifted *l, const double q[3]) {
     double square = 0;
     for (int d = 0; d < 3; d++)
         square += l->a[0][d] * l->a[0][d] + l->a[1][d] * l->a[1][d] +
@@ -92,8 +89,7 @@ static void set_radius(struct incode_lifted *l, const double q[3])
 
 /* Its centre is off by a part of the last digit, which its one half axis makes
  * up for. */
-static void set_place(struct corner *c, const double p[3])
-{
+static void set_place(struct corner *c, const double p[3]) {
     double q[3];
     memset(c, 0, sizeof *c);
     c->boxes.unit = 1;
@@ -112,8 +108,7 @@ static void set_place(struct corner *c, const double p[3])
 /* The point is in the corner where F is least, less a part of the radius that
  * boxes need not hold.  down: against the gradient of F there. */
 static void set_corner(struct corner *c, const double p[3],
-                       const double down[3], double size)
-{
+                       const double down[3], double size) {
     double q[3], norm = 0, radius = 0;
     memset(c, 0, sizeof *c);
     c->boxes.unit = 1;
@@ -146,8 +141,7 @@ static void set_corner(struct corner *c, const double p[3],
 static struct incode_regions regions;
 
 static void count_wrong(const struct incode_region *r, const double p[3],
-                        const struct corner *corners, int count)
-{
+                        const struct corner *corners, int count) {
     bool met = true;
     incode_regions_set(&regions, 5, r);
     met = incode_regions_meeting(&regions, 1 << 5, p, p) == 1 << 5;
@@ -164,8 +158,7 @@ static void count_wrong(const struct incode_region *r, const double p[3],
 static mpq_t term, sum, other;
 
 /* Whether F(p) <= 0, or X (p - o) >= 0 of a half-space. */
-static bool holds(const struct incode_region *r, const double p[3])
-{
+static bool holds(const struct incode_region *r, const double p[3]) {
     mpq_set_ui(sum, 0, 1);
     for (int d = 0; d < 3; d++) {
         mpq_set_d(term, p[d]);
@@ -182,15 +175,13 @@ static bool holds(const struct incode_region *r, const double p[3])
 
 typedef bool holding(const void *of, const double p[3]);
 
-static bool region_holds(const void *of, const double p[3])
-{
+static bool region_holds(const void *of, const double p[3]) {
     return holds(of, p);
 }
 
 /* From a point that is held towards one that is not: the last one held. */
 static void approach(holding *hold, const void *of, double in[3],
-                     const double out[3])
-{
+                     const double out[3]) {
     double a = 0, b = 1, from[3];
     memcpy(from, in, sizeof from);
     while (a < (a + b) / 2 && (a + b) / 2 < b) {
@@ -206,14 +197,12 @@ static void approach(holding *hold, const void *of, double in[3],
 }
 
 static void gradient(const struct incode_region *r, const double p[3],
-                     double down[3])
-{
+                     double down[3]) {
     for (int d = 0; d < 3; d++)
         down[d] = r->x[d] - (r->infinite ? 0 : 2 * (p[d] - r->o[d]));
 }
 
-static void try_exact(double far, double scale, bool infinite)
-{
+static void try_exact(double far, double scale, bool infinite) {
     struct incode_region r = {.infinite = infinite};
     struct corner corners[3];
     double p[3], out[3], down[3];
@@ -250,8 +239,7 @@ struct cell {
     alignas(64) uint8_t memory[4096];
 };
 
-static bool cell_holds(const void *of, const double p[3])
-{
+static bool cell_holds(const void *of, const double p[3]) {
     const struct cell *s = of;
     struct incode_tally tally = {0};
     const double *q[4];
@@ -265,8 +253,7 @@ static bool cell_holds(const void *of, const double p[3])
 /* How the points of a cell lie. */
 enum shape { REGULAR, CAP, THIN, ALIGNED, SHAPES };
 
-static void draw_cell(double p[4][3], enum shape shape, double far)
-{
+static void draw_cell(double p[4][3], enum shape shape, double far) {
     for (int i = 0; i < 4; i++)
         for (int d = 0; d < 3; d++)
             p[i][d] = far + even();
@@ -288,8 +275,7 @@ static void draw_cell(double p[4][3], enum shape shape, double far)
 
 /* A point just in the cell's sphere, or just beyond its facet. */
 static bool draw_point(const struct cell *s, const struct incode_region *r,
-                       enum shape shape, double p[3])
-{
+                       enum shape shape, double p[3]) {
     double out[3], size = 0;
     for (int d = 0; d < 3; d++)
         size = fmax(size, fabs(r->x[d]));
@@ -309,8 +295,7 @@ static bool draw_point(const struct cell *s, const struct incode_region *r,
     return true;
 }
 
-static void try_sharp(struct cell *s, enum shape shape)
-{
+static void try_sharp(struct cell *s, enum shape shape) {
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++) {
         struct incode_region kept, sharp;
         struct corner corner = {.boxes = {.unit = 1}};
@@ -332,8 +317,7 @@ static void try_sharp(struct cell *s, enum shape shape)
     }
 }
 
-static void try_cell(struct cell *s, enum shape shape, double far)
-{
+static void try_cell(struct cell *s, enum shape shape, double far) {
     double p[4][3];
     uint32_t four[4];
     draw_cell(p, shape, far);
@@ -344,8 +328,7 @@ static void try_cell(struct cell *s, enum shape shape, double far)
         try_sharp(s, shape);
 }
 
-static void points_in_the_boundary(void **unused)
-{
+static void points_in_the_boundary(void **unused) {
     static struct cell cell;
     int rounds = emulated() ? 20 : SANITIZED ? 300 : 1500;
     (void)unused;
@@ -372,8 +355,7 @@ static const struct {
 } lattices[] = {{0.1, {1, 1, 1}}, {1, {10, 10, 10}}, {1, {3, 7, 11}}};
 enum { LATTICES = sizeof lattices / sizeof *lattices };
 
-static void make_lattice(int l)
-{
+static void make_lattice(int l) {
     for (int i = 0; i < POINTS; i++) {
         const int at[3] = {i / SIDE / SIDE, i / SIDE % SIDE, i % SIDE};
         for (int d = 0; d < 3; d++)
@@ -382,8 +364,7 @@ static void make_lattice(int l)
 }
 
 static void run(uint8_t build, size_t memory, struct host_digest *digest,
-                uint64_t *count)
-{
+                uint64_t *count) {
     struct solo solo = {
         .index = INCODE_KD, .build = build, .regions = 1, .memory = memory};
     solo_run(&solo, xyz[0], POINTS);
@@ -395,8 +376,7 @@ static void run(uint8_t build, size_t memory, struct host_digest *digest,
 
 /* With how many of two sizes of memory the digest is wrong by points. */
 static unsigned wrong_by_points(enum bound without,
-                                const struct host_digest *right)
-{
+                                const struct host_digest *right) {
     struct host_digest digest;
     uint64_t count;
     unsigned found = 0;
@@ -412,8 +392,7 @@ static unsigned wrong_by_points(enum bound without,
 
 /* 0.25 for 0.625 of a kept sphere changes none of these results; the test of
  * points in the boundary finds it. */
-static void decimal_lattices(void **unused)
-{
+static void decimal_lattices(void **unused) {
     unsigned found = 0;
     (void)unused;
     for (int l = 0; l < LATTICES; l++) {
@@ -428,8 +407,7 @@ static void decimal_lattices(void **unused)
     assert_true(found > 0);
 }
 
-static void each_bound_is_needed(void **unused)
-{
+static void each_bound_is_needed(void **unused) {
     (void)unused;
     for (int b = NOTHING; b < BOUNDS; b++)
         print_message("without %s: %llu wrong\n", names[b],
@@ -439,8 +417,7 @@ static void each_bound_is_needed(void **unused)
         assert_true(wrong[b] > 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_in_the_boundary),
         cmocka_unit_test(each_bound_is_needed),

@@ -12,33 +12,27 @@ static struct incode_rest rest;
 
 /* Of cells of points of own bricks: those whose spheres hold one of the rest,
  * the others, and which of these are told. */
-static struct counts {
-    uint64_t reached, free, final;
-} counts;
+static struct counts { uint64_t reached, free, final; } counts;
 
-static bool is_own(uint32_t brick, uint32_t before, uint32_t from)
-{
+static bool is_own(uint32_t brick, uint32_t before, uint32_t from) {
     return brick >= before && brick < from;
 }
 
 static bool rest_touches(struct points_scene *s, uint32_t cell, uint32_t before,
-                         uint32_t from)
-{
+                         uint32_t from) {
     for (uint32_t b = 0; b < s->set.order.bricks; b++)
         if (!is_own(b, before, from) && points_touch(s, cell, b))
             return true;
     return false;
 }
 
-static void set_rest(struct points_scene *s, uint32_t before, uint32_t from)
-{
+static void set_rest(struct points_scene *s, uint32_t before, uint32_t from) {
     while (!incode_rest_set(&rest, &s->maker, before, from))
         points_deliver(s);
     assert_true(rest.count <= INCODE_REST_MAX);
 }
 
-static void check(struct points_scene *s, uint32_t before, uint32_t from)
-{
+static void check(struct points_scene *s, uint32_t before, uint32_t from) {
     set_rest(s, before, from);
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < s->x.cells; i++) {
         const struct incode_cell *c = incode_complex_cell(&s->x, i);
@@ -60,8 +54,7 @@ static void check(struct points_scene *s, uint32_t before, uint32_t from)
 
 /* Each of some bricks ends the own ones, which begin with the first or any. */
 static void no_cell_that_is_reached_is_final(making *make, int exponent,
-                                             double far)
-{
+                                             double far) {
     memset(&counts, 0, sizeof counts);
     points_open(&scene, make, exponent, far, POINTS);
     for (uint32_t from = 1; from <= scene.set.order.bricks;
@@ -77,22 +70,19 @@ static void no_cell_that_is_reached_is_final(making *make, int exponent,
         assert_true(counts.final > counts.free * VOLUME / 10);
 }
 
-static void kinds_and_scales(void **unused)
-{
+static void kinds_and_scales(void **unused) {
     (void)unused;
     points_of_all_kinds(no_cell_that_is_reached_is_final);
 }
 
-static void squares_that_underflow(void **unused)
-{
+static void squares_that_underflow(void **unused) {
     (void)unused;
     points_that_underflow(no_cell_that_is_reached_is_final);
 }
 
 /* ---- the boxes ---- */
 
-static bool is_in_rest(const double p[3])
-{
+static bool is_in_rest(const double p[3]) {
     for (uint32_t i = 0; i < rest.count; i++) {
         bool in = true;
         for (int d = 0; d < 3; d++)
@@ -105,8 +95,7 @@ static bool is_in_rest(const double p[3])
 
 /* Every point of the rest is in its boxes. */
 static void check_points(const struct points_scene *s, uint32_t before,
-                         uint32_t from)
-{
+                         uint32_t from) {
     uint32_t step = 1 + s->set.order.bricks / 200;
     for (uint32_t b = 0; b < s->set.order.bricks; b++) {
         /* All at the ends, where levels meet, and some of the others. */
@@ -124,8 +113,7 @@ static void check_points(const struct points_scene *s, uint32_t before,
 
 /* A box of a page is one of the rest's. */
 static bool is_box_of_rest(const struct points_scene *s, uint32_t level,
-                           uint32_t index)
-{
+                           uint32_t index) {
     const struct incode_tree *tree = &s->maker.tree;
     uint32_t page = tree->base[level + 1] + index / INCODE_FANOUT;
     alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
@@ -145,8 +133,7 @@ static bool is_box_of_rest(const struct points_scene *s, uint32_t level,
  * returns how many. */
 static uint32_t check_largest(const struct points_scene *s, uint32_t level,
                               uint32_t index, uint32_t span, uint32_t before,
-                              uint32_t from)
-{
+                              uint32_t from) {
     uint32_t first = index * span, last = first + span, count = 0;
     last = last < s->set.order.bricks ? last : s->set.order.bricks;
     if (first >= last)
@@ -164,8 +151,8 @@ static uint32_t check_largest(const struct points_scene *s, uint32_t level,
 }
 
 /* They are the rest's, and no others. */
-static void check_boxes(struct points_scene *s, uint32_t before, uint32_t from)
-{
+static void check_boxes(struct points_scene *s, uint32_t before,
+                        uint32_t from) {
     uint32_t span = 1;
     set_rest(s, before, from);
     check_points(s, before, from);
@@ -176,8 +163,7 @@ static void check_boxes(struct points_scene *s, uint32_t before, uint32_t from)
 }
 
 /* Any of them are taken out, and those where pages of boxes begin and end. */
-static void any_bricks_in_the_middle(void **unused)
-{
+static void any_bricks_in_the_middle(void **unused) {
     static const uint32_t ends[] = {0,   1,    31,   32,   33,  64,
                                     992, 1023, 1024, 1025, 1056};
     enum { ENDS = sizeof ends / sizeof *ends };
@@ -201,8 +187,7 @@ static void any_bricks_in_the_middle(void **unused)
     points_close(&scene);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(kinds_and_scales),
         cmocka_unit_test(squares_that_underflow),

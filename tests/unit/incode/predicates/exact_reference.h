@@ -18,8 +18,7 @@ enum { REFERENCE_POINTS = 5 };
 
 static mpz_t reference_p[REFERENCE_POINTS][5], reference_t[12];
 
-static void reference_start(void)
-{
+static void reference_start(void) {
     for (int i = 0; i < REFERENCE_POINTS; i++) {
         for (int k = 0; k < 5; k++)
             mpz_init(reference_p[i][k]);
@@ -28,8 +27,7 @@ static void reference_start(void)
         mpz_init(reference_t[i]);
 }
 
-static void reference_stop(void)
-{
+static void reference_stop(void) {
     for (int i = 0; i < REFERENCE_POINTS; i++) {
         for (int k = 0; k < 5; k++)
             mpz_clear(reference_p[i][k]);
@@ -39,8 +37,7 @@ static void reference_stop(void)
 }
 
 /* The points as integers of one scale, less the origin where there is one. */
-static void reference_load(double (*p)[3], int n, const double *origin)
-{
+static void reference_load(double (*p)[3], int n, const double *origin) {
     int least = INT32_MAX, e;
     for (int i = 0; i <= n; i++) {
         const double *q = i < n ? p[i] : origin;
@@ -68,8 +65,7 @@ static void reference_load(double (*p)[3], int n, const double *origin)
 }
 
 /* r = determinant of rows i, j, k of the loaded points; uses t[10]. */
-static void reference_det3(mpz_t r, int i, int j, int k)
-{
+static void reference_det3(mpz_t r, int i, int j, int k) {
     static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                     {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
     mpz_set_ui(r, 0);
@@ -82,22 +78,19 @@ static void reference_det3(mpz_t r, int i, int j, int k)
 }
 
 /* r = |row i|^2 */
-static void reference_lift(mpz_t r, int i)
-{
+static void reference_lift(mpz_t r, int i) {
     mpz_set_ui(r, 0);
     for (int k = 0; k < 3; k++)
         mpz_addmul(r, reference_p[i][k], reference_p[i][k]);
 }
 
-static int reference_orient3d(double (*p)[3])
-{
+static int reference_orient3d(double (*p)[3]) {
     reference_load(p + 1, 3, p[0]);
     reference_det3(reference_t[0], 0, 1, 2);
     return mpz_sgn(reference_t[0]);
 }
 
-static bool reference_above(const double *a, const double *b)
-{
+static bool reference_above(const double *a, const double *b) {
     for (int k = 0; k < 3; k++) {
         if (a[k] != b[k])
             return a[k] > b[k];
@@ -107,8 +100,7 @@ static bool reference_above(const double *a, const double *b)
 
 /* r = determinant of the loaded rows in columns [column, 5), rows not in
  * `used`: by the first of these columns. */
-static void reference_laplace(mpz_t r, int column, unsigned used)
-{
+static void reference_laplace(mpz_t r, int column, unsigned used) {
     mpz_t minor;
     int sign = 1;
     mpz_set_ui(r, column == 5);
@@ -127,8 +119,7 @@ static void reference_laplace(mpz_t r, int column, unsigned used)
 
 /* The tie: lifts S |p|^2 + B^rank, S and B so large that no lower power nor
  * the rounding of anything can matter; -det with rows (x, y, z, lift, 1). */
-static int reference_tie(double (*p)[3])
-{
+static int reference_tie(double (*p)[3]) {
     mp_bitcnt_t bits = 1;
     reference_load(p, 5, NULL);
     for (int i = 0; i < 5; i++) {
@@ -154,8 +145,7 @@ static int reference_tie(double (*p)[3])
 }
 
 /* With `perturbed`, never 0 where p0..p3 span space and all differ. */
-static int reference_in_sphere(double (*p)[3], bool perturbed)
-{
+static int reference_in_sphere(double (*p)[3], bool perturbed) {
     static const int rest[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
     reference_load(p, 4, p[4]);
     mpz_set_ui(reference_t[0], 0);
@@ -168,8 +158,7 @@ static int reference_in_sphere(double (*p)[3], bool perturbed)
     return sign == 0 && perturbed ? reference_tie(p) : sign;
 }
 
-static int reference_compare_distance(double (*p)[3])
-{
+static int reference_compare_distance(double (*p)[3]) {
     reference_load(p + 1, 2, p[0]);
     reference_lift(reference_t[0], 0);
     reference_lift(reference_t[1], 1);
@@ -177,8 +166,7 @@ static int reference_compare_distance(double (*p)[3])
     return (sign > 0) - (sign < 0);
 }
 
-static bool reference_collinear(double (*p)[3])
-{
+static bool reference_collinear(double (*p)[3]) {
     reference_load(p + 1, 2, p[0]);
     for (int k = 0; k < 3; k++) {
         int u = (k + 1) % 3, v = (k + 2) % 3;

@@ -40,32 +40,27 @@ static const char *const hard_names[HARD_FAMILIES] = {
     "turned",   "spread",     "wide box",   "exponents", "ends",  "largest",
     "denormal", "up",         "down",       "permuted"};
 
-static uint64_t hard_bits(uint64_t *seed)
-{
+static uint64_t hard_bits(uint64_t *seed) {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
     *seed ^= *seed << 17;
     return *seed * 0x9e3779b97f4a7c15u >> 11; /* 53 of them */
 }
 
-static double hard_unit(uint64_t *seed)
-{
+static double hard_unit(uint64_t *seed) {
     return (double)hard_bits(seed) * 0x1p-53;
 }
 
-static int hard_below(uint64_t *seed, int n)
-{
+static int hard_below(uint64_t *seed, int n) {
     return (int)(hard_unit(seed) * n);
 }
 
-static double hard_sign(uint64_t *seed)
-{
+static double hard_sign(uint64_t *seed) {
     return hard_below(seed, 2) != 0 ? 1.0 : -1.0;
 }
 
 /* Half of the time, up to two units in the last place off. */
-static double hard_shaken(uint64_t *seed, double x)
-{
+static double hard_shaken(uint64_t *seed, double x) {
     for (int n = hard_below(seed, 5) - 2; n > 0; n--)
         x = nextafter(x, hard_sign(seed) * INFINITY);
     return x;
@@ -73,8 +68,7 @@ static double hard_shaken(uint64_t *seed, double x)
 
 /* Corners of the box from `lo` to `hi`; now and then a point off them. */
 static void hard_box(uint64_t *seed, double p[5][3], const double lo[3],
-                     const double hi[3])
-{
+                     const double hi[3]) {
     int corners = hard_below(seed, 8), step = 1 + 2 * hard_below(seed, 4);
     for (int i = 0; i < 5; i++, corners += step) {
         for (int k = 0; k < 3; k++)
@@ -86,8 +80,7 @@ static void hard_box(uint64_t *seed, double p[5][3], const double lo[3],
     }
 }
 
-static void hard_on_sphere(uint64_t *seed, double p[5][3])
-{
+static void hard_on_sphere(uint64_t *seed, double p[5][3]) {
     double center[3], radius = 0.25 + hard_unit(seed);
     for (int k = 0; k < 3; k++)
         center[k] = hard_below(seed, 2) != 0 ? 0 : hard_unit(seed);
@@ -102,8 +95,7 @@ static void hard_on_sphere(uint64_t *seed, double p[5][3])
     }
 }
 
-static void hard_turned(uint64_t *seed, double p[5][3])
-{
+static void hard_turned(uint64_t *seed, double p[5][3]) {
     int at[3] = {hard_below(seed, 100) - 50, hard_below(seed, 100) - 50,
                  hard_below(seed, 100) - 50};
     for (int i = 0; i < 5; i++) {
@@ -116,8 +108,7 @@ static void hard_turned(uint64_t *seed, double p[5][3])
     }
 }
 
-static double hard_coordinate(uint64_t *seed, enum hard_family family)
-{
+static double hard_coordinate(uint64_t *seed, enum hard_family family) {
     double sign = hard_sign(seed), unit = hard_unit(seed);
     switch (family) {
     case HARD_SMALL_GRID:
@@ -143,8 +134,7 @@ static double hard_coordinate(uint64_t *seed, enum hard_family family)
 
 /* 2^500 or 2^-500, or where products of 5, 3 or 2 leave the range, or where
  * the filters' guards are. */
-static double hard_edge(uint64_t *seed, int up)
-{
+static double hard_edge(uint64_t *seed, int up) {
     static const int ups[5] = {500, 204, 340, 511, 338};
     static const int downs[5] = {-500, -214, -358, -537, -194};
     int at = hard_below(seed, 5);
@@ -152,16 +142,14 @@ static double hard_edge(uint64_t *seed, int up)
     return ldexp(1, off + (up ? ups[at] : downs[at]));
 }
 
-static void hard_each(uint64_t *seed, enum hard_family family, double p[5][3])
-{
+static void hard_each(uint64_t *seed, enum hard_family family, double p[5][3]) {
     for (int i = 0; i < 5; i++) {
         for (int k = 0; k < 3; k++)
             p[i][k] = hard_coordinate(seed, family);
     }
 }
 
-static void hard_permuted(uint64_t *seed, double p[5][3])
-{
+static void hard_permuted(uint64_t *seed, double p[5][3]) {
     double all[5][3];
     hard_each(seed, HARD_EXPONENTS, all);
     for (int i = 0; i < 5; i++) {
@@ -175,8 +163,8 @@ static void hard_permuted(uint64_t *seed, double p[5][3])
     }
 }
 
-static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
-{
+static void hard_points(uint64_t *seed, enum hard_family family,
+                        double p[5][3]) {
     double lo[3], hi[3], scale;
     switch (family) {
     case HARD_LARGE_GRID:
@@ -230,8 +218,7 @@ static void hard_points(uint64_t *seed, enum hard_family family, double p[5][3])
 }
 
 /* Whether no two of the five points are equal. */
-static int hard_distinct(double p[5][3])
-{
+static int hard_distinct(double p[5][3]) {
     for (int i = 0; i < 5; i++) {
         for (int j = 0; j < i; j++) {
             if (p[i][0] == p[j][0] && p[i][1] == p[j][1] && p[i][2] == p[j][2])

@@ -54,31 +54,27 @@ const char *extended_arithmetic_fault(void);
 #pragma GCC pop_options
 #endif
 
-static void need_processor(void)
-{
+static void need_processor(void) {
     if (emulated()) {
         print_message("valgrind's processor does not know it\n");
         skip();
     }
 }
 
-static void names(const char *fault, const char *word)
-{
+static void names(const char *fault, const char *word) {
     assert_non_null(fault);
     if (strstr(fault, word) == NULL)
         fail_msg("'%s' does not name '%s'", fault, word);
 }
 
-static void test_sound_here(void **state)
-{
+static void test_sound_here(void **state) {
     (void)state;
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL)
         fail_msg("%s", fault);
 }
 
-static void test_fused(void **state)
-{
+static void test_fused(void **state) {
     (void)state;
 #if defined(__FMA__) && !defined(INCODE_SANITIZED)
     names(fused_arithmetic_fault(), "fused");
@@ -88,8 +84,7 @@ static void test_fused(void **state)
 #endif
 }
 
-static void test_extended(void **state)
-{
+static void test_extended(void **state) {
     (void)state;
     need_processor();
 #ifdef EXTENDED
@@ -100,8 +95,7 @@ static void test_extended(void **state)
 #endif
 }
 
-static void test_rounding(void **state)
-{
+static void test_rounding(void **state) {
     static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
     (void)state;
     need_processor();
@@ -114,8 +108,7 @@ static void test_rounding(void **state)
     assert_null(incode_arithmetic_fault());
 }
 
-static void test_flushed(void **state)
-{
+static void test_flushed(void **state) {
     (void)state;
     need_processor();
 #ifdef __SSE2__
@@ -135,8 +128,7 @@ static void test_flushed(void **state)
 #endif
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sound_here), cmocka_unit_test(test_fused),
         cmocka_unit_test(test_extended),   cmocka_unit_test(test_rounding),

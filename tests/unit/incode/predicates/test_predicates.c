@@ -24,16 +24,14 @@
  * and as many again from other orders of the same points. */
 enum { ORIENT3D = 40000, IN_SPHERE = 20000, DISTANCE = 8000, LINE = 8000 };
 
-static long cases(long n)
-{
+static long cases(long n) {
 #ifdef INCODE_SANITIZED
     n /= 8;
 #endif
     return emulated() ? n / 40 : n;
 }
 
-static void show(const char *what, int family, long number, double (*p)[3])
-{
+static void show(const char *what, int family, long number, double (*p)[3]) {
     fprintf(stderr, "%s, family %s, case %ld:\n", what, hard_names[family],
             number);
     for (int i = 0; i < 5; i++)
@@ -41,22 +39,19 @@ static void show(const char *what, int family, long number, double (*p)[3])
 }
 
 static void expect(int got, int want, const char *what, int family, long number,
-                   double (*p)[3])
-{
+                   double (*p)[3]) {
     if (got != want) {
         show(what, family, number, p);
         fail_msg("%d, not %d", got, want);
     }
 }
 
-static int orient3d(double (*p)[3], int a, int b, int c, int d)
-{
+static int orient3d(double (*p)[3], int a, int b, int c, int d) {
     struct incode_tally tally = {0};
     return incode_orient3d(&tally, p[a], p[b], p[c], p[d]);
 }
 
-static int in_sphere(double (*p)[3], int a, int b, int c, int d, int e)
-{
+static int in_sphere(double (*p)[3], int a, int b, int c, int d, int e) {
     struct incode_tally tally = {0};
     return incode_in_sphere(&tally, p[a], p[b], p[c], p[d], p[e]);
 }
@@ -70,8 +65,7 @@ static const int even[12][4] = {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2},
 /* ---- the reference itself ---- */
 
 /* det with rows p1-p0, p2-p0, p3-p0 in rational arithmetic. */
-static int rational_orient3d(double (*p)[3])
-{
+static int rational_orient3d(double (*p)[3]) {
     static const int order[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1},
                                     {0, 2, 1}, {1, 0, 2}, {2, 1, 0}};
     mpq_t m[3][3], t, sum;
@@ -94,8 +88,7 @@ static int rational_orient3d(double (*p)[3])
     return sign;
 }
 
-static void test_reference(void **state)
-{
+static void test_reference(void **state) {
     uint64_t seed = 11;
     double p[5][3];
     (void)state;
@@ -120,8 +113,7 @@ static void test_reference(void **state)
 
 /* ---- the predicates ---- */
 
-static void test_orient3d(void **state)
-{
+static void test_orient3d(void **state) {
     uint64_t seed = 1;
     double p[5][3];
     (void)state;
@@ -146,8 +138,7 @@ static void test_orient3d(void **state)
 }
 
 /* Five distinct points of which the first four are positive. */
-static void draw_positive(uint64_t *seed, int family, double (*p)[3])
-{
+static void draw_positive(uint64_t *seed, int family, double (*p)[3]) {
     for (;;) {
         hard_points(seed, (enum hard_family)family, p);
         int o = hard_distinct(p) ? orient3d(p, 0, 1, 2, 3) : 0;
@@ -163,8 +154,7 @@ static void draw_positive(uint64_t *seed, int family, double (*p)[3])
     }
 }
 
-static void test_in_sphere(void **state)
-{
+static void test_in_sphere(void **state) {
     uint64_t seed = 2;
     double p[5][3];
     (void)state;
@@ -195,8 +185,7 @@ static void test_in_sphere(void **state)
 
 /* Of two candidates over a face exactly one is in the other's sphere, and of
  * three there is one that no other beats: what makes the apex unique. */
-static void test_in_sphere_orders_candidates(void **state)
-{
+static void test_in_sphere_orders_candidates(void **state) {
     uint64_t seed = 3;
     double p[10][3];
     (void)state;
@@ -222,8 +211,7 @@ static void test_in_sphere_orders_candidates(void **state)
     }
 }
 
-static void test_compare_distance(void **state)
-{
+static void test_compare_distance(void **state) {
     uint64_t seed = 4;
     double p[5][3];
     (void)state;
@@ -248,8 +236,7 @@ static void test_compare_distance(void **state)
     }
 }
 
-static void test_collinear(void **state)
-{
+static void test_collinear(void **state) {
     uint64_t seed = 5;
     double p[5][3];
     (void)state;
@@ -274,8 +261,7 @@ static void test_collinear(void **state)
     }
 }
 
-static void test_lexicographic(void **state)
-{
+static void test_lexicographic(void **state) {
     uint64_t seed = 6;
     double p[5][3];
     (void)state;
@@ -296,8 +282,7 @@ struct use {
 };
 
 static double largest_difference(double (*p)[3], int first, int n,
-                                 const double *origin)
-{
+                                 const double *origin) {
     double most = 0;
     for (int i = first; i < first + n; i++) {
         for (int k = 0; k < 3; k++)
@@ -309,8 +294,7 @@ static double largest_difference(double (*p)[3], int first, int n,
 /* Every stage that claims to know must be right, the last one always, whether
  * or not an earlier one would have decided. */
 static void check_orient3d_stages(double (*p)[3], int family, long number,
-                                  struct use *use)
-{
+                                  struct use *use) {
     const double *q[4] = {p[0], p[1], p[2], p[3]};
     int want = reference_orient3d(p), sign;
     double most = largest_difference(p, 1, 3, p[0]);
@@ -331,8 +315,7 @@ static void check_orient3d_stages(double (*p)[3], int family, long number,
 }
 
 static void check_in_sphere_stages(double (*p)[3], int family, long number,
-                                   struct use *use)
-{
+                                   struct use *use) {
     const double *q[5] = {p[0], p[1], p[2], p[3], p[4]};
     int want = reference_in_sphere(p, false), sign;
     double most = largest_difference(p, 0, 4, p[4]);
@@ -360,8 +343,7 @@ static void check_in_sphere_stages(double (*p)[3], int family, long number,
     }
 }
 
-static void test_stages(void **state)
-{
+static void test_stages(void **state) {
     uint64_t seed = 7;
     double p[5][3];
     struct use all = {0};
@@ -387,8 +369,7 @@ static void test_stages(void **state)
 }
 
 /* Integers as large as the stage allows, and every size below. */
-static void test_portable_integers(void **state)
-{
+static void test_portable_integers(void **state) {
     uint64_t seed = 8;
     int64_t d[4][3];
     (void)state;
@@ -411,8 +392,7 @@ static void test_portable_integers(void **state)
     }
 }
 
-static void test_two_product(void **state)
-{
+static void test_two_product(void **state) {
     uint64_t seed = 9;
     mpz_t x, y, z;
     (void)state;
@@ -439,8 +419,7 @@ static void test_two_product(void **state)
         print_message("no fused multiply-add here: Dekker's product alone\n");
 }
 
-static void test_tally(void **state)
-{
+static void test_tally(void **state) {
     struct incode_tally tally = {0};
     double p[5][3] = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {.5, .5, .5}};
     (void)state;
@@ -460,8 +439,7 @@ static void test_tally(void **state)
 /* ---- points of others ---- */
 
 /* Up to `room` points of an .xyz file, compressed or not. */
-static size_t read_points(const char *path, double (*xyz)[3], size_t room)
-{
+static size_t read_points(const char *path, double (*xyz)[3], size_t room) {
     char line[256];
     size_t n = 0;
     gzFile file = gzopen(path, "rb");
@@ -477,8 +455,7 @@ static size_t read_points(const char *path, double (*xyz)[3], size_t room)
 enum { NEAR = 24, ROWS = 20000 };
 
 /* Moves the NEAR points next to row `at` to the front. */
-static void gather(double (*xyz)[3], size_t n, size_t at)
-{
+static void gather(double (*xyz)[3], size_t n, size_t at) {
     double from[3], t[3];
     memcpy(from, xyz[at], sizeof from);
     for (size_t i = 0; i < NEAR && i < n; i++) {
@@ -497,8 +474,7 @@ static void gather(double (*xyz)[3], size_t n, size_t at)
     }
 }
 
-static void check_rows(const char *name, double (*xyz)[3], size_t n)
-{
+static void check_rows(const char *name, double (*xyz)[3], size_t n) {
     static const double scales[3] = {1, 0x1p500, 0x1p-500};
     uint64_t seed = 10;
     double p[5][3];
@@ -528,8 +504,7 @@ static void check_rows(const char *name, double (*xyz)[3], size_t n)
     print_message("%s: %ld in_sphere, %ld ties\n", name, spheres, ties);
 }
 
-static void test_data(void **state)
-{
+static void test_data(void **state) {
     static const char *const names[] = {"bluntfin.xyz.gz",
                                         "bunny.xyz.gz",
                                         "office.xyz.gz",
@@ -567,8 +542,7 @@ static void test_data(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_reference),
         cmocka_unit_test(test_orient3d),

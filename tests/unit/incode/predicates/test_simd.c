@@ -23,16 +23,14 @@ enum {
 
 static uint64_t state;
 
-static uint64_t draw(void)
-{
+static uint64_t draw(void) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
     return state * UINT64_C(0x9e3779b97f4a7c15);
 }
 
-static float draw_float(void)
-{
+static float draw_float(void) {
     static const float odd[] = {0,         -0.0F,   1,       -1,
                                 INFINITY,  NAN,     1e-45F,  -1e-45F,
                                 -INFINITY, 3.4e38F, 1.2e-38F};
@@ -44,8 +42,7 @@ static float draw_float(void)
     return value;
 }
 
-static double draw_double(void)
-{
+static double draw_double(void) {
     uint64_t bits = draw();
     double value;
     if (bits % 2 == 0)
@@ -54,20 +51,17 @@ static double draw_double(void)
     return value;
 }
 
-static bool same(double a, double b)
-{
+static bool same(double a, double b) {
     return (isnan(a) && isnan(b)) || (a == b && signbit(a) == signbit(b));
 }
 
-static int begin(void **unused)
-{
+static int begin(void **unused) {
     (void)unused;
     state = 88172645463325252u;
     return 0;
 }
 
-static void doubles(void **unused)
-{
+static void doubles(void **unused) {
     (void)unused;
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
@@ -91,8 +85,7 @@ static void doubles(void **unused)
     assert_true(same(incode_vd_all(-0.0)[D - 1], -0.0));
 }
 
-static void rows(void **unused)
-{
+static void rows(void **unused) {
     (void)unused;
     for (int round = 0; round < ROUNDS; round++) {
         incode_vd row[D];
@@ -111,8 +104,7 @@ static void rows(void **unused)
     }
 }
 
-static void products(void **unused)
-{
+static void products(void **unused) {
     (void)unused;
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
@@ -129,8 +121,7 @@ static void products(void **unused)
     }
 }
 
-static void floats(void **unused)
-{
+static void floats(void **unused) {
     (void)unused;
     _Alignas(INCODE_VECTOR) float x[F], y[F];
     _Alignas(INCODE_VECTOR) int32_t known[F];
@@ -159,8 +150,7 @@ static void floats(void **unused)
     }
 }
 
-static void whole_numbers(void **unused)
-{
+static void whole_numbers(void **unused) {
     (void)unused;
     _Alignas(INCODE_VECTOR) uint32_t x[F], lo[F], span[F];
     for (int round = 0; round < ROUNDS; round++) {
@@ -188,14 +178,12 @@ static void whole_numbers(void **unused)
 
 /* What lies before byte `first` and from `last` on is as it was. */
 static void assert_untouched(const uint8_t *bytes, size_t size, size_t first,
-                             size_t last)
-{
+                             size_t last) {
     for (size_t i = 0; i < size; i++)
         assert_true((i >= first && i < last) || bytes[i] == GUARD);
 }
 
-static void packs(void **unused)
-{
+static void packs(void **unused) {
     (void)unused;
     _Alignas(INCODE_VECTOR) int32_t x[F];
     _Alignas(INCODE_VECTOR) double y[D];
@@ -234,8 +222,7 @@ static void packs(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(doubles, begin),
         cmocka_unit_test_setup(rows, begin),

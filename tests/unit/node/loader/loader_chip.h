@@ -43,19 +43,16 @@ struct chip {
 
 static struct chip chip;
 
-static uint32_t chip_draw(struct chip *c)
-{
+static uint32_t chip_draw(struct chip *c) {
     c->random = c->random * 1664525u + 1013904223u;
     return c->random >> 8;
 }
 
-static uint32_t chip_size(const struct chip *c)
-{
+static uint32_t chip_size(const struct chip *c) {
     return c->flash.sectors * c->flash.sector_bytes;
 }
 
-static void chip_read(void *context, uint32_t at, void *bytes, size_t size)
-{
+static void chip_read(void *context, uint32_t at, void *bytes, size_t size) {
     const struct chip *c = context;
     assert_true(at + size <= chip_size(c));
     memcpy(bytes, c->bytes + at, size);
@@ -64,8 +61,7 @@ static void chip_read(void *context, uint32_t at, void *bytes, size_t size)
 /* Where a program rewrites all of a block: it may hold anything then, or what
  * was there, or what was to be. */
 static void chip_tear_block(struct chip *c, uint32_t at, const uint8_t *to,
-                            uint32_t size)
-{
+                            uint32_t size) {
     uint32_t begin = at / c->flash.torn_bytes * c->flash.torn_bytes;
     uint32_t kind = chip_draw(c) % 4;
     if (kind != 0) {
@@ -78,8 +74,7 @@ static void chip_tear_block(struct chip *c, uint32_t at, const uint8_t *to,
 }
 
 /* So many blocks of a sector are erased, the next may hold anything. */
-static void chip_tear_sector(struct chip *c, uint32_t at)
-{
+static void chip_tear_sector(struct chip *c, uint32_t at) {
     uint32_t block = c->flash.torn_bytes;
     uint32_t whole = chip_draw(c) % (c->flash.sector_bytes / block);
     memset(c->bytes + at, 0xff, (size_t)whole * block);
@@ -91,8 +86,7 @@ static void chip_tear_sector(struct chip *c, uint32_t at)
 
 /* So many bytes have changed, the word behind them is torn. */
 static void chip_tear(struct chip *c, uint32_t at, const uint8_t *to,
-                      uint32_t size)
-{
+                      uint32_t size) {
     uint32_t whole = chip_draw(c) % (size + 1);
     memcpy(c->bytes + at, to, whole);
     for (uint32_t i = whole; i < size && i < whole + 4; i++) {
@@ -103,20 +97,17 @@ static void chip_tear(struct chip *c, uint32_t at, const uint8_t *to,
 }
 
 /* Whether power is lost in the midst of this operation. */
-static bool chip_loses(struct chip *c)
-{
+static bool chip_loses(struct chip *c) {
     c->done++;
     return c->until_loss >= 0 && c->until_loss-- == 0;
 }
 
-static void chip_spare(const struct chip *c, uint32_t at, uint32_t size)
-{
+static void chip_spare(const struct chip *c, uint32_t at, uint32_t size) {
     assert_true(at + size <= c->sacred || at >= c->sacred + c->sacred_bytes);
 }
 
 static bool chip_program(void *context, uint32_t at, const void *bytes,
-                         size_t size)
-{
+                         size_t size) {
     struct chip *c = context;
     uint8_t to[4096];
     const uint8_t *in = bytes;
@@ -143,8 +134,7 @@ static bool chip_program(void *context, uint32_t at, const void *bytes,
 }
 
 /* Of a torn erasure each byte may be old, new, or in between. */
-static bool chip_erase(void *context, uint32_t sector)
-{
+static bool chip_erase(void *context, uint32_t sector) {
     struct chip *c = context;
     uint32_t size = c->flash.sector_bytes, at = sector * size;
     assert_true(sector < c->flash.sectors);
@@ -169,8 +159,7 @@ static bool chip_erase(void *context, uint32_t sector)
 }
 
 static void chip_make(struct chip *c, uint32_t sector, uint32_t page,
-                      uint32_t sectors)
-{
+                      uint32_t sectors) {
     assert_true(sector * sectors <= CHIP_BYTES);
     memset(c, 0, offsetof(struct chip, lost));
     c->flash = (struct loader_flash){.context = c,
@@ -193,13 +182,11 @@ struct quick_hash {
     uint32_t lane[SIGN_DIGEST_BYTES / 4], count;
 };
 
-static void quick_begin(void *hash)
-{
+static void quick_begin(void *hash) {
     memset(hash, 0, sizeof(struct quick_hash));
 }
 
-static void quick_add(void *hash, const void *bytes, size_t size)
-{
+static void quick_add(void *hash, const void *bytes, size_t size) {
     struct quick_hash *h = hash;
     for (size_t i = 0; i < size; i++, h->count++) {
         uint32_t *lane = &h->lane[h->count % (SIGN_DIGEST_BYTES / 4)];
@@ -208,14 +195,12 @@ static void quick_add(void *hash, const void *bytes, size_t size)
     }
 }
 
-static void quick_end(void *hash, uint8_t digest[SIGN_DIGEST_BYTES])
-{
+static void quick_end(void *hash, uint8_t digest[SIGN_DIGEST_BYTES]) {
     memcpy(digest, ((struct quick_hash *)hash)->lane, SIGN_DIGEST_BYTES);
 }
 
 static void quick_sign(uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
-                       size_t size, const uint8_t *key)
-{
+                       size_t size, const uint8_t *key) {
     struct quick_hash hash;
     quick_begin(&hash);
     quick_add(&hash, key, SIGN_PUBLIC_BYTES);
@@ -226,8 +211,7 @@ static void quick_sign(uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
 
 static bool quick_good(const uint8_t signature[SIGN_BYTES],
                        const uint8_t *bytes, size_t size,
-                       const uint8_t key[SIGN_PUBLIC_BYTES])
-{
+                       const uint8_t key[SIGN_PUBLIC_BYTES]) {
     uint8_t right[SIGN_BYTES];
     quick_sign(right, bytes, size, key);
     return memcmp(signature, right, sizeof right) == 0;
@@ -250,8 +234,7 @@ struct made {
     uint8_t all[CHIP_IMAGE_MAX];
 };
 
-static inline void made_seal(struct made *made)
-{
+static inline void made_seal(struct made *made) {
     struct quick_hash hash;
     loader_image_pack(&made->image, made->all);
     quick_begin(&hash);
@@ -264,8 +247,8 @@ static inline void made_seal(struct made *made)
     loader_image_pack(&made->image, made->all);
 }
 
-static inline void made_make(struct made *made, uint32_t bytes, uint32_t number)
-{
+static inline void made_make(struct made *made, uint32_t bytes,
+                             uint32_t number) {
     uint32_t random = number;
     memset(made, 0, sizeof *made);
     made->bytes = bytes;
@@ -283,8 +266,7 @@ static inline void made_make(struct made *made, uint32_t bytes, uint32_t number)
 }
 
 /* As an image does that comes up, from its start to its first neighbour. */
-static inline bool chip_confirm(const struct chip *c, unsigned slot)
-{
+static inline bool chip_confirm(const struct chip *c, unsigned slot) {
     struct loader_state up;
     return !loader_slots_unconfirmed(&c->flash, slot, &up) ||
            loader_slots_confirm(&c->flash, &up);
@@ -293,8 +275,7 @@ static inline bool chip_confirm(const struct chip *c, unsigned slot)
 /* --- a transfer ------------------------------------------------------------
  */
 
-static inline void chip_work(struct loader_incoming *in)
-{
+static inline void chip_work(struct loader_incoming *in) {
     for (int i = 0; loader_incoming_busy(in); i++) {
         assert_true(i < 100000);
         loader_incoming_step(in);
@@ -302,15 +283,13 @@ static inline void chip_work(struct loader_incoming *in)
 }
 
 static inline void chip_begin(struct loader_incoming *in,
-                              const struct made *made)
-{
+                              const struct made *made) {
     loader_incoming_begin(in, made->all, made->bytes);
     chip_work(in);
 }
 
 static inline void chip_block(struct loader_incoming *in,
-                              const struct made *made, uint32_t block)
-{
+                              const struct made *made, uint32_t block) {
     uint32_t at = block * LOADER_BLOCK_BYTES;
     uint32_t size = made->bytes - at < LOADER_BLOCK_BYTES ? made->bytes - at
                                                           : LOADER_BLOCK_BYTES;
@@ -321,8 +300,7 @@ static inline void chip_block(struct loader_incoming *in,
 
 /* Every block that is not held, as often as it takes. */
 static inline void chip_bring(struct loader_incoming *in,
-                              const struct made *made)
-{
+                              const struct made *made) {
     for (int pass = 0; pass < 8 && in->phase == LOADER_TAKES; pass++) {
         for (uint32_t b = 0; b < in->blocks; b++) {
             if ((in->map[b / 8] >> b % 8 & 1) == 0) {
@@ -332,8 +310,7 @@ static inline void chip_bring(struct loader_incoming *in,
     }
 }
 
-static inline void chip_verify(struct loader_incoming *in)
-{
+static inline void chip_verify(struct loader_incoming *in) {
     loader_incoming_verify(in);
     chip_work(in);
 }

@@ -20,16 +20,14 @@ static struct made one, two;
 static uint32_t erasures[SECTORS], proofs;
 static uint64_t now_us, started_us; /* since the beginning */
 
-static bool count_erasure(void *context, uint32_t sector)
-{
+static bool count_erasure(void *context, uint32_t sector) {
     erasures[sector]++;
     return chip_erase(context, sector);
 }
 
 static bool count_proof(const uint8_t signature[SIGN_BYTES],
                         const uint8_t *bytes, size_t size,
-                        const uint8_t key[SIGN_PUBLIC_BYTES])
-{
+                        const uint8_t key[SIGN_PUBLIC_BYTES]) {
     proofs++;
     return quick_good(signature, bytes, size, key);
 }
@@ -37,8 +35,7 @@ static bool count_proof(const uint8_t signature[SIGN_BYTES],
 static const struct sign_suite counting = {quick_begin, quick_add, quick_end,
                                            count_proof};
 
-static int blank_board(void **state)
-{
+static int blank_board(void **state) {
     (void)state;
     chip_make(&chip, 4096, 256, SECTORS);
     chip.flash.erase = count_erasure;
@@ -53,15 +50,13 @@ static int blank_board(void **state)
     return 0;
 }
 
-static void pass(uint64_t us)
-{
+static void pass(uint64_t us) {
     now_us += us;
     loader_budget_pass(&budget, now_us - started_us);
 }
 
 /* As a board does it; whether it had to wait. */
-static bool start(void)
-{
+static bool start(void) {
     bool waited = false;
     uint32_t boot;
     started_us = now_us;
@@ -75,8 +70,7 @@ static bool start(void)
     return waited;
 }
 
-static uint32_t most_of(uint32_t first, uint32_t sectors)
-{
+static uint32_t most_of(uint32_t first, uint32_t sectors) {
     uint32_t most = 0;
     for (uint32_t i = first; i < first + sectors; i++) {
         most = erasures[i] > most ? erasures[i] : most;
@@ -85,14 +79,12 @@ static uint32_t most_of(uint32_t first, uint32_t sectors)
 }
 
 /* Of a sector that was erased so often meanwhile, but for the first times. */
-static double years(uint32_t erased, uint64_t us)
-{
+static double years(uint32_t erased, uint64_t us) {
     return (double)ERASURES / (double)erased * 1e-6 * (double)us / DAY_S /
            365.25;
 }
 
-static void restarts_cannot_wear_out_a_board(void **unused)
-{
+static void restarts_cannot_wear_out_a_board(void **unused) {
     uint32_t starts = 0, at_once = 0;
     (void)unused;
     while (!start()) {
@@ -118,8 +110,7 @@ static void restarts_cannot_wear_out_a_board(void **unused)
 
 /* Brings code that is not what was signed, twice where the board restarts in
  * the midst of it; false: it is not begun. */
-static bool bring_false(const struct made *made, bool restarts)
-{
+static bool bring_false(const struct made *made, bool restarts) {
     static struct made bad;
     bad = *made;
     for (uint32_t i = LOADER_HEADER_BYTES; i < bad.bytes; i++) {
@@ -145,8 +136,7 @@ static bool bring_false(const struct made *made, bool restarts)
     return true;
 }
 
-static void false_transfers_cannot_wear_out_a_slot(void **unused)
-{
+static void false_transfers_cannot_wear_out_a_slot(void **unused) {
     const struct loader_layout layout = loader_layout(&chip.flash);
     uint32_t begun = 0, before[SECTORS];
     uint64_t from_us = 0;
@@ -181,8 +171,7 @@ static void false_transfers_cannot_wear_out_a_slot(void **unused)
 }
 
 /* Nothing is written for them, and of many few are looked at. */
-static void false_signatures_cost_little(void **unused)
-{
+static void false_signatures_cost_little(void **unused) {
     struct made bad = one;
     (void)unused;
     (void)start();
@@ -210,8 +199,7 @@ static void false_signatures_cost_little(void **unused)
     assert_true(loader_incoming_proved(&in));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(restarts_cannot_wear_out_a_board, blank_board),
         cmocka_unit_test_setup(false_transfers_cannot_wear_out_a_slot,

@@ -30,15 +30,13 @@ static struct {
     jmp_buf lost;
 } device;
 
-static bool read_block(void *context, uint32_t block, uint8_t *bytes)
-{
+static bool read_block(void *context, uint32_t block, uint8_t *bytes) {
     device.reads++;
     assert_true(block < CARD_BLOCKS);
     return !device.dead && loader_card_fetch(context, block, bytes);
 }
 
-static bool write_block(void *context, uint32_t block, const uint8_t *bytes)
-{
+static bool write_block(void *context, uint32_t block, const uint8_t *bytes) {
     device.writes++;
     device.written = block;
     assert_true(block < CARD_BLOCKS);
@@ -59,13 +57,11 @@ static bool write_block(void *context, uint32_t block, const uint8_t *bytes)
 static struct loader_card card;
 static const struct loader_flash flash = LOADER_CARD(&card);
 
-static uint8_t *entry(unsigned i)
-{
+static uint8_t *entry(unsigned i) {
     return device.bytes + 446 + (size_t)i * 16;
 }
 
-static int insert(void **state)
-{
+static int insert(void **state) {
     (void)state;
     if (device.bytes == NULL) {
         device.bytes = malloc((size_t)CARD_BLOCKS * BLOCK);
@@ -81,15 +77,13 @@ static int insert(void **state)
     return 0;
 }
 
-static int take_out(void **state)
-{
+static int take_out(void **state) {
     (void)state;
     free(device.bytes);
     return 0;
 }
 
-static void test_the_partition_is_found(void **state)
-{
+static void test_the_partition_is_found(void **state) {
     (void)state;
     assert_int_equal(card.first, LOADER_CARD_FIRST);
     memmove(entry(2), entry(0), 16);
@@ -110,8 +104,7 @@ static void test_the_partition_is_found(void **state)
 }
 
 /* It is looked for again by who needs it. */
-static void test_without_it_nothing_is_taken(void **state)
-{
+static void test_without_it_nothing_is_taken(void **state) {
     uint8_t bytes[4] = {0};
     uint32_t boot;
     (void)state;
@@ -127,8 +120,7 @@ static void test_without_it_nothing_is_taken(void **state)
     assert_true(loader_boots_next(&flash, &boot));
 }
 
-static void test_it_has_a_flash_s_rules(void **state)
-{
+static void test_it_has_a_flash_s_rules(void **state) {
     uint8_t out[2 * BLOCK], in[4] = {0x0f, 0xf0, 0x55, 0xff};
     uint8_t wide[BLOCK + 1] = {0};
     size_t begin = (size_t)LOADER_CARD_FIRST * BLOCK;
@@ -162,8 +154,7 @@ static void test_it_has_a_flash_s_rules(void **state)
 }
 
 /* Bytes of one block are one read; what is erased is not written. */
-static void test_it_asks_little_of_the_card(void **state)
-{
+static void test_it_asks_little_of_the_card(void **state) {
     uint8_t out[64], in = 0;
     (void)state;
     assert_true(flash.erase(flash.context, 3));
@@ -180,8 +171,7 @@ static void test_it_asks_little_of_the_card(void **state)
                      LOADER_CARD_FIRST + 3 * LOADER_CARD_SECTOR / BLOCK);
 }
 
-static void test_a_card_that_fails_is_told(void **state)
-{
+static void test_a_card_that_fails_is_told(void **state) {
     uint8_t byte = 0;
     uint32_t boot;
     (void)state;
@@ -199,8 +189,7 @@ static void test_a_card_that_fails_is_told(void **state)
 
 /* What is told of starts and of the serial number outlives every write that
  * leaves a block of which nothing is right. */
-static void test_a_torn_block_takes_its_own_alone(void **state)
-{
+static void test_a_torn_block_takes_its_own_alone(void **state) {
     const uint8_t name[LOADER_SERIAL_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8};
     uint8_t serial[LOADER_SERIAL_BYTES];
     static uint32_t last;
@@ -228,8 +217,7 @@ static void test_a_torn_block_takes_its_own_alone(void **state)
     assert_true(last > 300);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_the_partition_is_found, insert),
         cmocka_unit_test_setup(test_without_it_nothing_is_taken, insert),

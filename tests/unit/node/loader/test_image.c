@@ -12,8 +12,7 @@
 #include "transport/bytes.h"
 #include "transport/frame.h"
 
-static struct loader_image sample(void)
-{
+static struct loader_image sample(void) {
     struct loader_image image = {.bytes = 1234567,
                                  .address = 0x10000,
                                  .number = 0x01020304,
@@ -26,8 +25,7 @@ static struct loader_image sample(void)
     return image;
 }
 
-static void what_is_packed_comes_back(void **unused)
-{
+static void what_is_packed_comes_back(void **unused) {
     struct loader_image image = sample(), back;
     uint8_t bytes[LOADER_HEADER_BYTES], again[LOADER_HEADER_BYTES];
     (void)unused;
@@ -49,8 +47,7 @@ static void what_is_packed_comes_back(void **unused)
 }
 
 /* The longest texts have no zero at their end. */
-static void texts_fill_their_fields(void **unused)
-{
+static void texts_fill_their_fields(void **unused) {
     struct loader_image image = sample(), back;
     uint8_t bytes[LOADER_HEADER_BYTES];
     (void)unused;
@@ -62,8 +59,7 @@ static void texts_fill_their_fields(void **unused)
     assert_int_equal(strlen(back.version), LOADER_VERSION_BYTES);
 }
 
-static void every_false_bit_is_found(void **unused)
-{
+static void every_false_bit_is_found(void **unused) {
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES];
     (void)unused;
@@ -80,8 +76,7 @@ static void every_false_bit_is_found(void **unused)
 }
 
 /* Nothing can be hidden where no signature covers it. */
-static void what_says_nothing_is_zero(void **unused)
-{
+static void what_says_nothing_is_zero(void **unused) {
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES];
     (void)unused;
@@ -102,8 +97,7 @@ static struct {
 } judge;
 
 static bool good(const uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
-                 size_t size, const uint8_t key[SIGN_PUBLIC_BYTES])
-{
+                 size_t size, const uint8_t key[SIGN_PUBLIC_BYTES]) {
     judge.asked++;
     judge.size = size;
     assert_int_equal(signature[0], 0x51);
@@ -112,8 +106,7 @@ static bool good(const uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
     return judge.word;
 }
 
-static void a_signer_is_known_by_key_and_signature(void **unused)
-{
+static void a_signer_is_known_by_key_and_signature(void **unused) {
     static const struct sign_suite suite = {.good = good};
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES], key[SIGN_PUBLIC_BYTES];
@@ -136,8 +129,7 @@ static void a_signer_is_known_by_key_and_signature(void **unused)
     assert_int_equal(judge.asked, 2);
 }
 
-static void every_fault_has_its_text(void **unused)
-{
+static void every_fault_has_its_text(void **unused) {
     (void)unused;
     assert_null(loader_fault_text(LOADER_GOOD));
     for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++) {
@@ -145,8 +137,7 @@ static void every_fault_has_its_text(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_packed_comes_back),
         cmocka_unit_test(texts_fill_their_fields),

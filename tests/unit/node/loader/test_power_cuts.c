@@ -8,8 +8,7 @@ enum { IMAGE = 4 * LOADER_BLOCK_BYTES + 1000, TEARS = 16 };
 static struct made old, new, third;
 
 /* What the board would run, byte for byte; LOADER_SLOTS: it waits. */
-static unsigned starts(struct loader_slots *slots, bool ended_badly)
-{
+static unsigned starts(struct loader_slots *slots, bool ended_badly) {
     uint32_t boot;
     assert_true(loader_boots_next(&chip.flash, &boot));
     loader_slots_open(slots, &chip_rules);
@@ -17,8 +16,7 @@ static unsigned starts(struct loader_slots *slots, bool ended_badly)
 }
 
 static bool is_image(const struct loader_slots *slots, unsigned slot,
-                     const struct made *made)
-{
+                     const struct made *made) {
     return slot < LOADER_SLOTS &&
            memcmp(chip.bytes + loader_slots_code(slots, slot),
                   made->all + LOADER_HEADER_BYTES, made->image.bytes) == 0;
@@ -27,8 +25,7 @@ static bool is_image(const struct loader_slots *slots, unsigned slot,
 static struct loader_incoming in;
 
 /* The board is on, takes an image and runs it once. */
-static void live(const struct made *made, bool confirms)
-{
+static void live(const struct made *made, bool confirms) {
     struct loader_slots slots;
     (void)starts(&slots, false);
     loader_incoming_init(&in, &slots);
@@ -47,8 +44,7 @@ static void live(const struct made *made, bool confirms)
 }
 
 /* An image that never comes up, tried until it is given up. */
-static void give_up(const struct made *made, bool badly)
-{
+static void give_up(const struct made *made, bool badly) {
     struct loader_slots slots;
     live(made, false);
     for (unsigned i = 1; i <= LOADER_TRIES; i++) {
@@ -61,8 +57,7 @@ static void give_up(const struct made *made, bool badly)
     assert_true(false);
 }
 
-static bool until_loss(void (*act)(void), long loss)
-{
+static bool until_loss(void (*act)(void), long loss) {
     chip.until_loss = loss;
     if (setjmp(chip.lost) == 0) {
         act();
@@ -73,18 +68,15 @@ static bool until_loss(void (*act)(void), long loss)
     return false;
 }
 
-static void take_new(void)
-{
+static void take_new(void) {
     live(&new, true);
 }
 
-static void fail_new(void)
-{
+static void fail_new(void) {
     give_up(&new, true);
 }
 
-static void fail_new_slowly(void)
-{
+static void fail_new_slowly(void) {
     give_up(&new, false);
 }
 
@@ -98,8 +90,7 @@ static const struct {
 
 /* What is behind a loss: the board starts one of the two, whole; what it held
  * it holds; and the transfer ends as if nothing had been. */
-static void recover(const struct made *before, uint32_t held)
-{
+static void recover(const struct made *before, uint32_t held) {
     struct loader_slots slots;
     unsigned slot = starts(&slots, false);
     if (before != NULL) {
@@ -115,8 +106,7 @@ static void recover(const struct made *before, uint32_t held)
     assert_true(is_image(&slots, slot, &new));
 }
 
-static void cut_everywhere(const struct made *before, void (*act)(void))
-{
+static void cut_everywhere(const struct made *before, void (*act)(void)) {
     static uint8_t image[CHIP_BYTES];
     memcpy(image, chip.bytes, chip_size(&chip));
     chip.done = 0;
@@ -135,8 +125,7 @@ static void cut_everywhere(const struct made *before, void (*act)(void))
     }
 }
 
-static void each_geometry(bool empty, void (*act)(void))
-{
+static void each_geometry(bool empty, void (*act)(void)) {
     for (size_t g = 0; g < sizeof geometries / sizeof geometries[0]; g++) {
         chip_make(&chip, geometries[g].sector, geometries[g].page,
                   geometries[g].sectors);
@@ -149,20 +138,17 @@ static void each_geometry(bool empty, void (*act)(void))
     }
 }
 
-static void test_cuts_of_an_empty_board(void **state)
-{
+static void test_cuts_of_an_empty_board(void **state) {
     (void)state;
     each_geometry(true, take_new);
 }
 
-static void test_cuts_of_a_second_image(void **state)
-{
+static void test_cuts_of_a_second_image(void **state) {
     (void)state;
     each_geometry(false, take_new);
 }
 
-static void test_cuts_of_an_image_that_fails(void **state)
-{
+static void test_cuts_of_an_image_that_fails(void **state) {
     (void)state;
     each_geometry(false, fail_new);
     each_geometry(false, fail_new_slowly);
@@ -173,13 +159,11 @@ static void test_cuts_of_an_image_that_fails(void **state)
  * through in the end. */
 static const struct made *wanted;
 
-static void take_wanted(void)
-{
+static void take_wanted(void) {
     live(wanted, true);
 }
 
-static void test_cuts_at_random(void **state)
-{
+static void test_cuts_at_random(void **state) {
     const struct made *const all[] = {&old, &new, &third};
     (void)state;
     chip_make(&chip, 512, 64, 45);
@@ -201,8 +185,7 @@ static void test_cuts_at_random(void **state)
     }
 }
 
-static int make_images(void **state)
-{
+static int make_images(void **state) {
     (void)state;
     made_make(&old, IMAGE, 5);
     made_make(&new, IMAGE - 300, 6);
@@ -210,8 +193,7 @@ static int make_images(void **state)
     return 0;
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cuts_of_an_empty_board),
         cmocka_unit_test(test_cuts_of_a_second_image),

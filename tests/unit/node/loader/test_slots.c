@@ -7,44 +7,38 @@ static struct made old, new, third;
 static struct loader_slots slots;
 static struct loader_incoming in;
 
-static unsigned starts(bool ended_badly)
-{
+static unsigned starts(bool ended_badly) {
     loader_slots_open(&slots, &chip_rules);
     return loader_slots_choose(&slots, ended_badly);
 }
 
-static void begin(const struct made *made)
-{
+static void begin(const struct made *made) {
     (void)starts(false);
     loader_incoming_init(&in, &slots);
     chip_begin(&in, made);
 }
 
-static void bring(const struct made *made)
-{
+static void bring(const struct made *made) {
     begin(made);
     chip_bring(&in, made);
     chip_verify(&in);
     assert_int_equal(in.phase, LOADER_VERIFIED);
 }
 
-static void bring_and_confirm(const struct made *made)
-{
+static void bring_and_confirm(const struct made *made) {
     bring(made);
     unsigned slot = starts(false);
     assert_true(loader_slots_try(&slots));
     assert_true(chip_confirm(&chip, slot));
 }
 
-static void spare_slot(unsigned slot)
-{
+static void spare_slot(unsigned slot) {
     struct loader_layout layout = loader_layout(&chip.flash);
     chip.sacred = loader_slot_at(&layout, &chip.flash, slot);
     chip.sacred_bytes = layout.sectors * chip.flash.sector_bytes;
 }
 
-static int blank_board(void **state)
-{
+static int blank_board(void **state) {
     (void)state;
     chip_make(&chip, 512, 64, 45);
     made_make(&old, IMAGE, 5);
@@ -53,8 +47,7 @@ static int blank_board(void **state)
     return 0;
 }
 
-static void test_slots_layout(void **state)
-{
+static void test_slots_layout(void **state) {
     (void)state;
     static const uint32_t all[][3] = {
         {4096, 256, 1024}, {4096, 256, 64}, {4096, 256, 63}, {65536, 256, 32},
@@ -79,8 +72,7 @@ static void test_slots_layout(void **state)
     }
 }
 
-static void test_slots_of_an_empty_board(void **state)
-{
+static void test_slots_of_an_empty_board(void **state) {
     (void)state;
     assert_int_equal(starts(false), LOADER_SLOTS);
     assert_int_equal(starts(true), LOADER_SLOTS);
@@ -90,8 +82,7 @@ static void test_slots_of_an_empty_board(void **state)
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_install(void **state)
-{
+static void test_slots_install(void **state) {
     (void)state;
     assert_true(loader_slots_install(&chip.flash, old.all, old.bytes));
     assert_int_equal(starts(true), 0);
@@ -101,8 +92,7 @@ static void test_slots_install(void **state)
 }
 
 /* Three starts that confirm nothing, or one that ends in a fault. */
-static void test_slots_fall_back(void **state)
-{
+static void test_slots_fall_back(void **state) {
     (void)state;
     for (unsigned badly = 0; badly < 2; badly++) {
         blank_board(state);
@@ -130,8 +120,7 @@ static void test_slots_fall_back(void **state)
 
 /* Who turns a board off and on that is not wired yet, and each time lets it run
  * for a while, does not lose the image; one that crashes still falls back. */
-static void test_slots_outlive_power_cycles(void **state)
-{
+static void test_slots_outlive_power_cycles(void **state) {
     (void)state;
     bring_and_confirm(&old);
     bring(&new);
@@ -159,8 +148,7 @@ static void test_slots_outlive_power_cycles(void **state)
     assert_int_equal(starts(true), 0); /* it hung, however late */
 }
 
-static void test_slots_confirm_once(void **state)
-{
+static void test_slots_confirm_once(void **state) {
     (void)state;
     bring_and_confirm(&old);
     long done = chip.done;
@@ -174,8 +162,7 @@ static void test_slots_confirm_once(void **state)
 
 /* What has lost a bit is not started; the other one is, on trial, as it may be
  * one that never came up. */
-static void test_slots_leave_what_has_rotted(void **state)
-{
+static void test_slots_leave_what_has_rotted(void **state) {
     (void)state;
     bring_and_confirm(&old);
     bring_and_confirm(&new);
@@ -191,8 +178,7 @@ static void test_slots_leave_what_has_rotted(void **state)
 }
 
 /* Neither the one in use, nor the only one that has ever come up. */
-static void test_slots_are_spared(void **state)
-{
+static void test_slots_are_spared(void **state) {
     (void)state;
     bring_and_confirm(&old); /* in slot 0 */
     spare_slot(0);
@@ -216,8 +202,7 @@ static void test_slots_are_spared(void **state)
     chip.sacred_bytes = 0;
 }
 
-static void test_slots_serial(void **state)
-{
+static void test_slots_serial(void **state) {
     static const uint8_t one[LOADER_SERIAL_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8};
     static const uint8_t two[LOADER_SERIAL_BYTES] = {9};
     uint8_t serial[LOADER_SERIAL_BYTES];
@@ -245,8 +230,7 @@ static void test_slots_serial(void **state)
 /* --- what is refused: nothing in the flash changes then --------------------
  */
 
-static void refuses(const struct made *made, enum loader_fault fault)
-{
+static void refuses(const struct made *made, enum loader_fault fault) {
     static uint8_t before[CHIP_BYTES];
     memcpy(before, chip.bytes, chip_size(&chip));
     begin(made);
@@ -258,8 +242,7 @@ static void refuses(const struct made *made, enum loader_fault fault)
     assert_memory_equal(before, chip.bytes, chip_size(&chip));
 }
 
-static void test_slots_refuse(void **state)
-{
+static void test_slots_refuse(void **state) {
     (void)state;
     bring_and_confirm(&old);
     struct made bad = new;
@@ -304,8 +287,7 @@ static void test_slots_refuse(void **state)
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_have_no_way_back(void **state)
-{
+static void test_slots_have_no_way_back(void **state) {
     (void)state;
     bring_and_confirm(&old);
     struct made strict = new;
@@ -328,8 +310,7 @@ static void test_slots_have_no_way_back(void **state)
 /* --- blocks ----------------------------------------------------------------
  */
 
-static void test_slots_take_blocks_in_any_order(void **state)
-{
+static void test_slots_take_blocks_in_any_order(void **state) {
     (void)state;
     memset(chip.bytes, 0x5a, chip_size(&chip));
     begin(&old);
@@ -346,8 +327,7 @@ static void test_slots_take_blocks_in_any_order(void **state)
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_pass_over_bad_blocks(void **state)
-{
+static void test_slots_pass_over_bad_blocks(void **state) {
     uint8_t block[LOADER_BLOCK_BYTES + 1] = {0};
     (void)state;
     begin(&old);
@@ -370,8 +350,7 @@ static void test_slots_pass_over_bad_blocks(void **state)
 }
 
 /* Blocks whose CRC is right, and which are not what was signed. */
-static void test_slots_refuse_another_code(void **state)
-{
+static void test_slots_refuse_another_code(void **state) {
     (void)state;
     bring_and_confirm(&old);
     struct made bad = new;
@@ -386,8 +365,7 @@ static void test_slots_refuse_another_code(void **state)
     assert_int_equal(starts(false), 1);
 }
 
-static void test_slots_go_on(void **state)
-{
+static void test_slots_go_on(void **state) {
     (void)state;
     begin(&old);
     chip_block(&in, &old, 2);
@@ -405,8 +383,7 @@ static void test_slots_go_on(void **state)
 
 /* Without a restart: the same again changes nothing; what is refused costs
  * nothing of what has come; another image takes its place. */
-static void test_slots_begin_in_the_midst(void **state)
-{
+static void test_slots_begin_in_the_midst(void **state) {
     (void)state;
     bring_and_confirm(&old);
     begin(&new);
@@ -443,8 +420,7 @@ static void test_slots_begin_in_the_midst(void **state)
  * signature is neither started nor fallen back to, although its digest is
  * right.
  */
-static void starts_not(const struct made *made, enum loader_fault fault)
-{
+static void starts_not(const struct made *made, enum loader_fault fault) {
     uint32_t boot;
     assert_true(loader_slots_install(&chip.flash, made->all, made->bytes));
     assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot),
@@ -456,8 +432,7 @@ static void starts_not(const struct made *made, enum loader_fault fault)
     assert_int_equal(slots.fault[0], fault);
 }
 
-static void test_slots_start_what_is_signed(void **state)
-{
+static void test_slots_start_what_is_signed(void **state) {
     static struct made bad;
     uint32_t boot;
     (void)state;
@@ -485,8 +460,7 @@ static void test_slots_start_what_is_signed(void **state)
 
 /* What runs is what was signed, also where the flash gives something else by
  * then, of code or header. */
-static void test_slots_look_at_the_copy(void **state)
-{
+static void test_slots_look_at_the_copy(void **state) {
     (void)state;
     struct loader_look look;
     uint8_t *code = new.all + LOADER_HEADER_BYTES;
@@ -501,8 +475,7 @@ static void test_slots_look_at_the_copy(void **state)
     assert_int_equal(slots.fault[0], LOADER_WRONG_DIGEST);
 }
 
-static void test_slots_tell_of_a_worn_flash(void **state)
-{
+static void test_slots_tell_of_a_worn_flash(void **state) {
     (void)state;
     bring_and_confirm(&old);
     chip.worn = 5 + 20 + 3; /* in slot 1 */
@@ -516,8 +489,7 @@ static void test_slots_tell_of_a_worn_flash(void **state)
 }
 
 /* It would only restart, again and again, and lose what it had. */
-static void test_slots_wait_where_no_start_is_recorded(void **state)
-{
+static void test_slots_wait_where_no_start_is_recorded(void **state) {
     uint32_t boot = 0, programs;
     (void)state;
     bring_and_confirm(&old);
@@ -544,8 +516,7 @@ static void test_slots_wait_where_no_start_is_recorded(void **state)
 }
 
 /* A trial that cannot be counted would have no end. */
-static void test_slots_wait_where_no_trial_is_counted(void **state)
-{
+static void test_slots_wait_where_no_trial_is_counted(void **state) {
     (void)state;
     bring(&old);
     chip.worn_out = true;
@@ -556,8 +527,7 @@ static void test_slots_wait_where_no_trial_is_counted(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(test_slots_layout, blank_board),
         cmocka_unit_test_setup(test_slots_of_an_empty_board, blank_board),

@@ -27,8 +27,7 @@ int __real_clock_gettime(clockid_t clock, struct timespec *now);
 int __wrap_clock_gettime(clockid_t clock, struct timespec *now);
 
 /* clock: what a machine that is never held up is at. */
-int __wrap_clock_gettime(clockid_t clock, struct timespec *now)
-{
+int __wrap_clock_gettime(clockid_t clock, struct timespec *now) {
     static uint64_t before, held = 1000000000;
     int status = __real_clock_gettime(clock, now);
     uint64_t ns = (uint64_t)now->tv_sec * 1000000000 + (uint64_t)now->tv_nsec;
@@ -42,16 +41,14 @@ int __wrap_clock_gettime(clockid_t clock, struct timespec *now)
 /* NOLINTEND(bugprone-reserved-identifier) */
 
 /* clock: this one. */
-static inline uint64_t clock_us(void)
-{
+static inline uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
 /* Sleeps until so much has passed.  clock: of this one. */
-static inline void rest(uint64_t us)
-{
+static inline void rest(uint64_t us) {
     for (uint64_t begin = clock_us(); clock_us() - begin < us;)
         (void)usleep(HELD_US / 2);
 }

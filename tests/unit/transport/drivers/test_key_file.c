@@ -18,8 +18,7 @@ static const char digits[] =
 static char folder[] = "/tmp/incode-key.XXXXXX";
 static char path[64];
 
-static int make_folder(void **unused)
-{
+static int make_folder(void **unused) {
     (void)unused;
     if (mkdtemp(folder) == NULL) {
         return -1;
@@ -28,15 +27,13 @@ static int make_folder(void **unused)
     return 0;
 }
 
-static int remove_folder(void **unused)
-{
+static int remove_folder(void **unused) {
     (void)unused;
     (void)unlink(path);
     return rmdir(folder);
 }
 
-static void make_file(const char *text, mode_t mode)
-{
+static void make_file(const char *text, mode_t mode) {
     FILE *stream = fopen(path, "w");
     assert_non_null(stream);
     assert_true(fputs(text, stream) >= 0);
@@ -45,8 +42,7 @@ static void make_file(const char *text, mode_t mode)
 }
 
 /* With every right of its group and of others. */
-static void others_that_can_write_it_are_refused(void **unused)
-{
+static void others_that_can_write_it_are_refused(void **unused) {
     static const uint8_t none[SECURE_KEY_BYTES];
     (void)unused;
     for (unsigned rights = 0; rights < 64; rights++) {
@@ -70,8 +66,7 @@ static void others_that_can_write_it_are_refused(void **unused)
 
 /* Root's is as good as one's own, another user's is not, whatever its rights.
  */
-static void another_users_is_refused(void **unused)
-{
+static void another_users_is_refused(void **unused) {
     static const uint8_t none[SECURE_KEY_BYTES];
     uint8_t key[SECURE_KEY_BYTES] = {7};
     (void)unused;
@@ -99,8 +94,7 @@ static void another_users_is_refused(void **unused)
     assert_int_equal(unlink(path), 0);
 }
 
-static void what_is_no_key_is_told(void **unused)
-{
+static void what_is_no_key_is_told(void **unused) {
     static const uint8_t none[SECURE_KEY_BYTES];
     static const char *const texts[] = {"", "00", "no key", NULL};
     uint8_t key[SECURE_KEY_BYTES] = {7};
@@ -134,13 +128,11 @@ static void what_is_no_key_is_told(void **unused)
 static uint8_t read_to[SECURE_KEY_BYTES];
 static enum key_file_state read_state;
 
-static void read_on_stack(void)
-{
+static void read_on_stack(void) {
     read_state = key_file_read(path, read_to);
 }
 
-static void a_key_leaves_no_core_and_no_copy(void **unused)
-{
+static void a_key_leaves_no_core_and_no_copy(void **unused) {
     static const struct rlimit some = {1 << 20, 1 << 20};
     struct rlimit core;
     (void)unused;
@@ -158,8 +150,7 @@ static void a_key_leaves_no_core_and_no_copy(void **unused)
     assert_int_equal(core.rlim_cur + core.rlim_max, 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_key_leaves_no_core_and_no_copy),
         cmocka_unit_test(others_that_can_write_it_are_refused),

@@ -18,8 +18,7 @@ enum { TAG = 7 };
 /* Open MPI leaks by itself.  NOLINTNEXTLINE(bugprone-reserved-identifier) */
 const char *__asan_default_options(void);
 /* NOLINTNEXTLINE(bugprone-reserved-identifier) */
-const char *__asan_default_options(void)
-{
+const char *__asan_default_options(void) {
     return "detect_leaks=0";
 }
 #endif
@@ -28,29 +27,25 @@ static struct mpi_place place;
 static struct mpi_pipe end; /* both ends of its wire */
 
 /* clock: for sleeps of at least a time, and of minutes less than one. */
-static uint64_t clock_us(void)
-{
+static uint64_t clock_us(void) {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }
 
-static int open_end(void **unused)
-{
+static int open_end(void **unused) {
     (void)unused;
     mpi_pipe_open(&end, &place, 0, TAG);
     return 0;
 }
 
-static int close_end(void **unused)
-{
+static int close_end(void **unused) {
     (void)unused;
     return mpi_place_part(&place, &end, 1, 120000000) ? 0 : -1;
 }
 
 /* Pieces of all sizes, read in others. */
-static void bytes_come_out_as_they_went_in(void **unused)
-{
+static void bytes_come_out_as_they_went_in(void **unused) {
     static uint8_t bytes[200000], got[sizeof bytes];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
@@ -73,8 +68,7 @@ static void bytes_come_out_as_they_went_in(void **unused)
     assert_memory_equal(bytes, got, sizeof bytes);
 }
 
-static void a_pipe_that_is_not_read_takes_no_more(void **unused)
-{
+static void a_pipe_that_is_not_read_takes_no_more(void **unused) {
     static uint8_t bytes[MPI_PIPE_BYTES];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
@@ -95,8 +89,7 @@ static void a_pipe_that_is_not_read_takes_no_more(void **unused)
     assert_false(end.blocked);
 }
 
-static void sleep_ends_with_time_or_bytes(void **unused)
-{
+static void sleep_ends_with_time_or_bytes(void **unused) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t byte = 1;
     (void)unused;
@@ -111,8 +104,7 @@ static void sleep_ends_with_time_or_bytes(void **unused)
     assert_int_equal(pipe.receive(pipe.context, &byte, 1), 1);
 }
 
-static void an_end_is_noticed(void **unused)
-{
+static void an_end_is_noticed(void **unused) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t bytes[8] = "last";
     (void)unused;
@@ -126,8 +118,7 @@ static void an_end_is_noticed(void **unused)
                      LINK_PIPE_CLOSED);
 }
 
-int main(int argc, char **argv)
-{
+int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(bytes_come_out_as_they_went_in,
                                         open_end, close_end),

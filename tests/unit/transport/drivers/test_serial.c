@@ -24,15 +24,13 @@
 #include "transport/drivers/serial_port.h"
 
 /* clock: minutes, for what has been sent already. */
-static void wait_for(int fd)
-{
+static void wait_for(int fd) {
     struct pollfd wait = {fd, POLLIN, 0};
     assert_int_equal(poll(&wait, 1, 120000), 1);
 }
 
 /* A pseudo-terminal; where this machine has none, the test is skipped. */
-static void make_pair(int fds[2])
-{
+static void make_pair(int fds[2]) {
     struct statfs pts;
     if (statfs("/dev/pts", &pts) != 0 || pts.f_type != DEVPTS_SUPER_MAGIC) {
         print_message("there are no pseudo-terminals here: no /dev/pts\n");
@@ -41,8 +39,7 @@ static void make_pair(int fds[2])
     assert_int_equal(serial_pair(fds), 0);
 }
 
-static void a_pair_passes_every_byte(void **unused)
-{
+static void a_pair_passes_every_byte(void **unused) {
     int fds[2];
     (void)unused;
     make_pair(fds);
@@ -68,8 +65,7 @@ static void a_pair_passes_every_byte(void **unused)
 }
 
 /* The slave goes and comes back; then the master goes for good. */
-static void a_wire_that_breaks_comes_back(void **unused)
-{
+static void a_wire_that_breaks_comes_back(void **unused) {
     int fds[2];
     char path[64];
     uint8_t byte = 7;
@@ -98,8 +94,7 @@ static void a_wire_that_breaks_comes_back(void **unused)
     assert_int_equal(serial_open(path, 115200, false), -1);
 }
 
-static void rates_and_modes(void **unused)
-{
+static void rates_and_modes(void **unused) {
     int fds[2];
     char path[64];
     struct termios t;
@@ -119,8 +114,7 @@ static void rates_and_modes(void **unused)
 }
 
 /* A child has the port open; it must be named. */
-static void a_port_in_use_says_by_whom(void **unused)
-{
+static void a_port_in_use_says_by_whom(void **unused) {
     int fds[2], ready[2];
     char byte, want[64];
     struct serial_port port;
@@ -166,8 +160,7 @@ static void a_port_in_use_says_by_whom(void **unused)
 
 /* Another process has made the pseudo-terminal and keeps both its ends open, as
  * socat does; it passes on what is sent. */
-static void who_made_a_terminal_is_no_user(void **unused)
-{
+static void who_made_a_terminal_is_no_user(void **unused) {
     int fds[2], ready[2];
     struct serial_port port;
     struct serial_port_settings settings = {.baud = 115200};
@@ -204,8 +197,7 @@ static void who_made_a_terminal_is_no_user(void **unused)
 
 /* A pseudo-terminal has no lasting name but that of a link, which leads to
  * another one when both ends were made anew. */
-static void a_link_is_followed_each_time(void **unused)
-{
+static void a_link_is_followed_each_time(void **unused) {
     char directory[] = "/tmp/incode-serial.XXXXXX", path[64];
     int first[2], second[2];
     uint8_t byte = 7;
@@ -248,8 +240,7 @@ static void a_link_is_followed_each_time(void **unused)
     assert_int_equal(unlink(settings.name) | rmdir(directory), 0);
 }
 
-static void ports_that_are_not_there(void **unused)
-{
+static void ports_that_are_not_there(void **unused) {
     static const char *const names[] = {"usb:no such number", "at:9-9.9",
                                         "/dev/ttyNONE7", "/dev/pts/99999"};
     (void)unused;
@@ -272,8 +263,7 @@ static void ports_that_are_not_there(void **unused)
 /* Real descriptors and the real driver, in the test's own time: between two
  * socket pairs the relay carries baud / 10 bytes a second each way. */
 static uint64_t now;
-static uint64_t test_clock(void)
-{
+static uint64_t test_clock(void) {
     return now;
 }
 
@@ -303,8 +293,7 @@ struct wire {
 enum { STEP_US_MIN = 20, STEP_US_MAX = 200, MESSAGE = 1600, TRANSFER = 65536 };
 
 /* Bits until the next error, about exponential: a sum of many small chances. */
-static double next_flip(struct wire *wire)
-{
+static double next_flip(struct wire *wire) {
     wire->random = wire->random * 6364136223846793005u + 1442695040888963407u;
     double u = (double)(wire->random >> 11) * 0x1p-53, sum = 0, term;
     if (wire->error_rate <= 0) {
@@ -318,8 +307,7 @@ static double next_flip(struct wire *wire)
     return sum / wire->error_rate;
 }
 
-static void carry(struct wire *wire, struct lane *lane)
-{
+static void carry(struct wire *wire, struct lane *lane) {
     uint8_t bytes[64];
     lane->credit += wire->step_us * 1e-7 * wire->baud;
     size_t most =
@@ -342,8 +330,7 @@ static void carry(struct wire *wire, struct lane *lane)
     assert_int_equal(write(lane->to, bytes, (size_t)n), n);
 }
 
-static void open_wire(struct wire *wire, uint32_t baud, double error_rate)
-{
+static void open_wire(struct wire *wire, uint32_t baud, double error_rate) {
     memset(wire, 0, sizeof *wire);
     wire->baud = baud;
     wire->step_us = 10000000 / baud;
@@ -382,8 +369,7 @@ static void open_wire(struct wire *wire, uint32_t baud, double error_rate)
 
 /* Moves `transfers` times 64 KB each way; returns the payload's share of
  * baud / 10. */
-static double transfer(struct wire *wire, unsigned transfers)
-{
+static double transfer(struct wire *wire, unsigned transfers) {
     static uint8_t bytes[MESSAGE];
     uint64_t wanted = (uint64_t)transfers * TRANSFER, begin = 0;
     while (wire->ends[0].read < wanted || wire->ends[1].read < wanted) {
@@ -418,8 +404,7 @@ static double transfer(struct wire *wire, unsigned transfers)
     return (double)wanted / (1e-6 * (double)(now - begin)) / (0.1 * wire->baud);
 }
 
-static void close_wire(struct wire *wire)
-{
+static void close_wire(struct wire *wire) {
     for (unsigned i = 0; i < 4; i++) {
         close(wire->fds[i]);
     }
@@ -428,8 +413,7 @@ static void close_wire(struct wire *wire)
 }
 
 /* A message from end 0, and its echo. */
-static void echo(struct wire *wire, size_t size)
-{
+static void echo(struct wire *wire, size_t size) {
     static uint8_t bytes[MESSAGE];
     struct link_message message;
     bool back = false;
@@ -454,8 +438,7 @@ static void echo(struct wire *wire, size_t size)
 
 /* Short messages, long ones and both directions at once, in turn: what waits
  * behind others is not lost. */
-static void a_clean_wire_resends_nothing(void **unused)
-{
+static void a_clean_wire_resends_nothing(void **unused) {
     static const uint32_t bauds[] = {19200, 57600, 115200, 921600, 3000000};
     (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0];
@@ -484,8 +467,7 @@ static void a_clean_wire_resends_nothing(void **unused)
     }
 }
 
-static void a_link_fills_a_paced_wire(void **unused)
-{
+static void a_link_fills_a_paced_wire(void **unused) {
     static const uint32_t bauds[] = {115200, 921600, 3000000};
     (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0]; i++) {
@@ -506,8 +488,7 @@ static void a_link_fills_a_paced_wire(void **unused)
 }
 
 /* What is given to the kernel ahead of the wire is bounded by the clock. */
-static void little_is_written_ahead(void **unused)
-{
+static void little_is_written_ahead(void **unused) {
     static uint8_t bytes[4096];
     int fds[2];
     struct serial_pipe pipe;
@@ -535,8 +516,7 @@ static void little_is_written_ahead(void **unused)
     close(fds[1]);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pair_passes_every_byte),
         cmocka_unit_test(a_wire_that_breaks_comes_back),

@@ -21,8 +21,7 @@ struct lab {
 };
 
 static struct lab *new_lab(uint32_t rate, uint32_t latency_us, uint32_t room,
-                           uint64_t seed)
-{
+                           uint64_t seed) {
     const struct sim_quality quality = {rate, latency_us, room, BYTES};
     struct lab *lab = calloc(1, sizeof *lab);
     assert_non_null(lab);
@@ -33,27 +32,23 @@ static struct lab *new_lab(uint32_t rate, uint32_t latency_us, uint32_t room,
     return lab;
 }
 
-static int put(struct lab *lab, const uint8_t *bytes, size_t size)
-{
+static int put(struct lab *lab, const uint8_t *bytes, size_t size) {
     return lab->pipe[0].send(lab->pipe[0].context, bytes, size);
 }
 
-static int get(struct lab *lab, uint8_t *bytes, size_t size)
-{
+static int get(struct lab *lab, uint8_t *bytes, size_t size) {
     return lab->pipe[1].receive(lab->pipe[1].context, bytes, size);
 }
 
 /* A frame without a zero but its last, that says its number. */
-static void fill(uint8_t *frame, uint32_t number)
-{
+static void fill(uint8_t *frame, uint32_t number) {
     for (uint32_t i = 0; i < FRAME; i++) {
         frame[i] = (uint8_t)(1 + (number * 31 + i * 7) % 255);
     }
     frame[FRAME - 1] = 0;
 }
 
-static void bytes_take_their_time(void **unused)
-{
+static void bytes_take_their_time(void **unused) {
     uint8_t out[200], in[200];
     struct lab *lab = new_lab(10000, 5000, 150, 1);
     (void)unused;
@@ -81,8 +76,7 @@ static void bytes_take_their_time(void **unused)
 }
 
 /* What is not read holds up who sends, and nothing is lost by that. */
-static void a_full_wire_takes_no_more(void **unused)
-{
+static void a_full_wire_takes_no_more(void **unused) {
     uint8_t out[1000], in[1000];
     struct lab *lab = new_lab(0, 10, BYTES, 1);
     uint64_t sent = 0, got = 0;
@@ -105,8 +99,7 @@ static void a_full_wire_takes_no_more(void **unused)
 
 /* Sends FRAMES frames under such faults; a sum of all that arrives. */
 static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
-                       struct sim_direction *direction, uint64_t *got)
-{
+                       struct sim_direction *direction, uint64_t *got) {
     uint8_t frame[FRAME], in[BYTES];
     struct lab *lab = new_lab(1000000, 50, BYTES / 2, seed);
     uint64_t sum = 0;
@@ -127,8 +120,7 @@ static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
     return sum;
 }
 
-static void faults_strike_as_often_as_they_should(void **unused)
-{
+static void faults_strike_as_often_as_they_should(void **unused) {
     const double chance[SIM_CHANCES] = {0.2,  1e-3, 1e-2, 1e-2,
                                         1e-2, 1e-4, 1e-3};
     const double each[SIM_CHANCES] = {
@@ -165,15 +157,13 @@ struct judge {
     uint64_t frame;
 };
 
-static enum sim_fate decide(void *context, struct sim_direction *direction)
-{
+static enum sim_fate decide(void *context, struct sim_direction *direction) {
     const struct judge *judge = context;
     return direction->frames == judge->frame ? judge->fate : SIM_PASSES;
 }
 
 /* The second frame of three, each sent in two pieces. */
-static void a_frame_meets_its_fate(void **unused)
-{
+static void a_frame_meets_its_fate(void **unused) {
     (void)unused;
     for (int fate = SIM_PASSES; fate <= SIM_LATE; fate++) {
         uint8_t frame[3][FRAME], in[5 * FRAME];
@@ -209,8 +199,7 @@ static void a_frame_meets_its_fate(void **unused)
     }
 }
 
-static void wires_fail_one_way_and_both(void **unused)
-{
+static void wires_fail_one_way_and_both(void **unused) {
     uint8_t frame[FRAME], in[FRAME];
     struct lab *lab = new_lab(0, 0, BYTES / 2, 1);
     (void)unused;
@@ -237,8 +226,7 @@ static void wires_fail_one_way_and_both(void **unused)
     free(lab);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bytes_take_their_time),
         cmocka_unit_test(a_full_wire_takes_no_more),

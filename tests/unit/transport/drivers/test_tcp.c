@@ -21,14 +21,12 @@
 #include "transport/drivers/tcp.h"
 
 /* clock: within minutes. */
-static bool has_input(int fd)
-{
+static bool has_input(int fd) {
     struct pollfd wait = {fd, POLLIN, 0};
     return poll(&wait, 1, WAIT_MS) == 1;
 }
 
-static void a_pair_is_connected_and_set_up(void **unused)
-{
+static void a_pair_is_connected_and_set_up(void **unused) {
     int fds[2], on = 0, bytes[2];
     char byte;
     socklen_t size = sizeof on;
@@ -53,8 +51,7 @@ static void a_pair_is_connected_and_set_up(void **unused)
     close(fds[1]);
 }
 
-static void a_pipe_tells_room_and_end(void **unused)
-{
+static void a_pipe_tells_room_and_end(void **unused) {
     static uint8_t bytes[100000];
     int fds[2], taken = 1;
     struct tcp_pipe a, b;
@@ -97,8 +94,7 @@ struct end {
     int fd;
 };
 
-static void open_end(struct end *end, int fd, unsigned who, uint16_t window)
-{
+static void open_end(struct end *end, int fd, unsigned who, uint16_t window) {
     struct link_config c = {.epoch = 5 + who,
                             .node = (uint16_t)who,
                             .peer_node = (uint16_t)(1 - who),
@@ -111,8 +107,7 @@ static void open_end(struct end *end, int fd, unsigned who, uint16_t window)
     assert_non_null(end->link);
 }
 
-static void a_link_over_tcp(void **unused)
-{
+static void a_link_over_tcp(void **unused) {
     enum { MESSAGES = 3000, SIZE = 1600 };
     static uint8_t bytes[SIZE];
     (void)unused;
@@ -158,8 +153,7 @@ static void a_link_over_tcp(void **unused)
 
 /* What poll has found spares one call, and no more: bytes and an end that come
  * after it are not missed. */
-static void what_was_heard_spares_one_call(void **unused)
-{
+static void what_was_heard_spares_one_call(void **unused) {
     uint8_t byte = 0;
     int fds[2];
     struct tcp_pipe pipe;
@@ -184,8 +178,7 @@ static void what_was_heard_spares_one_call(void **unused)
     close(fds[1]);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_pair_is_connected_and_set_up),
         cmocka_unit_test(a_pipe_tells_room_and_end),

@@ -4,8 +4,7 @@
 
 static const uint8_t other_key[SECURE_KEY_BYTES] = "another key";
 
-static void addresses(void **unused)
-{
+static void addresses(void **unused) {
     static const char *const good[] = {"127.0.0.1:7000", "[::1]:65535",
                                        "127.9.9.9:1"};
     static const char *const bad[] = {
@@ -29,8 +28,7 @@ static void addresses(void **unused)
     assert_true(tcp_address_is_any(&a));
 }
 
-static void paths(void **unused)
-{
+static void paths(void **unused) {
     char path[TCP_PATH_MAX + 2];
     struct tcp_address a;
     (void)unused;
@@ -44,8 +42,7 @@ static void paths(void **unused)
     assert_int_equal(tcp_address_set_path(&a, ""), -1);
 }
 
-static void wires_that_break_go_on(void **unused)
-{
+static void wires_that_break_go_on(void **unused) {
     static struct end ends[2];
     static const int families[] = {AF_INET, AF_INET6};
     (void)unused;
@@ -76,8 +73,7 @@ static void wires_that_break_go_on(void **unused)
 
 /* One with another key that is gone is not spoken of any more: the end that
  * called it hears of that, the other after a while. */
-static void another_key_that_is_gone_is_forgotten(void **unused)
-{
+static void another_key_that_is_gone_is_forgotten(void **unused) {
     (void)unused;
     for (unsigned gone = 0; gone < 2; gone++) {
         static struct end ends[2];
@@ -101,8 +97,7 @@ static void another_key_that_is_gone_is_forgotten(void **unused)
     }
 }
 
-static void another_key_never_connects(void **unused)
-{
+static void another_key_never_connects(void **unused) {
     static struct end ends[2];
     struct tcp_address at = free_address(AF_INET);
     (void)unused;
@@ -130,8 +125,7 @@ static void another_key_never_connects(void **unused)
 
 /* Where only one of the two has a key, either hears of that, whichever calls;
  * and forgets it when one comes who is right. */
-static void a_lone_key_is_told_of(void **unused)
-{
+static void a_lone_key_is_told_of(void **unused) {
     static struct end ends[2];
     (void)unused;
     for (unsigned keyed = 0; keyed < 2; keyed++) {
@@ -167,8 +161,7 @@ static void a_lone_key_is_told_of(void **unused)
  * wrong, or somebody has led his call elsewhere: while nobody better is there
  * he is heard, as the link tells then who he is; one who is right takes his
  * place, and keeps it. */
-static void one_who_is_led_elsewhere_ends_nothing(void **unused)
-{
+static void one_who_is_led_elsewhere_ends_nothing(void **unused) {
     static const struct secure_ends sees[3] = {
         {{0, 0}, {1, 0}}, {{1, 0}, {0, 0}}, {{2, 0}, {3, 0}}};
     static struct end ends[2], lost;
@@ -204,8 +197,7 @@ static void one_who_is_led_elsewhere_ends_nothing(void **unused)
 /* Strangers who say nothing, or noise, while two talk and lose their connection
  * now and then.  Those two are disturbed no more often than that, and look at
  * few strangers at a time. */
-static void with_strangers(const uint8_t *with)
-{
+static void with_strangers(const uint8_t *with) {
     enum { STRANGERS = 60 };
     static struct end ends[2];
     static uint8_t noise[3000];
@@ -262,21 +254,18 @@ static void with_strangers(const uint8_t *with)
     assert_true(connections <= 10);
 }
 
-static void strangers_change_nothing(void **unused)
-{
+static void strangers_change_nothing(void **unused) {
     (void)unused;
     with_strangers(key);
 }
 
-static void strangers_without_a_key_change_nothing(void **unused)
-{
+static void strangers_without_a_key_change_nothing(void **unused) {
     (void)unused;
     with_strangers(NULL);
 }
 
 /* What a caller says before it is answered: as many bytes as come. */
-static size_t greeting_with(const uint8_t *with, uint8_t *bytes, size_t size)
-{
+static size_t greeting_with(const uint8_t *with, uint8_t *bytes, size_t size) {
     static struct end end;
     struct tcp_address at = free_address(AF_INET);
     ssize_t got = 0;
@@ -310,8 +299,7 @@ struct flood {
 
 /* So many strangers more; the first go.  Those that talk slowly say a byte. */
 static void flood_on(struct flood *f, const struct tcp_address *at,
-                     unsigned count)
-{
+                     unsigned count) {
     while (count-- > 0) {
         unsigned i = f->called++ % FLOOD;
         unsigned kind =
@@ -337,8 +325,7 @@ static void flood_on(struct flood *f, const struct tcp_address *at,
 /* Hundreds come, three at each look of the one who listens; one with the key
  * comes behind them, and answers at every third look only.  It is taken within
  * so many looks. */
-static void a_flood_keeps_nobody_out(void **unused)
-{
+static void a_flood_keeps_nobody_out(void **unused) {
     enum { LOOKS_MAX = 60 };
     static struct end ends[2];
     static struct flood f;
@@ -382,8 +369,7 @@ static void a_flood_keeps_nobody_out(void **unused)
 
 /* Without a key, and with nobody better there, one who only listens is taken:
  * a node that does not know who it is; and gives way to one who greets. */
-static void a_silent_caller_is_taken_for_want_of_a_better(void **unused)
-{
+static void a_silent_caller_is_taken_for_want_of_a_better(void **unused) {
     static struct end ends[2];
     struct tcp_address at = free_address(AF_INET);
     uint8_t byte;
@@ -406,8 +392,7 @@ static void a_silent_caller_is_taken_for_want_of_a_better(void **unused)
 
 /* One that answers a call and proves nothing, as its bytes were lost, is called
  * again before it gives up itself. */
-static void a_lost_proof_is_asked_for_again(void **unused)
-{
+static void a_lost_proof_is_asked_for_again(void **unused) {
     static struct end end;
     struct tcp_address at = free_address(AF_INET);
     unsigned calls = 0;
@@ -432,8 +417,7 @@ static void a_lost_proof_is_asked_for_again(void **unused)
     close_end(&end);
 }
 
-static void without_a_key_only_if_it_is_meant(void **unused)
-{
+static void without_a_key_only_if_it_is_meant(void **unused) {
     static struct tcp_wire wire;
     struct tcp_wire_config c = {.listens = true};
     (void)unused;
@@ -450,8 +434,7 @@ static void without_a_key_only_if_it_is_meant(void **unused)
 
 /* A board without random bytes gives its device and the number of its start;
  * one that has neither gets no wire, and nothing left open. */
-static void openings_are_drawn_from_the_board(void **unused)
-{
+static void openings_are_drawn_from_the_board(void **unused) {
     static struct end ends[2];
     struct secure_source boards[2] = {{.device = "board 0", .boot = 7},
                                       {.device = "board 1", .boot = 1}};
@@ -474,8 +457,7 @@ static void openings_are_drawn_from_the_board(void **unused)
     close_end(&ends[1]);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(addresses),
         cmocka_unit_test(paths),

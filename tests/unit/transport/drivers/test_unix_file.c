@@ -7,20 +7,17 @@
 
 static char directory[] = "/tmp/incode-unix.XXXXXX";
 
-static int make_directory(void **unused)
-{
+static int make_directory(void **unused) {
     (void)unused;
     return mkdtemp(directory) == NULL || chmod(directory, 0755) != 0;
 }
 
-static int remove_directory(void **unused)
-{
+static int remove_directory(void **unused) {
     (void)unused;
     return rmdir(directory);
 }
 
-static struct tcp_address path_address(const char *name)
-{
+static struct tcp_address path_address(const char *name) {
     char path[TCP_PATH_MAX + 1];
     struct tcp_address a;
     snprintf(path, sizeof path, "%s/%s", directory, name);
@@ -28,8 +25,7 @@ static struct tcp_address path_address(const char *name)
     return a;
 }
 
-static void a_path_is_a_wire(void **unused)
-{
+static void a_path_is_a_wire(void **unused) {
     static struct end ends[2];
     struct tcp_address at = path_address("wire");
     struct stat about;
@@ -53,8 +49,7 @@ static void a_path_is_a_wire(void **unused)
     assert_int_equal(access(tcp_address_path(&at), F_OK), -1);
 }
 
-static void left_over_files_are_replaced_and_no_others(void **unused)
-{
+static void left_over_files_are_replaced_and_no_others(void **unused) {
     static struct tcp_wire first, second;
     struct tcp_wire_config c = {.listens = true};
     (void)unused;
@@ -78,8 +73,7 @@ static void left_over_files_are_replaced_and_no_others(void **unused)
 
 /* Another user who gets past the file's rights is told by the kernel; either
  * way round. */
-static void another_user_is_sent_away(void **unused)
-{
+static void another_user_is_sent_away(void **unused) {
     static struct end ends[2];
     static struct tcp_wire wire;
     struct tcp_wire_config c = {.listens = true};
@@ -123,8 +117,7 @@ static void another_user_is_sent_away(void **unused)
     tcp_wire_close(&wire);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_path_is_a_wire),
         cmocka_unit_test(left_over_files_are_replaced_and_no_others),

@@ -42,8 +42,7 @@ struct end {
 };
 
 /* A port that was free a moment ago. */
-static inline struct tcp_address free_address(int family)
-{
+static inline struct tcp_address free_address(int family) {
     struct tcp_address a;
     assert_int_equal(
         tcp_address_parse(&a, family == AF_INET ? "127.0.0.1:1" : "[::1]:1"),
@@ -63,8 +62,7 @@ static inline struct tcp_address free_address(int family)
 
 static inline void open_end(struct end *end, unsigned who,
                             const struct tcp_address *address,
-                            const uint8_t *with)
-{
+                            const uint8_t *with) {
     struct tcp_wire_config wire = {
         .address = *address, .listens = who == 1, .insecure = true};
     struct link_config c = {.epoch = 5 + who,
@@ -81,14 +79,12 @@ static inline void open_end(struct end *end, unsigned who,
     assert_non_null(end->link);
 }
 
-static inline void close_end(struct end *end)
-{
+static inline void close_end(struct end *end) {
     tcp_wire_close(&end->wire);
     free(end->memory);
 }
 
-static inline void step(struct end *end)
-{
+static inline void step(struct end *end) {
     static uint8_t bytes[1500];
     struct link_message message;
     link_poll(end->link, clock_us());
@@ -105,8 +101,7 @@ static inline void step(struct end *end)
 }
 
 /* Steps until both have read so many more. */
-static inline bool exchange(struct end *ends, uint32_t messages)
-{
+static inline bool exchange(struct end *ends, uint32_t messages) {
     uint32_t want[2] = {ends[0].read + messages, ends[1].read + messages};
     uint64_t begin = clock_us();
     while (ends[0].read < want[0] || ends[1].read < want[1]) {
@@ -119,8 +114,7 @@ static inline bool exchange(struct end *ends, uint32_t messages)
     return true;
 }
 
-static inline int stranger(const struct tcp_address *at)
-{
+static inline int stranger(const struct tcp_address *at) {
     int fd = socket(at->to.any.sa_family, SOCK_STREAM, 0);
     assert_true(fd >= 0);
     assert_int_equal(tcp_prepare(fd), 0);

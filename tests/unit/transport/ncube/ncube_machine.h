@@ -41,15 +41,13 @@ struct stage {
     unsigned counts[8]; /* for the programs */
 };
 
-static inline uint64_t stage_now_us(void *context)
-{
+static inline uint64_t stage_now_us(void *context) {
     const struct actor *actor = context;
     return actor->stage->machine->now_us;
 }
 
 /* Hands over to the next place, and waits for its turn. */
-static inline void stage_idle(void *context, uint64_t wait_us)
-{
+static inline void stage_idle(void *context, uint64_t wait_us) {
     struct actor *actor = context;
     struct stage *s = actor->stage;
     (void)wait_us;
@@ -62,8 +60,7 @@ static inline void stage_idle(void *context, uint64_t wait_us)
 }
 
 /* Passes messages on until all have finished. */
-static inline void *stage_thread(void *context)
-{
+static inline void *stage_thread(void *context) {
     struct actor *actor = context;
     struct stage *s = actor->stage;
     bool host = actor->place == s->machine->nodes;
@@ -89,8 +86,7 @@ static inline void *stage_thread(void *context)
 
 static inline struct stage *new_stage(unsigned dimension,
                                       const struct cube_config *config,
-                                      unsigned slots, uint64_t seed)
-{
+                                      unsigned slots, uint64_t seed) {
     struct stage *s = calloc(1, sizeof *s);
     assert_non_null(s);
     s->machine = build(dimension, config, &perfect, seed);
@@ -118,8 +114,7 @@ static inline struct stage *new_stage(unsigned dimension,
     return s;
 }
 
-static inline void perform(struct stage *s, play *of_nodes, play *of_host)
-{
+static inline void perform(struct stage *s, play *of_nodes, play *of_host) {
     s->of_nodes = of_nodes;
     s->of_host = of_host;
     s->turn = s->finished = 0;
@@ -133,8 +128,7 @@ static inline void perform(struct stage *s, play *of_nodes, play *of_host)
     }
 }
 
-static inline void free_stage(struct stage *s)
-{
+static inline void free_stage(struct stage *s) {
     for (unsigned i = 0; i < s->machine->count; i++) {
         free(s->actors[i].slots);
     }

@@ -3,8 +3,7 @@
 #include "ncube_machine.h"
 
 /* cmocka's jumps must not leave a thread. */
-static void demand_at(bool true_now, int line)
-{
+static void demand_at(bool true_now, int line) {
     if (!true_now) {
         fprintf(stderr, "tests/unit/transport/ncube/test_ncube.c:%d: not so\n",
                 line);
@@ -18,8 +17,7 @@ static const struct cube_config narrow = {.window = 1};
 /* --- the vendor's calls -------------------------------------------------- */
 
 /* All send to all, themselves and the host as well. */
-static void greet_all(struct actor *a)
-{
+static void greet_all(struct actor *a) {
     struct ncube *v = &a->ncube;
     int node, process, host, dimension, flag = 7, number = 0;
     bool heard[ENDS_MAX] = {false};
@@ -50,8 +48,7 @@ static void greet_all(struct actor *a)
     }
 }
 
-static void every_node_greets_every_node(void **unused)
-{
+static void every_node_greets_every_node(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct stage *s = new_stage(d, &narrow, (1u << d) + 1, d);
@@ -63,8 +60,7 @@ static void every_node_greets_every_node(void **unused)
 enum { TYPES_SENT = 6, EACH = 3 };
 
 /* Node 0 reads by type, the last that was sent first; of a type, in order. */
-static void choose_by_type(struct actor *a)
-{
+static void choose_by_type(struct actor *a) {
     struct ncube *v = &a->ncube;
     int nodes = (int)a->stage->machine->nodes, size;
     for (int i = 0; i < TYPES_SENT * EACH && a->place != 0; i++) {
@@ -87,8 +83,7 @@ static void choose_by_type(struct actor *a)
     }
 }
 
-static void messages_wait_for_who_asks_for_them(void **unused)
-{
+static void messages_wait_for_who_asks_for_them(void **unused) {
     (void)unused;
     for (unsigned d = 1; d <= 3; d++) {
         unsigned slots = (unsigned)TYPES_SENT * EACH << d;
@@ -99,8 +94,7 @@ static void messages_wait_for_who_asks_for_them(void **unused)
 }
 
 /* 0xffff, sizes from nothing to the most, and buffers that are too small. */
-static void tell_all(struct actor *a)
-{
+static void tell_all(struct actor *a) {
     static const int sizes[] = {0, 1, 5, 1000, NCUBE_BYTES_MAX};
     struct ncube *v = &a->ncube;
     uint8_t bytes[NCUBE_BYTES_MAX + 1];
@@ -128,8 +122,7 @@ static void tell_all(struct actor *a)
     }
 }
 
-static void the_host_tells_all(void **unused)
-{
+static void the_host_tells_all(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct stage *s = new_stage(d, &narrow, 1, d);
@@ -138,8 +131,7 @@ static void the_host_tells_all(void **unused)
     }
 }
 
-static void ask_wrongly(struct actor *a)
-{
+static void ask_wrongly(struct actor *a) {
     struct ncube *v = &a->ncube;
     uint8_t bytes[NCUBE_BYTES_MAX + 1] = {0};
     int source = -1, type = -1, nobody = 99, negative = -2;
@@ -160,8 +152,7 @@ static void ask_wrongly(struct actor *a)
     demand(v->failure == NCUBE_LATE);
 }
 
-static void what_makes_no_sense_is_refused(void **unused)
-{
+static void what_makes_no_sense_is_refused(void **unused) {
     (void)unused;
     struct stage *s = new_stage(2, &narrow, 1, 1);
     perform(s, ask_wrongly, ask_wrongly);
@@ -169,8 +160,7 @@ static void what_makes_no_sense_is_refused(void **unused)
 }
 
 /* Node 1 writes what node 0 does not ask for, as does the host. */
-static void fill_up(struct actor *a)
-{
+static void fill_up(struct actor *a) {
     struct ncube *v = &a->ncube;
     int source = -1, type = 5, number = 0;
     if (a->place != 0) {
@@ -187,16 +177,14 @@ static void fill_up(struct actor *a)
     }
 }
 
-static void full_slots_are_said_to_be(void **unused)
-{
+static void full_slots_are_said_to_be(void **unused) {
     (void)unused;
     struct stage *s = new_stage(1, &narrow, 2, 1);
     perform(s, fill_up, fill_up);
     free_stage(s);
 }
 
-static void live_through(struct actor *a)
-{
+static void live_through(struct actor *a) {
     struct ncube *v = &a->ncube;
     int source = -1, type = 5, number = 3;
     if (a->place == a->stage->machine->nodes) {
@@ -221,8 +209,7 @@ static void live_through(struct actor *a)
     demand(source == CUBE_HOST);
 }
 
-static void a_new_generation_is_told(void **unused)
-{
+static void a_new_generation_is_told(void **unused) {
     (void)unused;
     struct stage *s = new_stage(3, &narrow, 4, 1);
     perform(s, live_through, live_through);
@@ -233,14 +220,12 @@ static void a_new_generation_is_told(void **unused)
 
 enum { LARGE = 4000 };
 
-static uint8_t byte_of(unsigned node, unsigned round, size_t i)
-{
+static uint8_t byte_of(unsigned node, unsigned round, size_t i) {
     return (uint8_t)(node * 31 + round * 7 + i * 3 + (i >> 8));
 }
 
 static void broadcast_round(struct actor *a, unsigned root, unsigned round,
-                            size_t size)
-{
+                            size_t size) {
     uint8_t data[LARGE];
     for (size_t i = 0; i < size; i++) {
         data[i] = a->place == root ? byte_of(root, round, i) : 0;
@@ -252,8 +237,7 @@ static void broadcast_round(struct actor *a, unsigned root, unsigned round,
 }
 
 static void gather_round(struct actor *a, unsigned root, unsigned round,
-                         size_t size)
-{
+                         size_t size) {
     unsigned nodes = a->stage->machine->nodes;
     uint8_t own[LARGE], *all = malloc(nodes * size + 1);
     demand(all != NULL);
@@ -269,8 +253,7 @@ static void gather_round(struct actor *a, unsigned root, unsigned round,
     free(all);
 }
 
-static void add(void *into, const void *from, size_t bytes)
-{
+static void add(void *into, const void *from, size_t bytes) {
     for (size_t i = 0; i < bytes; i += sizeof(uint32_t)) {
         uint32_t a, b;
         memcpy(&a, (uint8_t *)into + i, sizeof a);
@@ -281,8 +264,7 @@ static void add(void *into, const void *from, size_t bytes)
 }
 
 static void reduce_round(struct actor *a, unsigned root, unsigned round,
-                         size_t size)
-{
+                         size_t size) {
     uint32_t data[LARGE / 4];
     uint32_t nodes = a->stage->machine->nodes;
     for (uint32_t i = 0; i < size / 4; i++) {
@@ -294,8 +276,7 @@ static void reduce_round(struct actor *a, unsigned root, unsigned round,
     }
 }
 
-static void barrier_round(struct actor *a, unsigned round)
-{
+static void barrier_round(struct actor *a, unsigned round) {
     unsigned *count = &a->stage->counts[round % 4];
     unsigned nodes = a->stage->machine->nodes;
     ++*count;
@@ -309,8 +290,7 @@ static void barrier_round(struct actor *a, unsigned round)
     *count = 0; /* by each, before any can be two rounds ahead */
 }
 
-static void do_together(struct actor *a)
-{
+static void do_together(struct actor *a) {
     static const size_t sizes[] = {8, 0, LARGE, 1, 1596};
     unsigned nodes = a->stage->machine->nodes;
     for (unsigned round = 0; round < 20; round++) {
@@ -327,8 +307,7 @@ static void do_together(struct actor *a)
     }
 }
 
-static void nodes_do_things_together(void **unused)
-{
+static void nodes_do_things_together(void **unused) {
     (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct cube_config c = {.window = (uint16_t)(d % 2 == 0 ? 1 : 4)};
@@ -338,8 +317,7 @@ static void nodes_do_things_together(void **unused)
     }
 }
 
-static void do_together_with_care(struct actor *a)
-{
+static void do_together_with_care(struct actor *a) {
     while (cube_wiring(a->ncube.config.cube)->generation < 2) {
         cube_poll(a->ncube.config.cube, a->stage->machine->now_us);
         stage_idle(a, 0);
@@ -356,8 +334,7 @@ static void do_together_with_care(struct actor *a)
     }
 }
 
-static void cut_and_renew(struct actor *a)
-{
+static void cut_and_renew(struct actor *a) {
     struct cube *cube = a->ncube.config.cube;
     struct cube_wiring next = *cube_wiring(cube);
     next.dead[next.dead_count++] = (struct cube_dead){0, 1};
@@ -365,8 +342,7 @@ static void cut_and_renew(struct actor *a)
     cube_renew(cube, &next);
 }
 
-static void and_after_links_have_died(void **unused)
-{
+static void and_after_links_have_died(void **unused) {
     (void)unused;
     struct stage *s = new_stage(3, &narrow, 8, 2);
     cut_wire(s->machine, 0, 1);
@@ -375,8 +351,7 @@ static void and_after_links_have_died(void **unused)
     free_stage(s);
 }
 
-static void miss_a_node(struct actor *a)
-{
+static void miss_a_node(struct actor *a) {
     struct ncube *v = &a->ncube;
     uint32_t data = 1;
     int source = 2, type = -1;
@@ -397,16 +372,14 @@ static void miss_a_node(struct actor *a)
     demand(a->place == 1 || v->failure == NCUBE_NO_WAY);
 }
 
-static void lose_a_node(struct actor *a)
-{
+static void lose_a_node(struct actor *a) {
     struct cube *cube = a->ncube.config.cube;
     struct cube_wiring next = *cube_wiring(cube);
     next.dead[next.dead_count++] = (struct cube_dead){2, CUBE_WHOLE_NODE};
     cube_renew(cube, &next);
 }
 
-static void a_dead_node_is_named_at_once(void **unused)
-{
+static void a_dead_node_is_named_at_once(void **unused) {
     (void)unused;
     struct stage *s = new_stage(2, &narrow, 8, 2);
     cut_wire(s->machine, 2, 0);
@@ -415,8 +388,7 @@ static void a_dead_node_is_named_at_once(void **unused)
     free_stage(s);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_node_greets_every_node),
         cmocka_unit_test(messages_wait_for_who_asks_for_them),

@@ -13,15 +13,13 @@
 
 static uint64_t random_state = 5;
 
-static uint32_t draw(uint32_t below)
-{
+static uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&random_state) >> 32) % below;
 }
 
 static const uint8_t text[] = "the faces of a job";
 
-static struct tuple_field drawn_field(void)
-{
+static struct tuple_field drawn_field(void) {
     static const double reals[] = {0.0, -0.0, 1.5, 1e300};
     switch (1 + draw(TUPLE_TYPE_LAST)) {
     case TUPLE_TYPE_INT32:
@@ -37,8 +35,7 @@ static struct tuple_field drawn_field(void)
     }
 }
 
-static struct tuple drawn_tuple(void)
-{
+static struct tuple drawn_tuple(void) {
     struct tuple t = {.count = (uint8_t)(1 + draw(3)), .keyed = draw(2)};
     for (unsigned i = 0; i < t.count; i++) {
         t.field[i] = drawn_field();
@@ -46,8 +43,8 @@ static struct tuple drawn_tuple(void)
     return t;
 }
 
-static bool same_value(const struct tuple_field *a, const struct tuple_field *b)
-{
+static bool same_value(const struct tuple_field *a,
+                       const struct tuple_field *b) {
     switch (a->type) {
     case TUPLE_TYPE_INT32:
         return a->as.int32 == b->as.int32;
@@ -68,8 +65,8 @@ static bool same_value(const struct tuple_field *a, const struct tuple_field *b)
 }
 
 /* As TUPLES.md has it. */
-static bool should_match(const struct tuple *pattern, const struct tuple *tuple)
-{
+static bool should_match(const struct tuple *pattern,
+                         const struct tuple *tuple) {
     bool match = pattern->count == tuple->count;
     for (unsigned i = 0; match && i < tuple->count; i++) {
         const struct tuple_field *p = &pattern->field[i];
@@ -79,8 +76,7 @@ static bool should_match(const struct tuple *pattern, const struct tuple *tuple)
     return match;
 }
 
-static void round_trip(void **state)
-{
+static void round_trip(void **state) {
     uint8_t bytes[200];
     (void)state;
     for (unsigned i = 0; i < 20000; i++) {
@@ -97,8 +93,7 @@ static void round_trip(void **state)
     }
 }
 
-static void matches(void **state)
-{
+static void matches(void **state) {
     uint8_t a[200], b[200];
     unsigned matched = 0;
     (void)state;
@@ -126,8 +121,7 @@ static void matches(void **state)
 }
 
 /* Keys and signatures go to all places alike. */
-static void spreads(void **state)
-{
+static void spreads(void **state) {
     unsigned count[7] = {0};
     uint8_t bytes[20];
     (void)state;
@@ -141,8 +135,7 @@ static void spreads(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(round_trip),
                                        cmocka_unit_test(matches),
                                        cmocka_unit_test(spreads)};

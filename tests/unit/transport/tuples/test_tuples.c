@@ -4,8 +4,7 @@
 #include "tuples_world.h"
 
 /* Of so many random programs, those that valgrind has the time for. */
-static uint64_t seeds(uint64_t all)
-{
+static uint64_t seeds(uint64_t all) {
     return emulated() ? all / 5 : all;
 }
 
@@ -21,8 +20,8 @@ struct model {
     unsigned count;
 };
 
-static int model_find(const struct model *m, uint32_t a, uint32_t b, bool wide)
-{
+static int model_find(const struct model *m, uint32_t a, uint32_t b,
+                      bool wide) {
     for (unsigned i = 0; i < m->count; i++) {
         if ((a == OPEN || a == m->tuples[i].a) &&
             (b == OPEN || b == m->tuples[i].b) && wide == m->tuples[i].wide) {
@@ -32,15 +31,13 @@ static int model_find(const struct model *m, uint32_t a, uint32_t b, bool wide)
     return -1;
 }
 
-static void model_drop(struct model *m, int at)
-{
+static void model_drop(struct model *m, int at) {
     m->count--;
     memmove(&m->tuples[at], &m->tuples[at + 1],
             (m->count - (unsigned)at) * sizeof m->tuples[0]);
 }
 
-static struct tuple make(uint32_t a, uint32_t b, bool wide, bool keyed)
-{
+static struct tuple make(uint32_t a, uint32_t b, bool wide, bool keyed) {
     struct tuple t = pair_of(a, b, keyed);
     if (wide) {
         t.field[1] =
@@ -49,14 +46,12 @@ static struct tuple make(uint32_t a, uint32_t b, bool wide, bool keyed)
     return t;
 }
 
-static uint32_t second(const struct tuple *t)
-{
+static uint32_t second(const struct tuple *t) {
     return t->field[1].type == TUPLE_TYPE_INT64 ? (uint32_t)t->field[1].as.int64
                                                 : t->field[1].as.uint32;
 }
 
-static void put(struct world *w, struct model *m, unsigned caller)
-{
+static void put(struct world *w, struct model *m, unsigned caller) {
     uint32_t a = draw(w, 5), b = draw(w, 3);
     bool wide = draw(w, 4) == 0;
     struct tuple t = make(a, b, wide, draw(w, 2));
@@ -73,8 +68,7 @@ static void put(struct world *w, struct model *m, unsigned caller)
 /* What was got: the oldest; or, where callers take turns, any that is there and
  * fits. */
 static int model_got(const struct model *m, int oldest, const struct tuple *t,
-                     bool wide, bool any)
-{
+                     bool wide, bool any) {
     uint32_t a = t->field[0].as.uint32, b = second(t);
     int got = any ? model_find(m, a, b, wide) : oldest;
     assert_true(got >= 0);
@@ -84,8 +78,7 @@ static int model_got(const struct model *m, int oldest, const struct tuple *t,
     return got;
 }
 
-static void ask(struct world *w, struct model *m, unsigned caller, bool any)
-{
+static void ask(struct world *w, struct model *m, unsigned caller, bool any) {
     uint32_t a = draw(w, 2) ? draw(w, 5) : OPEN;
     uint32_t b = draw(w, 2) ? draw(w, 3) : OPEN;
     bool wide = draw(w, 4) == 0, takes = draw(w, 2);
@@ -113,8 +106,7 @@ static void ask(struct world *w, struct model *m, unsigned caller, bool any)
 }
 
 /* The caller stays at a place; or goes about, when all is said. */
-static void random_program(unsigned places, bool roams, uint64_t seed)
-{
+static void random_program(unsigned places, bool roams, uint64_t seed) {
     struct tuples_config config = usual_config();
     struct model *m = calloc(1, sizeof *m);
     config.store_bytes = 20000;
@@ -143,8 +135,7 @@ static void random_program(unsigned places, bool roams, uint64_t seed)
     free(m);
 }
 
-static void equals_model(void **state)
-{
+static void equals_model(void **state) {
     static const unsigned places[] = {1, 2, 3, 5, 16};
     (void)state;
     for (uint64_t seed = 0; seed < seeds(40); seed++) {
@@ -159,8 +150,7 @@ static void equals_model(void **state)
 
 /* Callers that wait get what comes in the order in which they asked; copies
  * hold nobody up. */
-static void first_come(void **state)
-{
+static void first_come(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < seeds(20); seed++) {
         struct tuples_config config = usual_config();
@@ -199,8 +189,7 @@ static void first_come(void **state)
 enum { EACH = 60 };
 
 static struct tuple bulky(uint32_t maker, uint32_t number, uint8_t *bytes,
-                          unsigned size)
-{
+                          unsigned size) {
     struct tuple t = pair_of(maker, number, false);
     memset(bytes, (int)(maker * 7 + number), size);
     t.count = 3;
@@ -210,8 +199,7 @@ static struct tuple bulky(uint32_t maker, uint32_t number, uint8_t *bytes,
 
 /* Makers put more than the store holds, and one takes it, slowly: nothing is
  * lost, and what one maker put one after the other comes so. */
-static void push_back(uint64_t seed)
-{
+static void push_back(uint64_t seed) {
     uint8_t bytes[1100];
     uint32_t made[4] = {0}, got[4] = {0}, refused = 0;
     int putting[4] = {-1, -1, -1, -1}, taking = -1;
@@ -269,8 +257,7 @@ static void push_back(uint64_t seed)
     free_world(w);
 }
 
-static void pushes_back(void **state)
-{
+static void pushes_back(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < seeds(20); seed++) {
         push_back(seed);
@@ -279,8 +266,7 @@ static void pushes_back(void **state)
 
 /* A large tuple is not overtaken for ever by small ones: who asked for room
  * first gets it first. */
-static void room_in_order(void **state)
-{
+static void room_in_order(void **state) {
     uint8_t bytes[1500] = {0};
     struct tuples_config config = usual_config();
     config.store_bytes = 1600;
@@ -313,8 +299,7 @@ static void room_in_order(void **state)
 
 /* --- generations */
 
-static void drop_messages(struct world *w)
-{
+static void drop_messages(struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
         for (unsigned j = 0; j < w->places; j++) {
             w->way[i][j].count = 0;
@@ -324,8 +309,7 @@ static void drop_messages(struct world *w)
 
 /* At any moment: all is empty, what was pending has ended, and the space is as
  * good as new.  Messages of before may still come. */
-static void begins_anew(void **state)
-{
+static void begins_anew(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < seeds(60); seed++) {
         struct tuples_config config = usual_config();
@@ -369,8 +353,7 @@ static void begins_anew(void **state)
 }
 
 /* Whoever gives up gets nothing, and takes nothing from anybody. */
-static void gives_up(void **state)
-{
+static void gives_up(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < seeds(60); seed++) {
         struct tuples_config config = usual_config();
@@ -397,8 +380,7 @@ static void gives_up(void **state)
 /* --- eval */
 
 /* Counts its number down, a step each, and says where it ran. */
-static bool count_down(void *context, struct tuple *tuple)
-{
+static bool count_down(void *context, struct tuple *tuple) {
     const struct world_place *place = context;
     if (tuple->field[1].as.uint32 > 0) {
         tuple->field[1].as.uint32--;
@@ -408,8 +390,7 @@ static bool count_down(void *context, struct tuple *tuple)
     return true;
 }
 
-static void evaluates(void **state)
-{
+static void evaluates(void **state) {
     static tuples_function *const functions[] = {NULL, count_down};
     (void)state;
     for (uint64_t seed = 0; seed < seeds(20); seed++) {
@@ -456,8 +437,7 @@ static void evaluates(void **state)
 
 /* --- limits, and what no place sends */
 
-static void keeps_limits(void **state)
-{
+static void keeps_limits(void **state) {
     struct tuples_config config = usual_config();
     uint8_t bytes[TUPLES_TUPLE_MAX] = {0};
     struct world *w = new_world(2, &config, 1);
@@ -486,8 +466,7 @@ static void keeps_limits(void **state)
     assert_int_equal(tuples_arena_bytes(&config), 0);
 }
 
-static void survives_nonsense(void **state)
-{
+static void survives_nonsense(void **state) {
     struct tuples_config config = usual_config();
     uint8_t m[64];
     unsigned sound = 0;
@@ -517,8 +496,7 @@ static void survives_nonsense(void **state)
     assert_true(sound > 300);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(equals_model),     cmocka_unit_test(first_come),
         cmocka_unit_test(pushes_back),      cmocka_unit_test(room_in_order),

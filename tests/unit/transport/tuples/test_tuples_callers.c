@@ -4,8 +4,7 @@
 
 enum { SEEDS = 6000 };
 
-static void explained(void **state)
-{
+static void explained(void **state) {
     uint32_t taken = 0, none = 0, waited = 0;
     (void)state;
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
@@ -27,8 +26,7 @@ static void explained(void **state)
 }
 
 /* What the explainer must not take. */
-static void tells_wrong(void **state)
-{
+static void tells_wrong(void **state) {
     struct history h;
     (void)state;
     memset(&h, 0, sizeof h);
@@ -52,8 +50,7 @@ static void tells_wrong(void **state)
     assert_false(is_explained(&h));
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(explained),
                                        cmocka_unit_test(tells_wrong)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -24,8 +24,7 @@ struct party {
 };
 
 static int write_message(void *context, uint16_t place, const void *data,
-                         size_t size)
-{
+                         size_t size) {
     struct party_place *p = context;
     int status = cube_write(p->party->machine->places[p->self].cube, place,
                             MESSAGE, data, size);
@@ -33,8 +32,7 @@ static int write_message(void *context, uint16_t place, const void *data,
     return status;
 }
 
-static struct tuple job_pattern(void)
-{
+static struct tuple job_pattern(void) {
     struct tuple t = {.count = 3};
     t.field[0] = TUPLE_UINT32('j');
     t.field[1] = TUPLE_FORMAL(TUPLE_TYPE_UINT32);
@@ -43,8 +41,7 @@ static struct tuple job_pattern(void)
 }
 
 /* A tetrahedron builder: takes jobs until there is one without faces. */
-static bool work(void *context, struct tuple *tuple)
-{
+static bool work(void *context, struct tuple *tuple) {
     struct party_place *p = context;
     struct worker *worker = &p->party->worker[p->self];
     struct tuples *space = p->party->space[p->self];
@@ -80,8 +77,7 @@ static bool work(void *context, struct tuple *tuple)
 
 static tuples_function *const functions[] = {work};
 
-static void open_party(struct party *p, struct machine *m)
-{
+static void open_party(struct party *p, struct machine *m) {
     struct tuples_config config = {0};
     p->machine = m;
     config.places = (uint16_t)m->nodes;
@@ -102,8 +98,7 @@ static void open_party(struct party *p, struct machine *m)
     }
 }
 
-static void turn(struct party *p)
-{
+static void turn(struct party *p) {
     struct machine *m = p->machine;
     m->now_us += 20 + draw(m) % 80;
     for (unsigned i = 0; i < m->count; i++) {
@@ -122,8 +117,8 @@ static void turn(struct party *p)
     }
 }
 
-static enum tuples_status wait_for(struct party *p, int number, struct tuple *t)
-{
+static enum tuples_status wait_for(struct party *p, int number,
+                                   struct tuple *t) {
     enum tuples_status status = TUPLES_PENDING;
     assert_true(number >= 0);
     for (unsigned i = 0; status == TUPLES_PENDING; i++) {
@@ -135,8 +130,7 @@ static enum tuples_status wait_for(struct party *p, int number, struct tuple *t)
 }
 
 static void put(struct party *p, uint32_t number, const void *faces,
-                unsigned size)
-{
+                unsigned size) {
     struct tuple t = job_pattern();
     t.field[1] = TUPLE_UINT32(number);
     t.field[2] = TUPLE_BYTES(faces, size);
@@ -145,8 +139,7 @@ static void put(struct party *p, uint32_t number, const void *faces,
     tuples_close(p->space[0], out);
 }
 
-static void master(struct party *p, unsigned workers)
-{
+static void master(struct party *p, unsigned workers) {
     uint8_t faces[FACES];
     struct tuple t = {.count = 2}, pattern = job_pattern();
     bool got[JOBS] = {false};
@@ -189,8 +182,7 @@ static void master(struct party *p, unsigned workers)
     assert_int_equal(done, JOBS);
 }
 
-static void triangulates(void **state)
-{
+static void triangulates(void **state) {
     static const struct cube_config usual = {.window = 2};
     struct host_sim_cube_options bad = perfect;
     (void)state;
@@ -217,8 +209,7 @@ static void triangulates(void **state)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(triangulates)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,8 +6,7 @@
 
 enum { SEEDS = 200 };
 
-static void found(void **state)
-{
+static void found(void **state) {
     unsigned wrong = 0;
     (void)state;
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
@@ -19,8 +18,7 @@ static void found(void **state)
     assert_true(wrong > 0);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(found)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,8 +47,7 @@ struct history {
 /* --- playing */
 
 static inline int begin_call(struct world *w, unsigned place,
-                             const struct call *c)
-{
+                             const struct call *c) {
     struct tuple t = pair_of(c->a, c->b, c->keyed);
     struct tuples *space = w->space[place];
     int number = c->verb == CALL_OUT   ? tuples_out(space, &t)
@@ -59,8 +58,7 @@ static inline int begin_call(struct world *w, unsigned place,
     return number;
 }
 
-static inline void draw_calls(struct world *w, struct history *h)
-{
+static inline void draw_calls(struct world *w, struct history *h) {
     unsigned outs = 2 + draw(w, 4);
     for (unsigned i = 0; i < h->callers; i++) {
         for (unsigned k = 0; k < h->calls; k++) {
@@ -76,8 +74,7 @@ static inline void draw_calls(struct world *w, struct history *h)
 }
 
 static inline bool end_call(struct world *w, unsigned place, int number,
-                            struct call *c, uint32_t now)
-{
+                            struct call *c, uint32_t now) {
     struct tuple t;
     enum tuples_status status = tuples_poll(w->space[place], number, &t);
     if (status == TUPLES_PENDING) {
@@ -94,8 +91,7 @@ static inline bool end_call(struct world *w, unsigned place, int number,
 }
 
 /* Callers may share a place.  Ends when nothing moves any more. */
-static inline void play(struct history *h, uint64_t seed)
-{
+static inline void play(struct history *h, uint64_t seed) {
     struct tuples_config config = usual_config();
     unsigned next[CALLERS_MAX] = {0}, quiet = 0;
     int number[CALLERS_MAX];
@@ -146,8 +142,7 @@ struct explainer {
                  (CALLS_MAX + 1)];
 };
 
-static inline bool is_there(const struct explainer *e, const struct call *c)
-{
+static inline bool is_there(const struct explainer *e, const struct call *c) {
     for (uint32_t a = 0; a < VALUES; a++) {
         for (uint32_t b = 0; b < VALUES; b++) {
             if (e->there[a][b] > 0 && (c->a == OPEN || c->a == a) &&
@@ -160,8 +155,7 @@ static inline bool is_there(const struct explainer *e, const struct call *c)
 }
 
 /* Whether the call, made now, has the result that was seen. */
-static inline bool fits(const struct explainer *e, const struct call *c)
-{
+static inline bool fits(const struct explainer *e, const struct call *c) {
     if (c->verb == CALL_OUT) {
         return true;
     }
@@ -175,8 +169,7 @@ static inline bool fits(const struct explainer *e, const struct call *c)
 }
 
 static inline void make_call(struct explainer *e, const struct call *c,
-                             int sign)
-{
+                             int sign) {
     if (c->verb == CALL_OUT) {
         e->there[c->a][c->b] += sign;
     } else if (!c->none && (c->verb == CALL_IN || c->verb == CALL_INP)) {
@@ -185,16 +178,15 @@ static inline void make_call(struct explainer *e, const struct call *c,
 }
 
 /* The next of a caller that has ended, or NULL. */
-static inline const struct call *next_of(const struct explainer *e, unsigned i)
-{
+static inline const struct call *next_of(const struct explainer *e,
+                                         unsigned i) {
     const struct call *c = &e->h->call[i][e->done[i]];
     return e->done[i] == e->h->calls || c->ended == NEVER ? NULL : c;
 }
 
 /* All that have ended are made: nobody waits for what is there, and nothing is
  * there that should not be.  An out that waits for room has not put any. */
-static inline bool ends_well(const struct explainer *e)
-{
+static inline bool ends_well(const struct explainer *e) {
     int count = 0;
     for (unsigned i = 0; i < e->h->callers; i++) {
         const struct call *c = &e->h->call[i][e->done[i]];
@@ -209,8 +201,7 @@ static inline bool ends_well(const struct explainer *e)
     return count == (int)e->h->stored;
 }
 
-static inline bool explain(struct explainer *e)
-{
+static inline bool explain(struct explainer *e) {
     unsigned set = 0;
     for (unsigned i = 0; i < CALLERS_MAX; i++) {
         set = set * (CALLS_MAX + 1) + e->done[i];
@@ -240,8 +231,7 @@ static inline bool explain(struct explainer *e)
     return ends_well(e);
 }
 
-static inline bool is_explained(const struct history *h)
-{
+static inline bool is_explained(const struct history *h) {
     struct explainer *e = calloc(1, sizeof *e);
     assert_non_null(e);
     e->h = h;

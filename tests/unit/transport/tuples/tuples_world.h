@@ -52,14 +52,12 @@ struct world {
     void *user; /* of functions that eval starts */
 };
 
-static inline uint32_t draw(struct world *w, uint32_t below)
-{
+static inline uint32_t draw(struct world *w, uint32_t below) {
     return (uint32_t)(sim_draw(&w->random) >> 32) % below;
 }
 
 static inline int world_write(void *context, uint16_t place, const void *data,
-                              size_t size)
-{
+                              size_t size) {
     struct world_place *from = context;
     struct world *w = from->world;
     assert_true(place < w->places && place != from->self);
@@ -77,8 +75,7 @@ static inline int world_write(void *context, uint16_t place, const void *data,
     return 0;
 }
 
-static inline struct tuples_config usual_config(void)
-{
+static inline struct tuples_config usual_config(void) {
     struct tuples_config config = {0};
     config.operations = 3;
     config.tuple_bytes = TUPLES_TUPLE_MAX;
@@ -87,8 +84,7 @@ static inline struct tuples_config usual_config(void)
 }
 
 static inline struct world *
-new_world(unsigned places, const struct tuples_config *usual, uint64_t seed)
-{
+new_world(unsigned places, const struct tuples_config *usual, uint64_t seed) {
     struct world *w = calloc(1, sizeof *w);
     assert_non_null(w);
     w->places = places;
@@ -116,8 +112,7 @@ new_world(unsigned places, const struct tuples_config *usual, uint64_t seed)
     return w;
 }
 
-static inline void free_world(struct world *w)
-{
+static inline void free_world(struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
         free(w->space[i]);
     }
@@ -125,8 +120,7 @@ static inline void free_world(struct world *w)
 }
 
 /* The next message of one way comes, if there is one. */
-static inline void deliver(struct world *w, unsigned from, unsigned to)
-{
+static inline void deliver(struct world *w, unsigned from, unsigned to) {
     if (w->way[from][to].count > 0) {
         struct world_message *m =
             &w->way[from][to].messages[w->way[from][to].first];
@@ -137,8 +131,7 @@ static inline void deliver(struct world *w, unsigned from, unsigned to)
     }
 }
 
-static inline void turn(struct world *w)
-{
+static inline void turn(struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
         tuples_step(w->space[draw(w, w->places)]);
         for (unsigned k = draw(w, 4); k > 0; k--) {
@@ -147,8 +140,7 @@ static inline void turn(struct world *w)
     }
 }
 
-static inline bool under_way(const struct world *w)
-{
+static inline bool under_way(const struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
         for (unsigned j = 0; j < w->places; j++) {
             if (w->way[i][j].count > 0) {
@@ -160,8 +152,7 @@ static inline bool under_way(const struct world *w)
 }
 
 /* Until nothing moves, and nothing is owed that a busy link holds up. */
-static inline void settle(struct world *w)
-{
+static inline void settle(struct world *w) {
     unsigned quiet = 0, busy = w->busy;
     w->busy = 0;
     for (unsigned turns = 0; quiet < 40; turns++) {
@@ -177,8 +168,7 @@ static inline void settle(struct world *w)
     w->busy = busy;
 }
 
-static inline uint32_t held(const struct world *w)
-{
+static inline uint32_t held(const struct world *w) {
     uint32_t count = 0;
     for (unsigned i = 0; i < w->places; i++) {
         count += tuples_held(w->space[i]);
@@ -188,8 +178,7 @@ static inline uint32_t held(const struct world *w)
 
 /* Waits for an operation, and closes it; what it has got was small. */
 static inline enum tuples_status finish(struct world *w, unsigned place,
-                                        int operation, struct tuple *tuple)
-{
+                                        int operation, struct tuple *tuple) {
     enum tuples_status status = TUPLES_PENDING;
     assert_true(operation >= 0);
     for (unsigned turns = 0; status == TUPLES_PENDING; turns++) {
@@ -205,8 +194,7 @@ static inline enum tuples_status finish(struct world *w, unsigned place,
  * open, or both. */
 enum { OPEN = 100 };
 
-static inline struct tuple pair_of(uint32_t a, uint32_t b, bool keyed)
-{
+static inline struct tuple pair_of(uint32_t a, uint32_t b, bool keyed) {
     struct tuple t = {.count = 2, .keyed = keyed};
     t.field[0] = a == OPEN ? TUPLE_FORMAL(TUPLE_TYPE_UINT32) : TUPLE_UINT32(a);
     t.field[1] = b == OPEN ? TUPLE_FORMAL(TUPLE_TYPE_UINT32) : TUPLE_UINT32(b);

@@ -31,23 +31,20 @@ static struct host_tetrahedra tets;
 static bool lost[NODES];
 static struct host_work work;
 
-static int set_up(void **unused)
-{
+static int set_up(void **unused) {
     (void)unused;
     struct host_error error = {0};
     return host_gen("uniform", 3000, 1, &points, &error);
 }
 
-static int tear_down(void **unused)
-{
+static int tear_down(void **unused) {
     (void)unused;
     host_points_free(&points);
     return 0;
 }
 
 /* A run of this strategy at its beginning: all nodes have their setup. */
-static void begin(const struct host_strategy *strategy)
-{
+static void begin(const struct host_strategy *strategy) {
     struct host_error error = {0};
     assert_int_equal(host_order_make(&order, "test", points.xyz, points.count,
                                      HOST_ADAPTIVE, strategy->regions(NODES),
@@ -66,8 +63,7 @@ static void begin(const struct host_strategy *strategy)
     assert_non_null(work.state);
 }
 
-static void end(void)
-{
+static void end(void) {
     free(work.state);
     host_order_free(&order);
     host_ledger_free(&ledger);
@@ -75,8 +71,7 @@ static void end(void)
 }
 
 /* The roles of the nodes, one character each. */
-static const char *roles(const struct host_strategy *strategy)
-{
+static const char *roles(const struct host_strategy *strategy) {
     static char text[NODES + 1];
     for (unsigned i = 0; i < NODES; i++) {
         struct node_setup_message setup = {0};
@@ -96,15 +91,13 @@ static const char *roles(const struct host_strategy *strategy)
     return text;
 }
 
-static void lose(const struct host_strategy *strategy, unsigned node)
-{
+static void lose(const struct host_strategy *strategy, unsigned node) {
     lost[node] = true;
     work.living--;
     strategy->lose(&work);
 }
 
-static uint32_t give(unsigned node, const struct incode_job *job)
-{
+static uint32_t give(unsigned node, const struct incode_job *job) {
     return host_ledger_open(&ledger, node, job->first, job->last);
 }
 

@@ -12,8 +12,7 @@
 enum { NODES = 4 };
 
 /* Every row can be run and named, and only by its own name. */
-static void test_table(void **unused)
-{
+static void test_table(void **unused) {
     (void)unused;
     const struct host_task task = {.points = 1000,
                                    .memory = 4u << 20,
@@ -42,8 +41,7 @@ static void test_table(void **unused)
     assert_null(host_strategy_row(UINT32_MAX));
 }
 
-static const struct host_strategy *best_of(const struct host_task *task)
-{
+static const struct host_strategy *best_of(const struct host_task *task) {
     const struct host_strategy *best = host_strategy_auto(task);
     char why[HOST_WHY_BYTES];
     for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
@@ -59,8 +57,7 @@ static const struct host_strategy *best_of(const struct host_task *task)
 /* Alone, alone; with few regions, regions; with many, where borders are most of
  * them, an exchange; and where points are inserted faster than faces found, or
  * the wire is what takes the time, alone again. */
-static void test_auto(void **unused)
-{
+static void test_auto(void **unused) {
     (void)unused;
     struct host_task task = {
         .points = 20000, .memory = 4u << 20, .nodes = 1, .processors = 1};
@@ -94,8 +91,7 @@ static void test_auto(void **unused)
     assert_ptr_equal(best_of(&task), &host_spatial);
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_table),
         cmocka_unit_test(test_auto),

@@ -7,8 +7,7 @@
 #include "begun_strategy.h"
 
 /* The box is that of the job's points, or of their region. */
-static void check_box(const struct incode_job *job)
-{
+static void check_box(const struct incode_job *job) {
     for (uint32_t v = job->first * INCODE_BRICK_POINTS;
          v < job->last * INCODE_BRICK_POINTS; v++) {
         double p[3];
@@ -20,16 +19,14 @@ static void check_box(const struct incode_job *job)
 }
 
 static void commit_all(const struct host_strategy *strategy, unsigned node,
-                       const struct incode_job *job)
-{
+                       const struct incode_job *job) {
     for (uint32_t b = job->first; b < job->last; b++) {
         assert_int_equal(strategy->commit(&work, node, b), 0);
     }
     assert_int_equal(host_ledger_finish(&ledger, node), 0);
 }
 
-static void test_sequential(void **unused)
-{
+static void test_sequential(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_sequential;
     struct incode_job job, none;
@@ -71,8 +68,7 @@ static void test_sequential(void **unused)
     end();
 }
 
-static void test_spatial_first(void **unused)
-{
+static void test_spatial_first(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_spatial;
     struct incode_job job, none;
@@ -101,8 +97,7 @@ static void test_spatial_first(void **unused)
 
 /* After a loss everybody takes of what is left, and all of it is done; two
  * ranges a node, or one where it is alone. */
-static void test_spatial_loss(void **unused)
-{
+static void test_spatial_loss(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_spatial;
     for (unsigned gone = 1; gone < NODES; gone++) {
@@ -139,8 +134,7 @@ static void test_spatial_loss(void **unused)
 }
 
 /* Nothing is done, and nodes only start again: each has its region again. */
-static void test_spatial_restart(void **unused)
-{
+static void test_spatial_restart(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_spatial;
     struct incode_job job;
@@ -159,8 +153,7 @@ static void test_spatial_restart(void **unused)
 
 /* Who builds for the manager, one bit each. */
 static unsigned builders_of(const struct host_strategy *strategy,
-                            unsigned manager)
-{
+                            unsigned manager) {
     struct node_setup_message setup = {0};
     strategy->set_up(&work, manager, &setup);
     assert_int_equal(setup.role, NODE_MANAGER);
@@ -178,8 +171,7 @@ static unsigned builders_of(const struct host_strategy *strategy,
     return builders;
 }
 
-static void test_master_slaves(void **unused)
-{
+static void test_master_slaves(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_master_slaves;
     struct incode_job job, none;
@@ -228,8 +220,7 @@ static void test_master_slaves(void **unused)
     end();
 }
 
-static void test_hybrid(void **unused)
-{
+static void test_hybrid(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_hybrid;
     struct incode_job job, none;
@@ -285,16 +276,14 @@ static void test_hybrid(void **unused)
 
 static void check_refused(const struct host_strategy *s, unsigned nodes,
                           struct host_sharing sharing,
-                          enum incode_face_rule rule, const char *text)
-{
+                          enum incode_face_rule rule, const char *text) {
     struct host_error error = {0};
     assert_int_equal(s->check(nodes, &sharing, rule, &error),
                      text == NULL ? 0 : HOST_USAGE);
     assert_true(text == NULL || strstr(error.text, text) != NULL);
 }
 
-static void test_refusals(void **unused)
-{
+static void test_refusals(void **unused) {
     (void)unused;
     static const struct host_strategy *const rows[] = {&host_master_slaves,
                                                        &host_hybrid};
@@ -323,8 +312,7 @@ static void test_refusals(void **unused)
 /* The first node that is given bricks at the beginning, and its job; NODES: a
  * strategy that gives none. */
 static unsigned first_with_bricks(const struct host_strategy *s,
-                                  struct incode_job *job)
-{
+                                  struct incode_job *job) {
     unsigned node = 0;
     while (node < NODES &&
            !(s->first(&work, node, job) && job->first + 2 <= job->last)) {
@@ -334,8 +322,7 @@ static unsigned first_with_bricks(const struct host_strategy *s,
 }
 
 /* What comes of a brick that is not committed goes with a loss. */
-static void test_lost_tetrahedra(void **unused)
-{
+static void test_lost_tetrahedra(void **unused) {
     (void)unused;
     unsigned tried = 0;
     for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
@@ -370,8 +357,7 @@ static void test_lost_tetrahedra(void **unused)
 
 /* The memory that is asked for does for every role that a strategy gives, and
  * is no more than one of them needs. */
-static void test_arena(void **unused)
-{
+static void test_arena(void **unused) {
     (void)unused;
     const struct node_identity identity = {.dimension = 2, .epoch = 1};
     const struct node_setup_message given = {.setup = {.bricks = 100}};
@@ -397,8 +383,7 @@ static void test_arena(void **unused)
     }
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_sequential),
         cmocka_unit_test(test_spatial_first),

@@ -13,8 +13,7 @@ static struct {
 } told;
 
 static bool write_to_all(void *context, uint8_t type, const void *data,
-                         size_t size)
-{
+                         size_t size) {
     struct node_regions_message head;
     struct node_page_message page;
     (void)context;
@@ -45,8 +44,7 @@ static bool write_to_all(void *context, uint8_t type, const void *data,
 }
 
 /* Pages that go to all where each node has room for so many. */
-static void goes_to_all(uint32_t frames, uint32_t first)
-{
+static void goes_to_all(uint32_t frames, uint32_t first) {
     const struct host_strategy *s = &host_exchange;
     struct incode_job job;
     uint32_t pages = order.tree.pages;
@@ -74,8 +72,7 @@ static void goes_to_all(uint32_t frames, uint32_t first)
 
 /* All exchange, and are told all regions and what pages each has room for,
  * once; after a loss they work by themselves, and hear nothing of them. */
-static void test_exchange(void **unused)
-{
+static void test_exchange(void **unused) {
     (void)unused;
     const struct host_strategy *s = &host_exchange;
     struct incode_job job;
@@ -125,8 +122,7 @@ static void test_exchange(void **unused)
     end();
 }
 
-int main(void)
-{
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_exchange),
     };
