@@ -69,8 +69,6 @@ GPIOD        := $(firstword $(subst ., ,$(shell pkg-config --modversion libgpiod
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
 host         := $(filter-out host/lines/lines_gpiod%,$(host)) \
 	host/lines/lines_gpiod$(GPIOD).c
-# A library of its own, for others' programs: nothing here is linked with it.
-ncube        := $(wildcard transport/ncube/*.c)
 unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
@@ -89,7 +87,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all ncube unit points planted bare arithmetic fuzzers run check test \
+.PHONY: all unit points planted bare arithmetic fuzzers run check test \
 	test-full bench firmware nodes cross fuzz lint install uninstall clean \
 	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
 
@@ -116,15 +114,13 @@ $(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
-ncube: $(BUILD)/libncube.a
-$(BUILD)/libncube.a: $(ncube:%.c=$(obj)/%.o)
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
 $(BUILD)/%.a: $(BUILD)/lists
 	@rm -f $@
 	@$(AR) rcs $@ $(filter %.o,$^)
 # An archive keeps nothing of a file that is gone.
-archived = $(core_objects) $(host_objects) $(ncube) $(bare_shared)
+archived = $(core_objects) $(host_objects) $(bare_shared)
 $(BUILD)/lists: FORCE
 	@mkdir -p $(@D)
 	@echo '$(archived)' | cmp -s - $@ || echo '$(archived)' > $@
@@ -218,7 +214,6 @@ $(foreach t,tcp tcp_wire unix_file,$(BUILD)/tests/test_$(t)): \
 
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
-$(BUILD)/tests/test_ncube: $(BUILD)/libncube.a
 $(foreach t,$(unit),$(eval $(BUILD)/tests/$(notdir $(t:.c=)): $(obj)/$(t:.c=.o)))
 $(filter-out %/test_mpi,$(unit_tests)): $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
@@ -468,7 +463,6 @@ help:
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                the order of rooms, format, examples, sizes,'
 	@echo '                         warnings as errors, analysers'
-	@echo 'make ncube               build/libncube.a: the calls of the nCUBE, for'
 	@echo '                         porting programs that were written for them'
 	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages,'
 	@echo '                         documents and completion to DIR/share, firmware and'
