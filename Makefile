@@ -67,8 +67,8 @@ host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
 GPIOD        := $(firstword $(subst ., ,$(shell pkg-config --modversion libgpiod \
 	2>/dev/null)) 1)
 host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
-host         := $(filter-out host/lines/lines_gpiod%,$(host)) \
-	host/lines/lines_gpiod$(GPIOD).c
+host         := $(filter-out host/cube/lines_gpiod%,$(host)) \
+	host/cube/lines_gpiod$(GPIOD).c
 unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
@@ -131,8 +131,8 @@ $(BUILD)/flags: FORCE
 	@echo '$(CC) $(NODE_CC) $(HOSTED)' | cmp -s - $@ || \
 		echo '$(CC) $(NODE_CC) $(HOSTED)' > $@
 
-ifeq ($(wildcard host/lines/lines_gpiod$(GPIOD).c),)
-host/lines/lines_gpiod$(GPIOD).c:
+ifeq ($(wildcard host/cube/lines_gpiod$(GPIOD).c),)
+host/cube/lines_gpiod$(GPIOD).c:
 	@echo 'make: libgpiod $(GPIOD) is installed; its calls belong in $@,' \
 		'as those of version 1 are in lines_gpiod1.c' >&2
 	@false
@@ -244,8 +244,8 @@ $(BUILD)/tests/incode-lost-batch: host/service/handlers.c
 $(BUILD)/tests/incode-taken-by-two: planted = \
 	transport/tuples/request.c -DINCODE_PLANT_TAKEN_BY_TWO
 $(BUILD)/tests/incode-taken-by-two: transport/tuples/request.c
-$(BUILD)/tests/incode-answer: planted = incode/manager.c -DINCODE_PLANT_ANSWER
-$(BUILD)/tests/incode-answer: incode/manager.c
+$(BUILD)/tests/incode-answer: planted = incode/paper/manager.c -DINCODE_PLANT_ANSWER
+$(BUILD)/tests/incode-answer: incode/paper/manager.c
 $(BUILD)/tests/incode-late: planted = incode/front/loan.c -DINCODE_PLANT_LATE
 $(BUILD)/tests/incode-late: incode/front/loan.c
 $(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "host/bench/mpi/bench.h"
-#include "host/machines/mpi/ranks.h"
+#include "host/nodes/mpi/ranks.h"
 #include "host/run/arguments.h"
 #include "host/run/begin.h"
 #include "host/run/launch.h"

@@ -10,9 +10,9 @@
 #define INCODE_STATE_H
 
 #include "incode/front/front.h"
-#include "incode/maker/maker.h"
-#include "incode/points/handover.h"
-#include "incode/points/insertion.h"
+#include "incode/apex/maker.h"
+#include "incode/insertion/handover.h"
+#include "incode/insertion/insertion.h"
 #include "triangulator.h"
 
 /* What a job is about. */

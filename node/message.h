@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #include "incode/front/loan.h"
-#include "incode/list.h"
+#include "incode/paper/list.h"
 #include "incode/triangulator.h"
 #include "transport/cube.h"
 
@@ -71,7 +71,7 @@ enum node_message_type {
     NODE_ANSWER,          /* struct node_answer_head, then what was asked for */
     NODE_IMAGE_STATE,     /* of a loader: loader/messages.h */
     NODE_WRONG_PAGE,      /* struct node_wrong_page_message */
-    /* From a face manager to a builder, and back: incode/list.h. */
+    /* From a face manager to a builder, and back: incode/paper/list.h. */
     NODE_LIST = 64, /* struct incode_list, as much as is in use */
     NODE_ANSWERS,   /* struct incode_answers, likewise */
     /* From a node to another: transport/TUPLES.md. */
@@ -161,11 +161,12 @@ struct node_setup_message {
      * builder: its manager, another node. */
     uint16_t manager;
 
-    /* Of a manager: faces a list, 1 to INCODE_LIST_MAX (incode/list.h). */
+    /* Of a manager: faces a list, 1 to INCODE_LIST_MAX (incode/paper/list.h).
+     */
     uint16_t faces_per_job;
 
     /* Lists that a builder may have at a time, 1 to INCODE_LISTS_MAX
-     * (incode/builder.h). */
+     * (incode/paper/builder.h). */
     uint16_t jobs_per_worker;
 
     uint16_t reserved2; /* 0 */

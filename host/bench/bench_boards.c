@@ -15,7 +15,7 @@
 #include "bench_trial.h"
 #include "host/base/create.h"
 #include "host/base/progress.h"
-#include "host/machines/boards.h"
+#include "host/nodes/boards.h"
 
 enum { POINTS = 5000, LIMIT_S = 900, NODES = 2, NODES_WORD = 4 };
 

@@ -22,7 +22,7 @@ static const struct {
     enum host_room room;
 } rooms[] = {
     {"incode/predicates/", HOST_ROOM_PREDICATES},
-    {"incode/maker/", HOST_ROOM_SEARCH},
+    {"incode/apex/", HOST_ROOM_SEARCH},
     {"incode/pages/", HOST_ROOM_SEARCH},
     {"incode/front/", HOST_ROOM_COMPLEX},
     {"incode/complex/", HOST_ROOM_COMPLEX},

@@ -13,7 +13,7 @@
 
 #include "bench_end.h"
 #include "bench_sim.h"
-#include "host/machines/cluster.h"
+#include "host/nodes/cluster.h"
 #include "transport/drivers/secure_sodium.h"
 #include "transport/drivers/serial.h"
 #include "transport/drivers/tcp_wire.h"

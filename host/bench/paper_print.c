@@ -6,7 +6,7 @@
 
 #include "host/base/create.h"
 #include "host/base/progress.h"
-#include "host/order/names.h"
+#include "host/mesh/names.h"
 
 int host_paper_print_begin(struct host_paper_print *print, const char *csv,
                            struct host_error *error) {

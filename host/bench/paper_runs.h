@@ -14,7 +14,7 @@
 #include <stdbool.h>
 
 #include "host/mesh/points.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "model.h"
 
 enum { HOST_PAPER_SETS = 16, HOST_PAPER_RUNS_MAX = 512, HOST_PAPER_QUICK = 10 };

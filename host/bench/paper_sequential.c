@@ -6,7 +6,7 @@
 
 #include "calibrate.h"
 #include "host/base/progress.h"
-#include "host/order/names.h"
+#include "host/mesh/names.h"
 #include "host/service/strategies/strategies.h"
 #include "paper_list.h"
 

@@ -12,8 +12,8 @@
 #define HOST_CONSOLE_PLACE_H
 
 #include "child_run.h"
-#include "host/lines/lines.h"
-#include "host/visit/site.h"
+#include "host/cube/lines.h"
+#include "host/cube/site.h"
 #include "shell.h"
 
 enum { HOST_CONSOLE_PATH = 4200 };

@@ -16,8 +16,8 @@
 
 #include <jansson.h>
 
-#include "host/look/look.h"
-#include "host/visit/visit.h"
+#include "host/watch/look.h"
+#include "host/cube/visit.h"
 #include "watch.h"
 
 /* Where the cube is, and what is beside it. */

@@ -5,7 +5,7 @@
 
 #include "commands.h"
 #include "host/base/text.h"
-#include "host/machines/emulator.h"
+#include "host/nodes/emulator.h"
 #include "node/roles/roles.h"
 
 enum { WIRES_US = 10000000 }; /* for those of nodes that have just begun */

@@ -21,7 +21,7 @@
 
 #include "host/deploy/programs.h"
 #include "host/deploy/script.h"
-#include "host/machines/cube_file.h"
+#include "host/nodes/cube_file.h"
 
 enum {
     HOST_BOARD_FILES = 3,

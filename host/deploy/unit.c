@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "host/base/text.h"
-#include "host/machines/cluster.h"
+#include "host/nodes/cluster.h"
 
 /* Beside its data memory: the program itself, and what the kernel keeps for its
  * sockets. */

@@ -13,7 +13,7 @@
 #ifndef HOST_UNIT_H
 #define HOST_UNIT_H
 
-#include "host/machines/cube_file.h"
+#include "host/nodes/cube_file.h"
 
 struct host_unit {
     const struct host_cube_file *file;

@@ -13,7 +13,7 @@
 #ifndef HOST_PICTURE_H
 #define HOST_PICTURE_H
 
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "section.h"
 
 enum {

@@ -10,8 +10,8 @@
 #include "host/base/options.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"
-#include "host/lines/lines.h"
-#include "host/visit/site.h"
+#include "host/cube/lines.h"
+#include "host/cube/site.h"
 #include "image_file.h"
 
 enum {

@@ -11,7 +11,7 @@
 #ifndef HOST_IMAGE_FILE_H
 #define HOST_IMAGE_FILE_H
 
-#include "host/files/source.h"
+#include "host/formats/source.h"
 #include "node/loader/image.h"
 
 struct host_image {

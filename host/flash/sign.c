@@ -8,8 +8,8 @@
 
 #include "host/base/options.h"
 #include "host/base/text.h"
-#include "host/files/output.h"
-#include "host/machines/boards.h"
+#include "host/formats/output.h"
+#include "host/nodes/boards.h"
 #include "image_file.h"
 #include "node/loader/messages.h"
 #include "node/version.h"

@@ -9,7 +9,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include "host/machines/cube_key.h"
+#include "host/nodes/cube_key.h"
 #include "transport/drivers/key_file.h"
 #include "transport/secure_wipe.h"
 

@@ -17,7 +17,7 @@
 #ifndef HOST_SPREAD_H
 #define HOST_SPREAD_H
 
-#include "host/visit/visit.h"
+#include "host/cube/visit.h"
 #include "node/loader/messages.h"
 
 enum { HOST_SPREAD_TEXT = 320, HOST_SPREAD_STARTS_MAX = 12 };

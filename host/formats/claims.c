@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/files/target.h"
+#include "host/formats/target.h"
 #include "write.h"
 
 struct host_claim {

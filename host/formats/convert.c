@@ -7,7 +7,7 @@
 
 #include "claims.h"
 #include "formats.h"
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "read.h"
 #include "write.h"
 

@@ -16,8 +16,8 @@
 #ifndef HOST_FORMAT_H
 #define HOST_FORMAT_H
 
-#include "host/files/output.h"
-#include "host/files/source.h"
+#include "host/formats/output.h"
+#include "host/formats/source.h"
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
 

@@ -16,7 +16,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "host/files/source.h"
+#include "host/formats/source.h"
 
 struct host_scan {
     const char *path;

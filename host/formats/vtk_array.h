@@ -11,7 +11,7 @@
 #ifndef HOST_VTK_ARRAY_H
 #define HOST_VTK_ARRAY_H
 
-#include "host/files/source.h"
+#include "host/formats/source.h"
 
 struct vtk_coding {
     bool base64;      /* else raw */

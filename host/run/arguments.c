@@ -9,9 +9,9 @@
 #include "host/base/parse.h"
 #include "host/base/text.h"
 #include "host/formats/formats.h"
-#include "host/order/names.h"
+#include "host/mesh/names.h"
 #include "host/service/strategies/strategies.h"
-#include "incode/builder.h"
+#include "incode/paper/builder.h"
 
 static const struct argp_option options_of_run[] = {
     {NULL, 0, NULL, 0, "What to compute, and where:", 1},

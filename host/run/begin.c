@@ -5,7 +5,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include "host/files/output.h"
+#include "host/formats/output.h"
 
 /* Of what was closed, nothing is read, and writing to it remains an error. */
 static void open_standard(void) {

@@ -17,8 +17,8 @@
 #include "host/base/parse.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"
-#include "host/files/output.h"
-#include "host/machines/board_emulated.h"
+#include "host/formats/output.h"
+#include "host/nodes/board_emulated.h"
 #include "transport/drivers/tcp_address.h"
 
 enum {

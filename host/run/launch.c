@@ -17,7 +17,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/parse.h"
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "transport/drivers/mpi_environment.h"
 
 #define SOCKET_NAME "INCODE_LAUNCHER"

@@ -1,6 +1,6 @@
 #include "on_cube.h"
 
-#include "host/machines/remote.h"
+#include "host/nodes/remote.h"
 #include "transport/secure_wipe.h"
 
 /* Until another program of this machine has ended. */

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "host/base/text.h"
-#include "host/order/names.h"
+#include "host/mesh/names.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
 

@@ -11,7 +11,7 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/base/progress.h"
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "host/formats/claims.h"
 #include "host/formats/formats.h"
 #include "host/formats/read.h"

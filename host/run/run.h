@@ -14,12 +14,12 @@
 
 #include <sys/types.h>
 
-#include "host/check/check.h"
-#include "host/machines/boards.h"
-#include "host/machines/throttle.h"
+#include "host/verify/check.h"
+#include "host/nodes/boards.h"
+#include "host/nodes/throttle.h"
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/order/open.h"
+#include "host/mesh/open.h"
 #include "memory_needed.h"
 
 /* The largest power of two of nodes that have a processor each. */

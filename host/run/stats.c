@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "host/files/output.h"
-#include "host/order/names.h"
+#include "host/formats/output.h"
+#include "host/mesh/names.h"
 #include "node/roles/roles.h"
 #include "report.h"
 

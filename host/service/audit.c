@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "host/base/progress.h"
-#include "host/check/judge.h"
+#include "host/verify/judge.h"
 #include "host/service/strategies/strategies.h"
 #include "notices.h"
 #include "service.h"

@@ -1,7 +1,7 @@
 /* The check of a result before success is reported, and what follows where it
  * fails.  Part of service.h.
  *
- * When every brick is committed, host_check (host/check/check.h) checks the
+ * When every brick is committed, host_check (host/verify/check.h) checks the
  * whole result on threads of its own, while the service goes on answering
  * links.  If the check fails, the judge finds which tetrahedra at the faults
  * are wrong, which came twice and which are missing.  The ledger knows which
@@ -34,7 +34,7 @@
 #include <stdint.h>
 
 #include "host/base/parallel.h"
-#include "host/check/check.h"
+#include "host/verify/check.h"
 
 struct host_service;
 

@@ -26,7 +26,7 @@
 #include <stdint.h>
 
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "incode/front/owner.h"
 
 struct host_job {

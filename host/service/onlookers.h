@@ -31,7 +31,7 @@ struct host_onlookers_progress {
     uint64_t committed, bricks, tetrahedra;
 };
 
-/* Where they are: host/look/. */
+/* Where they are: host/watch/. */
 struct host_onlookers {
     void *context;
     /* The next question, once the one before is answered; false: none. */

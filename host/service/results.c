@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/check/judge.h"
+#include "host/verify/judge.h"
 #include "idle_nodes.h"
 #include "notices.h"
 #include "node/result.h"

@@ -22,7 +22,7 @@
 #define HOST_SERVICE_H
 
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "audit.h"
 #include "host/service/strategies/strategy.h"
 #include "in_use.h"

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/check/verify.h"
+#include "host/verify/verify.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
 #include "sim_draw.h"

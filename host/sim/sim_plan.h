@@ -11,7 +11,7 @@
 
 #include <stdio.h>
 
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "host/service/strategies/strategy.h"
 #include "incode/triangulator.h"
 #include "liar.h"

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "incode/triangulator.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 
 enum { PAGES_MAX = 4096, SPARE_BYTES = 8 << 20, EMIT_ROOM = 4096 };
 

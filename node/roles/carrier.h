@@ -2,7 +2,7 @@
  * answers back: messages from node to node (lists.h), or a tuple space.  Each
  * end sees the same: a manager sends struct incode_list and is sent struct
  * incode_answers, a builder the other way round, as many bytes of them as are
- * in use (incode/list.h).
+ * in use (incode/paper/list.h).
  *
  * Memory: the struct.  Work: every function returns at once.
  *

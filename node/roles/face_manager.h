@@ -1,7 +1,7 @@
 /* What is the same in all face managers, whatever carries their lists
  * (carrier.h): jobs from the host, a front that lends its faces
- * (incode/manager.h), results and spilled faces to the host.  A role that has
- * one calls these functions with its own.
+ * (incode/paper/manager.h), results and spilled faces to the host.  A role that
+ * has one calls these functions with its own.
  *
  * Memory: the struct, two outboxes, and the rest of what it is given for the
  * active face list.  Work: as much as the pace has it; a step uses answers,
@@ -16,7 +16,7 @@
 #define NODE_FACE_MANAGER_H
 
 #include "carrier.h"
-#include "incode/manager.h"
+#include "incode/paper/manager.h"
 #include "jobs.h"
 #include "node/pace.h"
 #include "outlet.h"

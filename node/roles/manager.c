@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "face_manager.h"
-#include "incode/builder.h"
+#include "incode/paper/builder.h"
 #include "lists.h"
 
 /* Of the arena, for answers that wait. */

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "incode/list.h"
+#include "incode/paper/list.h"
 #include "incode/predicates/check.h"
 #include "node/arena.h"
 

@@ -1,6 +1,7 @@
 /* What is the same in all tetrahedron builders, whatever carries their lists
- * (carrier.h): a maker that answers them (incode/builder.h), and the pages that
- * it asks for.  A role that has one calls these functions with its own.
+ * (carrier.h): a maker that answers them (incode/paper/builder.h), and the
+ * pages that it asks for.  A role that has one calls these functions with its
+ * own.
  *
  * Memory: the struct, the lists at work, and the rest of what it is given for
  * page frames.  Work: as much as the pace has it; a step goes on with a list.
@@ -14,7 +15,7 @@
 #define NODE_TETRA_BUILDER_H
 
 #include "carrier.h"
-#include "incode/builder.h"
+#include "incode/paper/builder.h"
 #include "node/pace.h"
 #include "requests.h"
 

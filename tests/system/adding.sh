@@ -106,7 +106,7 @@ done
 sed 's/(text, "linux")/(text, "toy")/; s,#include "options.h",#include "boards/linux/options.h",
     s,#include "fault.h",#include "boards/linux/fault.h",' \
     boards/linux/options.c > "$tree/boards/toy/options.c"
-cat > "$tree/host/machines/board_toy.c" <<'END'
+cat > "$tree/host/nodes/board_toy.c" <<'END'
 /* Processes of a program of their own, incode-node-toy. */
 #include "boards.h"
 
@@ -156,7 +156,7 @@ int main(void)
 }
 END
 sed -i 's/ROW(plot3d)$/ROW(plot3d) ROW(toy) ROW(toypoints)/' "$tree/host/formats/formats.c"
-sed -i 's/ROW(linux)/ROW(linux) ROW(toy)/' "$tree/host/machines/boards.c"
+sed -i 's/ROW(linux)/ROW(linux) ROW(toy)/' "$tree/host/nodes/boards.c"
 
 # The flags of what is copied, whatever they were: only what has changed is
 # built, and without optimisation.

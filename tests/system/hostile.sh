@@ -88,7 +88,7 @@ wait $stranger
 check 'hostile/it was' "$(head -n 1 "$scratch/stranger")" grep -qE \
     '^[0-9]{3,} tcp [0-9]{2,} unix calls taken' "$scratch/stranger"
 # What there is to call: the wires of both files, and where a run lets others look
-# on (host/look/look.h), one place for each of the host's two wires.  A pair that
+# on (host/watch/look.h), one place for each of the host's two wires.  A pair that
 # connects nodes of its own has a port of the kernel's choice, for a moment in
 # which the stranger may look.
 {

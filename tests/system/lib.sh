@@ -133,7 +133,7 @@ await() {
 }
 
 # lets_look PID: who comes to the cube that it has looks on, and does not get in:
-# one of its open files is the meeting place of host/look/look.h.
+# one of its open files is the meeting place of host/watch/look.h.
 lets_look() {
     local places
     places=$(awk '/@incode-look-/ { print "socket:[" $7 "]" }' /proc/net/unix)

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "host/lines/lines.h"
+#include "host/cube/lines.h"
 
 int main(int argc, char **argv) {
     struct host_cube_file file;

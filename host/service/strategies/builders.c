@@ -1,6 +1,6 @@
 #include "builders.h"
 
-#include "incode/builder.h"
+#include "incode/paper/builder.h"
 
 /* Two lists for each builder from the start, as in the paper. */
 enum { JOBS_PER_WORKER = 2 };

@@ -20,7 +20,7 @@
 
 #include "host/base/error.h"
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "host/service/ledger.h"
 #include "incode/triangulator.h"
 #include "node/message.h"

@@ -23,9 +23,9 @@
 #include <cmocka.h>
 
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
-#include "incode/builder.h"
-#include "incode/manager.h"
+#include "host/mesh/order.h"
+#include "incode/paper/builder.h"
+#include "incode/paper/manager.h"
 
 enum {
     LEND_BUILDERS = 8,

@@ -22,7 +22,7 @@
 
 #include <cmocka.h>
 
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "host/mesh/tetrahedra.h"
 #include "incode/state.h"
 

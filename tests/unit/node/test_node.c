@@ -12,10 +12,10 @@
 
 #include <cmocka.h>
 
-#include "host/check/verify.h"
+#include "host/verify/verify.h"
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "host/service/ledger.h"
 #include "host/service/spill.h"
 #include "host/sim/sim_world.h"

@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "host/mesh/gen.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "node/page_check.h"
 #include "node/roles/worker.h"
 #include "tests/unit/incode/work_clock.h"

@@ -12,7 +12,7 @@
 
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 #include "node/page_check.h"
 #include "node/result.h"
 #include "node/roles/roles.h"

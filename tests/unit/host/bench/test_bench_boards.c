@@ -22,7 +22,7 @@ static const char map_text[] =
     " .text.incode_orient3d\n"
     "                0x00000100       0x20 "
     "/incode/b/firmware/x/incode/predicates/p.o\n"
-    " .text.cap      0x00000120       0x10 b/firmware/x/incode/maker/cap.o\n"
+    " .text.cap      0x00000120       0x10 b/firmware/x/incode/apex/cap.o\n"
     " .text          0x00000140       0x40 /usr/lib/libgcc.a(_arm_muldf3.o)\n"
     " .rodata.names  0x00000180       0x40 b/firmware/x/node/node.o\n"
     " .debug_info    0x00000000      0x900 b/firmware/x/transport/link.o\n";

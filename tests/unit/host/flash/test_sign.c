@@ -16,7 +16,7 @@
 #include "host/flash/image_file.h"
 #include "host/flash/sign.h"
 #include "host/flash/sign_key.h"
-#include "host/machines/cube_key.h"
+#include "host/nodes/cube_key.h"
 #include "transport/bytes.h"
 #include "transport/drivers/sign_sodium.h"
 #include "transport/frame.h"

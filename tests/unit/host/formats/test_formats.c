@@ -4,7 +4,7 @@
 #include <zlib.h>
 
 #include "bytes.h"
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "host/formats/formats.h"
 #include "host/formats/write.h"
 #include "host/mesh/gen.h"

@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "host/formats/convert.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"

@@ -13,7 +13,7 @@
 #include <nettle/sha2.h>
 
 #include "host/mesh/gen.h"
-#include "host/order/duplicates.h"
+#include "host/mesh/duplicates.h"
 
 static struct host_points made(const char *kind, uint64_t n, uint64_t seed) {
     struct host_points points;

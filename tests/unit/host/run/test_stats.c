@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 
 #include "host/base/memory.h"
-#include "host/files/output.h"
+#include "host/formats/output.h"
 #include "host/run/stats.h"
 #include "host/service/strategies/strategies.h"
 

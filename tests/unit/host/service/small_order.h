@@ -17,7 +17,7 @@
 #include <cmocka.h>
 
 #include "host/mesh/gen.h"
-#include "host/order/order.h"
+#include "host/mesh/order.h"
 
 /* regions: a power of two. */
 static inline struct host_order small_order(unsigned regions) {

@@ -1,0 +1,85 @@
+/* A bare board that QEMU emulates: a process, whose UARTs are wires, files or
+ * paths, and whose flash chip is a file that outlives it.  It stays on one of
+ * the processors that are allowed here, so that it and its neighbours do not
+ * wait for each other's way between them.
+ *
+ * Memory: 16 KB, in the child.  Work: a look at PATH, and of a start an exec.
+ *
+ *     if (host_emulator_find(&bare, &emulator, &error) != 0)
+ *         return error.code;
+ *     emulator.uart[0].wire.fd = wire;
+ *     host_emulator_become(&emulator, node); // in the child
+ */
+#ifndef HOST_EMULATOR_H
+#define HOST_EMULATOR_H
+
+#include <limits.h>
+#include <stdint.h>
+
+#include "host/base/error.h"
+#include "host/nodes/links.h"
+
+enum {
+    HOST_UARTS_MAX = 5,
+    HOST_BOARD_MEMORY = 4 << 20, /* data memory of every bare board */
+    HOST_FLASH_BYTES = 16 << 20, /* of a chip, as the emulator wants it */
+    /* A second, of the host's wire, as `auto` counts: it carries 50 KB/s, to
+     * nodes that compute a hundred times slower than those of this machine. */
+    HOST_BARE_WIRE_BYTES = 5000000
+};
+
+/* A bare board, and what emulates it.  UART 0 is its console, and the host's
+ * wire; the others are the links of dimensions 0, 1 .. */
+struct host_bare {
+    const char *machine; /* QEMU's name of it */
+    const char *program; /* QEMU for its processor, */
+    const char *package; /* of the distribution */
+    const char *image;   /* its firmware, a file's name, */
+    const char *loader;  /* and its loader's, which starts it */
+    unsigned uarts;
+    bool card;               /* its flash is a memory card's, not a chip */
+    uint32_t serial_baud;    /* that its firmware takes its wires for */
+    int (*pair)(int fds[2]); /* of which a wire between two is made */
+};
+
+/* A file or socket of the emulator: one that it inherits, or at a path; fd -1
+ * and no path: none. */
+struct host_place {
+    int fd;
+    const char *path;
+};
+
+struct host_emulator {
+    const struct host_bare *bare;
+    char program[PATH_MAX], image[PATH_MAX];
+    char kernel[PATH_MAX];   /* what it runs at first: the loader */
+    struct host_place flash; /* the chip's or card's file: HOST_FLASH_BYTES */
+    /* What is at the other end of a UART: a connected socket, or a path at
+     * which it listens; and the file that keeps what it sends. */
+    struct {
+        struct host_place wire, log;
+    } uart[HOST_UARTS_MAX];
+    struct host_place qmp; /* in the same way: of the monitor */
+    int folder; /* that the paths of wires and monitor lead through; -1: none */
+    int errors; /* what it says of itself goes there; -1: to standard error */
+};
+
+/* The most nodes in a cube of such boards. */
+static inline unsigned host_bare_nodes_max(const struct host_bare *bare) {
+    return 1u << (bare->uarts - 1);
+}
+
+/* Finds program and image, and makes all else nobody's: 0, or HOST_CUBE. */
+int host_emulator_find(const struct host_bare *bare,
+                       struct host_emulator *emulator,
+                       struct host_error *error);
+
+/* The image that `make firmware` has made for a board, by the shortest name
+ * that it has from here; false: there is none. */
+bool host_firmware_find(const char *board, char path[PATH_MAX]);
+
+/* In the child: becomes the emulator.  turn: of the processors, by which one
+ * is taken.  Returns where that fails, with errno. */
+void host_emulator_become(const struct host_emulator *emulator, unsigned turn);
+
+#endif

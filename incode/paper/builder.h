@@ -1,0 +1,86 @@
+/* The tetrahedron builder: a maker alone.  It takes lists of faces, finds the
+ * apex of each, and keeps the answers until they are fetched; it knows no list
+ * of what is open.  A list that waits for a page lets the next one go on.
+ *
+ * Memory: struct incode_builder, about 63 KB, and what it is given: the lists,
+ * with their answers, and page frames.  Work: a step goes on with one list, as
+ * far as a page that is missing, or the units that it is allowed.
+ *
+ *     incode_builder_init(&builder, memory, bytes, &setup, 2, &source, &pause);
+ *     incode_builder_take(&builder, &list);   // while it has room
+ *     while (incode_builder_answers(&builder) == NULL)
+ *         if (incode_builder_step(&builder, 100) == INCODE_WAITING)
+ *             deliver(&builder);   // by incode_maker_page, what was asked for
+ */
+#ifndef INCODE_BUILDER_H
+#define INCODE_BUILDER_H
+
+#include "incode/apex/maker.h"
+#include "list.h"
+#include "incode/triangulator.h"
+
+enum {
+    INCODE_LISTS_MAX = 16,   /* a search each */
+    INCODE_LIST_PATIENCE = 8 /* retries before a list goes on alone */
+};
+
+/* A list at work. */
+struct incode_lent {
+    struct incode_list list;
+    struct incode_answers answers;
+    uint64_t known[(INCODE_LIST_MAX + 63) / 64]; /* found on others' behalf */
+    uint64_t born;                               /* 0: the place is empty */
+    uint32_t done;                               /* faces answered */
+    uint32_t retries;                            /* since it got on last */
+};
+
+struct incode_builder {
+    struct incode_maker maker;
+    struct incode_lent *lent;
+    uint32_t lists;         /* places for them */
+    uint16_t number;        /* of the builder, in its answers; 0 at first */
+    uint64_t clock;         /* lists taken */
+    uint64_t built, faults; /* tetrahedra found, searches that had to wait */
+    size_t bytes;           /* of memory */
+    const char *fault;
+    uint64_t spent; /* units of work since init */
+};
+
+/* Bytes of memory that it does with, for so many lists. */
+size_t incode_builder_min(uint32_t lists);
+
+/* memory: aligned to 64 bytes, at least incode_builder_min(lists) of it; lists:
+ * at a time, 1 to INCODE_LISTS_MAX.  setup: sound.  pause: who is called while
+ * a step is long. */
+void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
+                         const struct incode_setup *setup, uint32_t lists,
+                         const struct incode_page_source *source,
+                         const struct incode_pause *pause);
+
+/* Takes a list, of which incode_list_bytes are read; false: there is no room
+ * for it.  What is no list is a fault. */
+bool incode_builder_take(struct incode_builder *b,
+                         const struct incode_list *list);
+
+/* Works on, about so many units, 1 at least: INCODE_WORKED; INCODE_WAITING for
+ * a list, a page, or for answers to be fetched; INCODE_BROKEN. */
+enum incode_step incode_builder_step(struct incode_builder *b, uint32_t units);
+
+/* Answers that are complete, those of the oldest list first, or NULL; the same
+ * until they are dropped. */
+const struct incode_answers *
+incode_builder_answers(const struct incode_builder *b);
+void incode_builder_drop(struct incode_builder *b);
+
+/* Lists that it has, answered or not. */
+uint32_t incode_builder_held(const struct incode_builder *b);
+
+/* NULL, or a static string: why the step is INCODE_BROKEN. */
+const char *incode_builder_fault(const struct incode_builder *b);
+
+/* Counts since init: tetrahedra are built here, once for each face that found
+ * them, and kept by whoever lent the faces. */
+void incode_builder_statistics(const struct incode_builder *b,
+                               struct incode_statistics *s);
+
+#endif
