@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What README.md has under "First hour", as somebody does it who has four boards
+# What boards/FIRST-HOUR.md describes, as somebody does it who has four boards
 # with nothing but their loaders, an adapter and a laptop: emulated boards, a
 # port of the host's whose adapter can be pulled out, wires that can be pulled.
 # first_hour.sh all: also what takes longer.
