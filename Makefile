@@ -392,8 +392,9 @@ made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/
 made_nodes   = $(wildcard $(node_programs))
 # Documents, what they show, and examples, in folders as here.
 doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
-documents := $(wildcard *.md LICENSE boards/*.md transport/*.md \
-	host/service/strategies/*.md boards/linux/examples/* host/draw/*.svg)
+documents := $(wildcard *.md LICENSE incode/*.md boards/*.md transport/*.md \
+	tests/*.md host/*.md host/*/*.md host/service/strategies/*.md \
+	boards/linux/examples/* host/draw/*.svg)
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
 $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node

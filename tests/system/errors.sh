@@ -398,7 +398,7 @@ usage 'unknown kind' 'uniform' gen cheese 100 -o "$left/o.xyz"
 usage 'too few to generate' 'give 4 to 4294901760$' gen uniform 3 -o "$left/o.xyz"
 check 'as many as are triangulated' 'the limits differ' test \
     $((2 ** 32 - 2 ** 16)) = 4294901760 -a \
-    -n "$(grep 'At most 2^32 - 2^16 points' README.md)" -a \
+    -n "$(grep 'At most 2^32 - 2^16 points' README.md host/README.md)" -a \
     -n "$("$INCODE" gen --help | tr '\n' ' ' | grep -F '4 to 4294901760 (2^32 - 2^16)')"
 usage 'verify without tetrahedra' 'TETS' verify "$good"
 usage 'digest without a file' \

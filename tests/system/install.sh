@@ -28,10 +28,11 @@ for arguments in '--help' 'run --help' 'console --help'; do
         grep -qF "$(realpath "$doc")/README.md" "$scratch/help"
 done
 lacks=
-while read -r link; do
-    [ -e "$doc/$link" ] || lacks="$lacks $link"
-done < <(grep -oE '\]\([^)#:]+\.(md|svg|cube)' "$doc/README.md" | cut -c 3-)
-check 'install/what README.md links' "$lacks" [ -z "$lacks" ]
+while IFS=: read -r page link; do
+    [ -e "${page%/*}/${link#??}" ] || lacks="$lacks $page: ${link#??}"
+done < <(find "$doc" -name '*.md' -exec \
+    grep -oHE '\]\([^)#:]+\.(md|svg|cube)' {} +)
+check 'install/what the documents link' "$lacks" [ -z "$lacks" ]
 
 # The firmware of boards, where the installed program finds it.
 if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
