@@ -127,9 +127,9 @@ static void note(struct incode_borrower *b, uint32_t i, const uint32_t f[4]) {
 
 static enum incode_outcome go_on(struct incode_borrower *b,
                                  struct incode_maker *maker) {
-    enum incode_outcome r = INCODE_OK;
-    while (r == INCODE_OK && maker->walker.left > 0 && maker->fault == NULL &&
-           !b->done) {
+    enum incode_outcome r = INCODE_ANSWERED;
+    while (r == INCODE_ANSWERED && maker->walker.left > 0 &&
+           maker->fault == NULL && !b->done) {
         if (b->found.count == INCODE_LOAN_FACES || b->open == 0 || b->full) {
             b->done = true;
             break;
@@ -146,7 +146,7 @@ static enum incode_outcome go_on(struct incode_borrower *b,
         uint64_t looked = maker->counts.candidates - before;
         incode_walker_spend(&maker->walker,
                             1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
-        if (r == INCODE_OK)
+        if (r == INCODE_ANSWERED)
             note(b, i, a.f);
     }
     return r;

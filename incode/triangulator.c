@@ -268,19 +268,20 @@ static enum incode_outcome advance(struct incode_triangulator *t,
     enum incode_outcome r;
     if (incode_maker_is_searching(&t->maker, task)) {
         r = incode_maker_resume(&t->maker, task, &a);
-        if (r != INCODE_OK || !incode_star_find(&t->front, a.f[1], a.f[2]))
-            return r == INCODE_MORE ? INCODE_OK : r;
+        if (r != INCODE_ANSWERED ||
+            !incode_star_find(&t->front, a.f[1], a.f[2]))
+            return r == INCODE_MORE ? INCODE_ANSWERED : r;
     } else {
         if (!incode_star_take(&t->front, &face))
-            return INCODE_OK;
+            return INCODE_ANSWERED;
         r = incode_maker_apex(&t->maker, task, face.b, face.c, face.hint, &a);
-        if (r != INCODE_OK) {
+        if (r != INCODE_ANSWERED) {
             incode_star_put(&t->front, &face);
-            return r == INCODE_MORE ? INCODE_OK : r;
+            return r == INCODE_MORE ? INCODE_ANSWERED : r;
         }
     }
     incode_star_build(&t->front, a.f, corners_of(&a).p, a.near);
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 #ifdef INCODE_PLANT_TWICE /* a fault that the simulation has to find */
@@ -304,9 +305,9 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
     struct incode_front *front = &t->front;
     uint32_t v = incode_front_vertex(front, task);
     if (!incode_star_open(front, v))
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     enum incode_outcome r = incode_maker_centre(&t->maker, task, v);
-    while (r == INCODE_OK && !incode_star_is_closed(front)) {
+    while (r == INCODE_ANSWERED && !incode_star_is_closed(front)) {
         if (incode_star_is_enough(front)) {
             r = INCODE_AGAIN;
             break;
@@ -314,9 +315,9 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
         uint64_t before = t->maker.counts.candidates;
         r = advance(t, task);
         spend_candidates(t, before);
-        if (r == INCODE_OK && incode_star_is_full(front))
+        if (r == INCODE_ANSWERED && incode_star_is_full(front))
             r = INCODE_AGAIN; /* the list will find it crowded */
-        if (r == INCODE_OK && t->maker.walker.left == 0)
+        if (r == INCODE_ANSWERED && t->maker.walker.left == 0)
             r = incode_maker_is_searching(&t->maker, task) ? INCODE_MORE
                                                            : INCODE_AGAIN;
     }
@@ -335,9 +336,9 @@ static enum incode_outcome pursue_face(struct incode_triangulator *t,
     uint32_t f[3];
     if (!incode_maker_is_searching(&t->maker, task) &&
         !incode_front_face(&t->front, incode_front_vertex(&t->front, task), f))
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     enum incode_outcome r = incode_maker_face(&t->maker, task, f, &a);
-    if (r == INCODE_OK)
+    if (r == INCODE_ANSWERED)
         (void)incode_front_use(&t->front, a.f, corners_of(&a).p);
     return r;
 }
@@ -348,9 +349,9 @@ static enum incode_outcome build_first(struct incode_triangulator *t,
     uint32_t v = incode_front_vertex(&t->front, task);
     /* Other stars go on while a seed waits for a page. */
     if (incode_front_is_reached(&t->front, v))
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     enum incode_outcome r = incode_maker_first(&t->maker, task, v, &a);
-    if (r == INCODE_OK && t->maker.fault == NULL)
+    if (r == INCODE_ANSWERED && t->maker.fault == NULL)
         incode_front_seed(&t->front, a.f, corners_of(&a).p);
     return r;
 }

@@ -67,7 +67,7 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
         if (r == INCODE_LOCAL_WAIT)
             return INCODE_WAIT;
         if (r == INCODE_LOCAL_READY || tries == COPY_TRIES)
-            return INCODE_OK;
+            return INCODE_ANSWERED;
         radius *= 0.75;
         m->spread *= 0.9;
     }
@@ -112,7 +112,7 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
         if (h->box_hi[d] >= m->hi[d])
             h->box_hi[d] = __builtin_inf();
     }
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
@@ -140,5 +140,5 @@ enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
     incode_local_centre(local, v, p, local->radius, m->lo, m->hi);
     if (!again)
         learn_spread(m, local->near);
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }

@@ -10,7 +10,7 @@
 static enum incode_outcome resolve(struct incode_maker *m, uint32_t id,
                                    uint16_t *index, uint32_t *page) {
     if (*index != INCODE_LOCAL_NONE)
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     uint32_t i = incode_local_find(&m->local, id);
     if (i == INCODE_LOCAL_NONE) {
         double p[3];
@@ -21,7 +21,7 @@ static enum incode_outcome resolve(struct incode_maker *m, uint32_t id,
             return INCODE_AGAIN;
     }
     *index = (uint16_t)i;
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 /* The answer at three local points. */
@@ -52,18 +52,18 @@ enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
     struct incode_search *s = &m->search[slot];
     uint32_t apex;
     enum incode_outcome r = resolve(m, b, &near[0], &s->page);
-    if (r == INCODE_OK)
+    if (r == INCODE_ANSWERED)
         r = resolve(m, c, &near[1], &s->page);
-    if (r != INCODE_OK)
+    if (r != INCODE_ANSWERED)
         return r;
     m->counts.calls++;
     switch (incode_apex_near(m, near[0], near[1], &apex, s)) {
     case INCODE_NEAR_FOUND:
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     case INCODE_NEAR_HULL:
         set_hull(a, m->local.vertex, b, c);
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     case INCODE_NEAR_SEARCH:
     default:
         m->counts.tree_searches++;
@@ -81,7 +81,7 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
     s->advanced = false;
     if (s->stage == INCODE_SEARCH_POINTS) {
         enum incode_outcome r = incode_search_run(m, s);
-        if (r != INCODE_OK)
+        if (r != INCODE_ANSWERED)
             return r;
         s->stage = INCODE_SEARCH_FOUND;
     }
@@ -90,10 +90,10 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
         if (apex == INCODE_LOCAL_NONE)
             apex = incode_local_append(&m->local, q->best, q->best_p);
         enum incode_outcome r = resolve(m, q->b, &near[0], &s->page);
-        if (r == INCODE_OK)
+        if (r == INCODE_ANSWERED)
             r = resolve(m, q->c, &near[1], &s->page);
-        if (r != INCODE_OK || apex == INCODE_LOCAL_NONE)
-            return r != INCODE_OK ? r : INCODE_AGAIN;
+        if (r != INCODE_ANSWERED || apex == INCODE_LOCAL_NONE)
+            return r != INCODE_ANSWERED ? r : INCODE_AGAIN;
     }
     s->stage = INCODE_SEARCH_NONE;
     if (q->question == INCODE_QUERY_HALF_SPACE)
@@ -103,7 +103,7 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
     else
         set_hull(a, q->v, q->b, q->c);
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 /* ---- faces as they come ---- */
@@ -125,7 +125,7 @@ static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,
         if (r == INCODE_AGAIN) {
             near[0] = near[1] = INCODE_LOCAL_NONE;
             r = incode_maker_centre(m, slot, f[0]);
-            if (r != INCODE_OK)
+            if (r != INCODE_ANSWERED)
                 return r;
         }
         r = m->search[slot].stage == INCODE_SEARCH_NONE
@@ -146,9 +146,9 @@ enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
         enum incode_outcome r = m->index == INCODE_KD
                                     ? answer_near(m, slot, f, a)
                                     : incode_maker_face(m, slot, f, a);
-        if (r != INCODE_OK)
+        if (r != INCODE_ANSWERED)
             return r;
         ++*done;
     }
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }

@@ -164,7 +164,7 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
             continue;
         }
         enum incode_outcome r = incode_search_run(m, search);
-        if (r != INCODE_OK)
+        if (r != INCODE_ANSWERED)
             return r;
         if (looked(m, search))
             settle(m, search, p, a);
@@ -176,5 +176,5 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
             return INCODE_MORE;
         }
     }
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }

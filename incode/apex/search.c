@@ -167,13 +167,13 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
             m->half_space_next = (m->half_space_next + 1) % INCODE_HALF_SPACES;
             if (m->half_space_count < INCODE_HALF_SPACES)
                 m->half_space_count++;
-            return INCODE_OK;
+            return INCODE_ANSWERED;
         }
         if (s->final) {
             incode_count_candidates(m, s->looked);
             if (q->best == INCODE_NONE)
                 incode_hull_learn(m, q);
-            return INCODE_OK;
+            return INCODE_ANSWERED;
         }
         if (q->best != INCODE_NONE || !q->boxed) {
             incode_maker_breathe(m, INCODE_LESSEN_UNITS);

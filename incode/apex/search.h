@@ -20,8 +20,9 @@ void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const uint32_t f[3], const double pv[3],
                          const double pb[3], const double pc[3], double radius);
 
-/* Goes on with it: INCODE_OK with query.best (INCODE_NONE: a hull facet), or
- * INCODE_WAIT for query.missing, or INCODE_MORE: the walker has no units left.
+/* Goes on with it: INCODE_ANSWERED with query.best (INCODE_NONE: a hull facet),
+ * or INCODE_WAIT for query.missing, or INCODE_MORE: the walker has no units
+ * left.
  */
 enum incode_outcome incode_search_run(struct incode_maker *m,
                                       struct incode_search *s);

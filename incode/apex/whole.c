@@ -33,7 +33,7 @@ static enum incode_outcome begin(struct incode_maker *m,
         s->sweep = m->sweep;
         s->sweep_left = m->tree.bricks;
     }
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 /* Every page of points in turn, from where the last search stands: several
@@ -60,7 +60,7 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
         s->sweep_left--;
         s->advanced = true;
     }
-    return s->sweep_left > 0 ? INCODE_MORE : INCODE_OK;
+    return s->sweep_left > 0 ? INCODE_MORE : INCODE_ANSWERED;
 }
 
 static enum incode_outcome look_at_cells(struct incode_maker *m,
@@ -80,9 +80,9 @@ static enum incode_outcome look_at_cells(struct incode_maker *m,
         if (r == INCODE_WALK_DONE && c->has_below)
             incode_hull_remember(m, q, c->below);
         else if (!new_shell && incode_hull_known(m, q->pv, q->pb, q->pc))
-            return INCODE_OK;
+            return INCODE_ANSWERED;
     }
-    return r == INCODE_WALK_STOP ? INCODE_MORE : INCODE_OK;
+    return r == INCODE_WALK_STOP ? INCODE_MORE : INCODE_ANSWERED;
 }
 
 static void set_answer(struct incode_answer *a, const struct incode_query *q) {
@@ -99,11 +99,11 @@ enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
                                       const uint32_t f[3],
                                       struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
-    enum incode_outcome r = INCODE_OK;
+    enum incode_outcome r = INCODE_ANSWERED;
     s->advanced = false;
     if (s->stage != INCODE_SEARCH_POINTS)
         r = begin(m, s, f);
-    if (r != INCODE_OK)
+    if (r != INCODE_ANSWERED)
         return r;
     uint64_t before = m->counts.candidates;
     do {
@@ -114,10 +114,10 @@ enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
     s->looked += m->counts.candidates - before;
     if (r == INCODE_MORE)
         s->page = INCODE_NONE;
-    if (r != INCODE_OK)
+    if (r != INCODE_ANSWERED)
         return r;
     incode_count_candidates(m, s->looked);
     set_answer(a, &s->query);
     s->stage = INCODE_SEARCH_NONE;
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }

@@ -157,14 +157,14 @@ static enum incode_outcome answer_face(struct incode_builder *b,
     uint32_t i = lent->done, done = 0;
     uint64_t before = b->maker.counts.candidates;
     if ((lent->known[i / 64] >> i % 64 & 1) != 0)
-        return INCODE_OK;
+        return INCODE_ANSWERED;
     enum incode_outcome r = incode_maker_apexes(
         &b->maker, (unsigned)(lent - b->lent),
         (const uint32_t(*)[3])lent->list.v + i, 1, &a, &done);
     uint64_t looked = b->maker.counts.candidates - before;
     incode_walker_spend(&b->maker.walker,
                         1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
-    if (r == INCODE_OK) {
+    if (r == INCODE_ANSWERED) {
         memcpy(lent->answers.v[i], a.f, sizeof a.f);
         b->built += a.f[3] != INCODE_NONE;
         if (a.f[3] != INCODE_NONE)
@@ -179,7 +179,7 @@ static enum incode_outcome answer_first(struct incode_builder *b,
     enum incode_outcome r = incode_maker_first(
         &b->maker, (unsigned)(lent - b->lent), lent->list.v[0][0], &a);
     incode_walker_spend(&b->maker.walker, 1);
-    if (r == INCODE_OK && b->maker.fault == NULL) {
+    if (r == INCODE_ANSWERED && b->maker.fault == NULL) {
         memcpy(lent->answers.v[0], a.f, sizeof a.f);
         b->built++;
     }
@@ -196,7 +196,7 @@ static enum incode_outcome answer_count(struct incode_builder *b,
     if (count == 0)
         return INCODE_WAIT;
     memcpy(lent->answers.v[i], answer, sizeof answer);
-    return INCODE_OK;
+    return INCODE_ANSWERED;
 }
 
 /* ---- steps ---- */
@@ -221,14 +221,14 @@ static struct incode_lent *choose(const struct incode_builder *b) {
 
 static enum incode_step go_on(struct incode_builder *b,
                               struct incode_lent *lent) {
-    enum incode_outcome r = INCODE_OK;
-    while (r == INCODE_OK && lent->done < lent->list.count &&
+    enum incode_outcome r = INCODE_ANSWERED;
+    while (r == INCODE_ANSWERED && lent->done < lent->list.count &&
            b->maker.walker.left > 0 && b->maker.fault == NULL) {
         r = lent->list.kind == INCODE_LIST_FACES   ? answer_face(b, lent)
             : lent->list.kind == INCODE_LIST_FIRST ? answer_first(b, lent)
                                                    : answer_count(b, lent);
-        lent->done += r == INCODE_OK;
-        lent->retries = r == INCODE_OK ? 0 : lent->retries;
+        lent->done += r == INCODE_ANSWERED;
+        lent->retries = r == INCODE_ANSWERED ? 0 : lent->retries;
     }
     if (r != INCODE_WAIT)
         return INCODE_WORKED;

@@ -188,7 +188,7 @@ static void answer_all(struct bench *b) {
             b->waits++;
             deliver(b);
         }
-        if (r != INCODE_OK)
+        if (r != INCODE_ANSWERED)
             continue;
         assert_int_equal(s->done, s->count);
         for (uint32_t i = 0; i < s->count; i++)
@@ -274,7 +274,7 @@ static void first_tetrahedra(void **unused) {
             continue;
         while ((r = incode_maker_first(&b.maker, 3, v, &a)) == INCODE_WAIT)
             deliver(&b);
-        assert_int_equal(r, INCODE_OK);
+        assert_int_equal(r, INCODE_ANSWERED);
         assert_null(b.maker.fault);
         assert_int_equal(a.f[0], v);
         assert_int_not_equal(a.f[3], INCODE_NONE);
@@ -297,7 +297,8 @@ static void abandoned(void **unused) {
             (const uint32_t(*)[3])b.face + draw(&b, b.faces);
         struct incode_answer a;
         uint32_t done = 0, left = draw(&b, 10);
-        while (incode_maker_apexes(&b.maker, 0, f, 1, &a, &done) != INCODE_OK &&
+        while (incode_maker_apexes(&b.maker, 0, f, 1, &a, &done) !=
+                   INCODE_ANSWERED &&
                left-- > 0)
             deliver(&b);
         if (done == 1)
