@@ -29,6 +29,7 @@ FLOATING = -ffp-contract=off -fno-math-errno -fno-trapping-math
 SANITIZE = $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all \
 	-fno-omit-frame-pointer -DINCODE_SANITIZED)
 CFLAGS  ?= -g
+OBJCOPY ?= objcopy
 MACHINE  = -march=$(ARCH)
 BASE     = -std=c11 -I. $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
 	$(CFLAGS)
@@ -73,6 +74,12 @@ unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
 obj          := $(BUILD)/obj
+# What the library is made of: code for any address, of which no name but those
+# of its header is seen from outside.
+library      := $(call files,incode host/library) transport/text.c $(patsubst %,host/%.c, \
+	base/error base/memory base/parallel base/text mesh/adjacency \
+	mesh/duplicates mesh/kd_build mesh/lift mesh/order mesh/sort mesh/spill \
+	mesh/tetrahedra)
 core_objects := $(freestanding:%.c=$(obj)/%.o)
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
@@ -89,11 +96,13 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 .SECONDARY:
 .PHONY: all unit points planted bare arithmetic fuzzers run check test \
 	test-full bench firmware nodes cross fuzz lint install uninstall clean \
+	compdb hooks \
 	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
 
 programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 	$(nodes)
-all: $(programs)
+libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
+all: $(programs) $(libraries)
 
 $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
@@ -114,6 +123,16 @@ $(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
+$(library:%.c=$(obj)/%.o): private BASE += -fPIC -fvisibility=hidden
+$(BUILD)/libincode.so.0: $(library:%.c=$(obj)/%.o)
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) -shared -Wl,-soname,$(@F) -Wl,--no-undefined $^ -lm -o $@
+$(BUILD)/libincode.o: $(library:%.c=$(obj)/%.o)
+	@$(LD) -r $^ -o $@
+	@$(OBJCOPY) --localize-hidden $@
+$(BUILD)/libincode.a: $(BUILD)/libincode.o
+	@rm -f $@
+	@$(AR) rcs $@ $^
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
 $(BUILD)/%.a: $(BUILD)/lists
@@ -262,6 +281,9 @@ relay := $(patsubst %.c,$(obj)/%.o,$(wildcard tests/system/relay/*.c))
 $(BUILD)/tests/relay $(BUILD)/tests/test_relay: $(relay)
 $(BUILD)/tests/pulse: $(BUILD)/libhost.a $(BUILD)/libcore.a
 $(BUILD)/tests/pulse: tool_libs = $(HOST_LIBS)
+$(BUILD)/tests/library: $(BUILD)/libincode.a
+$(BUILD)/tests/library: tool_libs = $(foreach \
+	f,mmap munmap mremap pthread_create,-Wl,--wrap=$(f))
 $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
@@ -376,6 +398,22 @@ fuzz: deps-test
 	@BUILD='$(BUILD)' FUZZ_SECONDS='$(FUZZ_SECONDS)' \
 		bash tests/fuzz/run
 
+# For an editor's language server: every source with the flags that a build of
+# all gives it.
+compdb:
+	@$(MAKE) --no-print-directory --always-make --dry-run V=1 all unit | \
+		awk -v here='$(CURDIR)' ' \
+		/ -c [^ ]+\.c -o / { gsub(/\t/, " "); gsub(/["\\]/, "\\\\&"); source = $$0; \
+			sub(/.* -c /, "", source); sub(/ .*/, "", source); \
+			printf "%s{\"directory\": \"%s\", \"file\": \"%s\", " \
+				"\"command\": \"%s\"}", n++ ? ",\n" : "[\n", here, \
+				source, $$0 } \
+		END { print "\n]" }' > compile_commands.json
+hooks:
+	@printf '%s\n' '#!/bin/sh' 'exec tests/hook' > \
+		"$$(git rev-parse --git-path hooks)/pre-commit"
+	@chmod +x "$$(git rev-parse --git-path hooks)/pre-commit"
+
 lint: deps-test
 	@BUILD='$(BUILD)' bash tests/lint
 
@@ -390,6 +428,10 @@ made_images  = $(wildcard $(images))
 made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/%))
 # Likewise programs of nodes that make nodes has made.
 made_nodes   = $(wildcard $(node_programs))
+# The library, its header and what pkg-config tells of it.
+header     = $(DESTDIR)$(PREFIX)/include
+library_to = $(DESTDIR)$(PREFIX)/lib
+VERSION   := $(shell sed -n 's/.*NODE_VERSION "\(.*\)"/\1/p' node/version.h)
 # Documents, what they show, and examples, in folders as here.
 doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
 documents := $(wildcard *.md LICENSE incode/*.md boards/*.md transport/*.md \
@@ -406,7 +448,7 @@ $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
 folders   = $(doc)/.folders
 install: all $(pages)
 	@for file in bin/- share/man/man1/- share/bash-completion/completions/- \
-		lib/incode/loader/- $(documents:%=share/doc/incode/%); do \
+		lib/incode/loader/- include/- lib/pkgconfig/- $(documents:%=share/doc/incode/%); do \
 		folder='$(DESTDIR)$(PREFIX)/'$${file%/*}; \
 		while [ ! -e "$$folder" ]; do \
 			echo "$$folder"; above=$${folder%/*}; \
@@ -417,6 +459,14 @@ install: all $(pages)
 		install -D -m 644 $$file '$(doc)'/$$file || exit 1; done
 	cat '$(BUILD)/folders' >> '$(folders)'
 	install $(programs) '$(bin)'
+	install -d '$(header)' '$(library_to)/pkgconfig'
+	install -m 644 host/library/incode.h '$(header)'
+	install -m 644 $(libraries) '$(library_to)'
+	ln -sf libincode.so.0 '$(library_to)/libincode.so'
+	printf '%s\n' 'Name: incode' 'Version: $(VERSION)' \
+		'Description: exact 3D Delaunay triangulation' \
+		'Cflags: -I$(PREFIX)/include' 'Libs: -L$(PREFIX)/lib -lincode' \
+		'Libs.private: -lm -pthread' > '$(library_to)/pkgconfig/incode.pc'
 	install -m 644 $(man_pages) '$(man)'
 	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
 	$(if $(made_images),install -d '$(lib)' && \
@@ -433,6 +483,9 @@ uninstall:
 	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
 		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
 		'$(completion)/incode' '$(completion)/incode-node' \
+		'$(header)/incode.h' '$(library_to)/libincode.so' \
+		$(patsubst %,'$(library_to)/%',$(notdir $(libraries))) \
+		'$(library_to)/pkgconfig/incode.pc' \
 		$(patsubst %,'$(doc)/%',$(documents))
 	@if [ -e '$(folders)' ]; then \
 		sort -ru '$(folders)' > '$(BUILD)/folders'; rm '$(folders)'; \
@@ -448,8 +501,8 @@ help:
 	@echo 'make test                set up, build, pass all tests (15 minutes)'
 	@echo 'make check               build, unit tests, quick lint, half a minute of'
 	@echo '                         simulation (3 minutes)'
-	@echo 'make                     build/incode, build/incode-node, and both for'
-	@echo '                         ranks of MPI'
+	@echo 'make                     build/incode, build/incode-node, both for ranks'
+	@echo '                         of MPI, and the library: build/libincode.a, .so.0'
 	@echo 'make deps                install missing Debian packages'
 	@echo 'make test-full           every combination, large sets, a clean'
 	@echo '                         chroot (hours)'
@@ -464,11 +517,12 @@ help:
 	@echo 'make fuzz                fuzz every reader (FUZZ_SECONDS each)'
 	@echo 'make lint                the order of rooms, format, examples, sizes,'
 	@echo '                         warnings as errors, analysers'
-	@echo '                         porting programs that were written for them'
-	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, their man pages,'
-	@echo '                         documents and completion to DIR/share, firmware and'
-	@echo '                         node programs of boards to DIR/lib/incode, if made'
+	@echo 'make install PREFIX=DIR  copy the programs to DIR/bin, the library to DIR/lib,'
+	@echo '                         its header to DIR/include, man pages, documents and'
+	@echo '                         completion to DIR/share, firmware and node programs'
+	@echo '                         of boards to DIR/lib/incode, if made'
 	@echo 'make uninstall           remove them (with the same PREFIX)'
+	@echo 'make compdb, make hooks  compile_commands.json; a hook that checks commits'
 	@echo 'make clean               remove the build'
 	@echo 'Variables: BUILD=build CC=gcc ARCH=native OPT=-O3 CFLAGS=-g SAN='
 

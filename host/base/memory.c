@@ -6,6 +6,8 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 
+#include "parallel.h"
+
 /* Huge pages need their own alignment; below this size they do not matter. */
 static const size_t huge = (size_t)2 << 20;
 
@@ -31,47 +33,82 @@ static void *reserve(size_t bytes) {
     return space + skip;
 }
 
+/* Takes bytes from what the call of this thread may use; false: it may not. */
+static bool charge(size_t bytes) {
+    struct host_call *call = host_call();
+    if (call == NULL)
+        return true;
+    uint64_t before = atomic_fetch_add(&call->memory, bytes);
+    if (bytes <= call->memory_max && before <= call->memory_max - bytes)
+        return true;
+    atomic_fetch_sub(&call->memory, bytes);
+    return false;
+}
+
+static void refund(size_t bytes) {
+    struct host_call *call = host_call();
+    if (call != NULL)
+        atomic_fetch_sub(&call->memory, bytes);
+}
+
 void *host_map(size_t bytes) {
     bytes = bytes == 0 ? 1 : bytes;
+    if (!charge(bytes))
+        return NULL;
     void *array = reserve(bytes);
-    if (array != NULL) {
+    if (array != NULL)
         (void)madvise(array, bytes, MADV_HUGEPAGE);
+    else
+        refund(bytes);
+    return array;
+}
+
+static void *move(void *old, size_t old_bytes, size_t bytes) {
+    enum { PAGE = 4096 };
+    size_t from = (old_bytes + (old_bytes == 0) + PAGE - 1) / PAGE * PAGE;
+    size_t to = (bytes + (bytes == 0) + PAGE - 1) / PAGE * PAGE;
+    if (to <= from) { /* which cannot fail */
+        if (to < from)
+            (void)munmap((char *)old + to, from - to);
+        return old;
+    }
+    char *space = reserve(to);
+    if (space == NULL)
+        return NULL;
+    /* Move, then grow: one call for both is more than valgrind can follow. */
+    void *array = mremap(old, from, from, MREMAP_MAYMOVE | MREMAP_FIXED, space);
+    if (array == MAP_FAILED) {
+        (void)munmap(space, to);
+        return NULL;
+    }
+    (void)munmap(space + from, to - from);
+    array = mremap(space, from, to, MREMAP_MAYMOVE);
+    if (array == MAP_FAILED) { /* the old array stays as it was */
+        (void)mremap(space, from, from, MREMAP_MAYMOVE | MREMAP_FIXED, old);
+        return NULL;
     }
     return array;
 }
 
 void *host_remap(void *old, size_t old_bytes, size_t bytes) {
-    if (old == NULL) {
+    if (old == NULL)
         return host_map(bytes);
-    }
-    enum { PAGE = 4096 };
-    size_t from = (old_bytes + (old_bytes == 0) + PAGE - 1) / PAGE * PAGE;
-    size_t to = (bytes + (bytes == 0) + PAGE - 1) / PAGE * PAGE;
-    char *space = reserve(to);
-    if (space == NULL) {
+    size_t from = old_bytes == 0 ? 1 : old_bytes, to = bytes == 0 ? 1 : bytes;
+    if (to > from && !charge(to - from))
         return NULL;
-    }
-    /* Move, then grow: one call for both is more than valgrind can follow. */
-    size_t kept = from < to ? from : to;
-    void *array = mremap(old, from, kept, MREMAP_MAYMOVE | MREMAP_FIXED, space);
-    if (array == MAP_FAILED) {
-        (void)munmap(space, to);
-        return NULL;
-    }
-    if (kept < to) {
-        (void)munmap(space + kept, to - kept);
-        array = mremap(space, kept, to, MREMAP_MAYMOVE);
-    }
-    if (array == MAP_FAILED) { /* the old array stays as it was */
-        (void)mremap(space, kept, kept, MREMAP_MAYMOVE | MREMAP_FIXED, old);
-        return NULL;
-    }
+    void *array = move(old, old_bytes, bytes);
+    if (array == NULL && to > from)
+        refund(to - from);
+    if (array != NULL && to < from)
+        refund(from - to);
     return array;
 }
 
 void host_unmap(void *array, size_t bytes) {
+    bytes = bytes == 0 ? 1 : bytes;
     if (array != NULL) {
-        (void)munmap(array, bytes == 0 ? 1 : bytes);
+        (void)munmap(array, bytes);
+        refund(bytes);
     }
 }
 

@@ -13,7 +13,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* NULL where there is no memory; 0 bytes are taken as 1. */
+/* NULL where there is no memory, or no more for this thread's call
+ * (parallel.h); 0 bytes are taken as 1. */
 void *host_map(size_t bytes);
 
 /* Like realloc: on NULL the old array still stands. */

@@ -2,26 +2,79 @@
 
 #include <sched.h>
 #include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
-enum { THREADS_MAX = 16 };
+static _Thread_local struct host_call *call_here;
 
-static unsigned threads_most = THREADS_MAX;
-
-unsigned host_threads(void) {
-    cpu_set_t set;
-    if (threads_most == 1 || sched_getaffinity(0, sizeof set, &set) != 0) {
-        return 1;
-    }
-    unsigned count = (unsigned)CPU_COUNT(&set);
-    return count < 1 ? 1 : count > threads_most ? threads_most : count;
+struct host_call *host_call(void) {
+    return call_here;
 }
 
-void host_threads_limit(unsigned most) {
-    threads_most = most < 1 ? 1 : most > THREADS_MAX ? THREADS_MAX : most;
+void host_call_enter(struct host_call *call) {
+    call_here = call;
+}
+
+bool host_call_cancelled(void) {
+    const struct host_call *call = call_here;
+    return call != NULL &&
+           atomic_load_explicit(&call->cancelled, memory_order_relaxed);
+}
+
+/* Processors that the quota "MAX PERIOD" of a control group in `folder` gives,
+ * rounded up; `most` where it gives no fewer. */
+static unsigned by_quota(const char *folder, unsigned most) {
+    char name[4200], text[64];
+    (void)snprintf(name, sizeof name, "/sys/fs/cgroup%s/cpu.max", folder);
+    FILE *file = fopen(name, "re");
+    if (file == NULL)
+        return most;
+    char *end = NULL;
+    unsigned long quota = 0, period = 0;
+    if (fgets(text, sizeof text, file) != NULL) {
+        quota = strtoul(text, &end, 10); /* "max": 0 */
+        period = strtoul(end, NULL, 10);
+    }
+    (void)fclose(file);
+    if (quota == 0 || period == 0)
+        return most;
+    unsigned long count = (quota + period - 1) / period;
+    return count < most ? (unsigned)count : most;
+}
+
+unsigned host_processors(void) {
+    cpu_set_t set;
+    unsigned count = 1;
+    if (sched_getaffinity(0, sizeof set, &set) == 0)
+        count = (unsigned)CPU_COUNT(&set);
+    count = count < 1 ? 1 : count > HOST_THREADS_MAX ? HOST_THREADS_MAX : count;
+    /* The group of this process and those above it.  In a container that sees
+     * none but its own, that is the root. */
+    char line[4096];
+    FILE *file = fopen("/proc/self/cgroup", "re");
+    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+        if (strncmp(line, "0::", 3) != 0)
+            continue;
+        line[strcspn(line, "\n")] = '\0';
+        for (char *end = line + strlen(line); end != NULL && count > 1;) {
+            *end = '\0';
+            count = by_quota(line + 3, count);
+            end = strrchr(line + 3, '/');
+        }
+    }
+    if (file != NULL)
+        (void)fclose(file);
+    return count;
+}
+
+unsigned host_threads(void) {
+    return call_here != NULL ? call_here->threads : host_processors();
 }
 
 static void *trampoline(void *argument) {
     struct host_fork *fork = argument;
+    call_here = fork->call;
     fork->function(fork->argument);
     return NULL;
 }
@@ -31,14 +84,14 @@ void host_fork_start(struct host_fork *fork, void (*function)(void *),
     sigset_t all, before;
     fork->function = function;
     fork->argument = argument;
+    fork->call = call_here;
     (void)sigfillset(&all);
     (void)pthread_sigmask(SIG_BLOCK, &all, &before);
-    fork->running = threads_most > 1 &&
+    fork->running = (call_here == NULL || call_here->threads > 1) &&
                     pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    if (!fork->running) {
+    if (!fork->running)
         function(argument);
-    }
 }
 
 void host_fork_join(struct host_fork *fork) {
@@ -61,16 +114,14 @@ static void run_part(void *argument) {
 
 void host_fork_all(unsigned parts, void (*function)(void *, unsigned),
                    void *context) {
-    struct host_fork fork[THREADS_MAX];
-    struct part part[THREADS_MAX];
+    struct host_fork fork[HOST_THREADS_MAX];
+    struct part part[HOST_THREADS_MAX];
     for (unsigned i = 0; i + 1 < parts; i++) {
         part[i] = (struct part){function, context, i};
         host_fork_start(&fork[i], run_part, &part[i]);
     }
-    if (parts > 0) {
+    if (parts > 0)
         function(context, parts - 1);
-    }
-    for (unsigned i = 0; i + 1 < parts; i++) {
+    for (unsigned i = 0; i + 1 < parts; i++)
         host_fork_join(&fork[i]);
-    }
 }

@@ -4,6 +4,9 @@
 #include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
+
+enum { POLL_ROWS = 1 << 16 }; /* between two polls of whether it is cancelled */
 
 static uint32_t lower(uint32_t a, uint32_t b) {
     return a < b ? a : b;
@@ -19,6 +22,8 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
                      uint32_t *order) {
     const struct host_tetrahedra *tets = a->tets;
     for (uint64_t i = 0; i < tets->count; i++) {
+        if (i % POLL_ROWS == 0 && host_call_cancelled())
+            return;
         first[tets->v[i][rank] + 1]++;
     }
     for (uint32_t p = 0; p < a->vertices; p++) {
@@ -28,6 +33,8 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
         return;
     }
     for (uint64_t i = 0; i < tets->count; i++) {
+        if (i % POLL_ROWS == 0 && host_call_cancelled())
+            return;
         order[first[tets->v[i][rank]]++] = (uint32_t)i;
     }
     memmove(first + 1, first, (size_t)a->vertices * sizeof *first);
@@ -57,6 +64,10 @@ int host_adjacency_make(struct host_adjacency *a,
     }
     index_by(a, 0, a->first_by_lowest, NULL);
     index_by(a, 1, a->first_by_second, a->by_second);
+    if (host_call_cancelled()) {
+        host_adjacency_free(a);
+        return host_fail(error, HOST_BROKEN, "host: cancelled");
+    }
     return 0;
 }
 
@@ -71,7 +82,7 @@ void host_adjacency_free(struct host_adjacency *a) {
 }
 
 void host_group_free(struct host_group *group) {
-    free(group->facet);
+    host_unmap(group->facet, group->capacity * sizeof *group->facet);
     *group = (struct host_group){0};
 }
 
@@ -82,7 +93,8 @@ static int reserve(struct host_group *group, size_t count,
         return 0;
     }
     struct host_facet *grown =
-        realloc(group->facet, 2 * count * sizeof *group->facet);
+        host_remap(group->facet, group->capacity * sizeof *group->facet,
+                   2 * count * sizeof *group->facet);
     if (grown == NULL) {
         return host_fail_memory(error, "the facets at a vertex");
     }

@@ -11,14 +11,13 @@ enum {
     AHEAD = 16, /* rows hashed ahead, so that their slots come from memory */
     FORK_ROWS = 1 << 13, /* fewer rows are not worth a thread: to search, */
     COPY_ROWS = 1 << 17, /* to copy */
+    POLL_ROWS = 1 << 16, /* between two polls of whether it is cancelled */
     PARTS_MAX = 16
 };
 
-static const uint64_t empty = UINT64_MAX;
-
 /* A table for each part of the hash values, so that threads share nothing. */
 struct table {
-    uint64_t *slot; /* upper hash bits and row, or empty */
+    uint64_t *slot; /* upper hash bits and row + 1; 0: empty */
     size_t slots;   /* a power of two */
 };
 
@@ -59,16 +58,16 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
                       uint32_t row) {
     size_t mask = table->slots - 1, at = (size_t)h & mask;
     uint64_t mark = h & UINT64_C(0xffffffff00000000);
-    for (; table->slot[at] != empty; at = (at + 1) & mask) {
+    for (; table->slot[at] != 0; at = (at + 1) & mask) {
         uint64_t slot = table->slot[at];
         if ((slot & UINT64_C(0xffffffff00000000)) == mark) {
-            uint32_t other = (uint32_t)slot;
+            uint32_t other = (uint32_t)slot - 1;
             if (same(s->xyz + 3 * (size_t)other, s->xyz + 3 * (size_t)row)) {
                 return other;
             }
         }
     }
-    table->slot[at] = mark | row;
+    table->slot[at] = mark | (row + 1); /* rows are below 2^32 - 1 */
     return row;
 }
 
@@ -77,7 +76,6 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
 static void search_part(void *context, unsigned part) {
     struct search *s = context;
     struct table *table = &s->table[part];
-    memset(table->slot, 0xff, table->slots * sizeof *table->slot);
     uint64_t waiting[AHEAD];
     uint32_t waiting_row[AHEAD];
     uint64_t queued = 0, taken = 0, distinct = 0;
@@ -91,6 +89,8 @@ static void search_part(void *context, unsigned part) {
                 queued++;
             }
             row++;
+            if (row % POLL_ROWS == 0 && host_call_cancelled())
+                return;
             continue;
         }
         uint32_t mine = waiting_row[taken % AHEAD];
@@ -108,7 +108,10 @@ static void search_part(void *context, unsigned part) {
 }
 
 static bool run_search(struct search *s) {
-    s->parts = s->rows < FORK_ROWS ? 1 : host_threads();
+    unsigned threads = host_threads();
+    s->parts = s->rows < FORK_ROWS   ? 1
+               : threads > PARTS_MAX ? PARTS_MAX
+                                     : threads;
     size_t slots = 64;
     while (slots < s->rows / s->parts * 3 / 2 + 64) {
         slots *= 2;
@@ -200,6 +203,10 @@ int host_distinct_make(struct host_distinct *distinct, const double *xyz,
         host_unmap(s.doubled, (size_t)rows);
         return host_fail_memory(error, "the search for duplicates");
     }
+    if (host_call_cancelled()) {
+        host_unmap(s.doubled, (size_t)rows);
+        return host_fail(error, HOST_BROKEN, "host: cancelled");
+    }
     for (unsigned i = 0; i < s.parts; i++) {
         distinct->count += (size_t)s.distinct[i];
     }
@@ -219,9 +226,10 @@ void host_distinct_free(struct host_distinct *distinct) {
     *distinct = (struct host_distinct){0};
 }
 
-/* NOLINTNEXTLINE(readability-non-const-parameter): the threads write it */
-uint64_t host_distinct_rows(const double *xyz, uint64_t rows,
-                            uint32_t *lowest) {
+uint64_t host_distinct_rows(
+    const double *xyz, uint64_t rows,
+    /* The threads write it.  NOLINTNEXTLINE(readability-non-const-parameter) */
+    uint32_t *lowest) {
     struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};
     uint64_t distinct = 0;
     if (run_search(&s)) {

@@ -10,6 +10,7 @@ enum {
     SAMPLE_MAX = 128,     /* items looked at to choose a pivot */
     SORT_MAX = 16,        /* fewer items than this are sorted by insertion */
     FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
+    POLL_ITEMS = 1 << 18  /* between two polls of whether it is cancelled */
 };
 
 void host_kd_box(const struct host_item *items, size_t n, double lo[3],
@@ -60,10 +61,13 @@ static inline void exchange(struct host_item *p, struct host_item *q) {
 static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
                              double pivot) {
     size_t m = 0;
-    for (size_t i = 0; i < n; i++) {
-        double key = sign * a[i].c[d];
-        exchange(&a[i], &a[m]);
-        m += key < pivot;
+    for (size_t i = 0; i < n && !host_call_cancelled();) {
+        for (size_t end = n - i > POLL_ITEMS ? i + POLL_ITEMS : n; i < end;
+             i++) {
+            double key = sign * a[i].c[d];
+            exchange(&a[i], &a[m]);
+            m += key < pivot;
+        }
     }
     return m;
 }
@@ -160,7 +164,7 @@ void host_kd_rank(struct host_item *a, size_t n, size_t k, int d,
     double sign = from_above ? -1 : 1;
     uint64_t state = n;
     int level = 0; /* keys order[0..level) are equal in all that is left */
-    while (k > 0 && k < n && level < 3) {
+    while (k > 0 && k < n && level < 3 && !host_call_cancelled()) {
         if (n <= SORT_MAX) {
             insertion_sort(a, n, order, sign);
             return;
@@ -208,6 +212,8 @@ struct task {
 
 static void build(void *argument) {
     struct task *t = argument;
+    if (host_call_cancelled())
+        return;
     if (t->n <= INCODE_BRICK_POINTS) {
         build_leaves(t->items, t->n);
         t->sink(t->context, t->first_brick, t->items, t->n);

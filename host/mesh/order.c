@@ -1,7 +1,6 @@
 #include "order.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "duplicates.h"
@@ -206,7 +205,7 @@ static void make_pages(void *context, unsigned part) {
     uint32_t pages = tree->count[l->level],
              children = tree->count[l->level - 1];
     for (uint32_t i = share(pages, part, l->parts);
-         i < share(pages, part + 1, l->parts); i++) {
+         i < share(pages, part + 1, l->parts) && !host_call_cancelled(); i++) {
         struct host_lump *all = &l->lump[tree->base[l->level] + i];
         struct incode_boxes *boxes = boxes_above(l, i * INCODE_FANOUT);
         const struct host_lump *first = below + i * INCODE_FANOUT;
@@ -227,7 +226,8 @@ static void lift_children(void *context, unsigned part) {
     uint32_t children = tree->count[l->level - 1];
     unsigned shift = 5 * (l->level - 1); /* to bricks */
     for (uint32_t c = share(children, part, l->parts);
-         c < share(children, part + 1, l->parts); c++) {
+         c < share(children, part + 1, l->parts) && !host_call_cancelled();
+         c++) {
         uint64_t first = (uint64_t)c << shift, last = (c + UINT64_C(1))
                                                       << shift;
         last = last < order->bricks ? last : order->bricks;
@@ -319,7 +319,7 @@ static int make_grid(struct host_order *order, struct host_error *error) {
 /* Points that span the space: the first that is off the first two's line, the
  * first that is off that plane.  Neighbours in this order are close, so
  * the second point is taken from the far end. */
-static int check_dimension(const struct host_order *order, const char *where,
+static int check_dimension(struct host_order *order, const char *where,
                            struct host_error *error) {
     struct incode_tally tally = {0};
     double a[3], b[3], c[3], d[3];
@@ -327,7 +327,7 @@ static int check_dimension(const struct host_order *order, const char *where,
     uint32_t last = order->bricks - 1;
     host_vertex(order, last * INCODE_BRICK_POINTS + order->fill[last] - 1u, b);
     bool plane = false;
-    for (uint32_t k = 0; k < order->bricks; k++) {
+    for (uint32_t k = 0; k < order->bricks && !host_call_cancelled(); k++) {
         for (uint32_t i = 0; i < order->fill[k]; i++) {
             host_vertex(order, k * INCODE_BRICK_POINTS + i, d);
             if (!plane) {
@@ -338,6 +338,7 @@ static int check_dimension(const struct host_order *order, const char *where,
             }
         }
     }
+    order->fault = HOST_ORDER_FLAT;
     return host_fail(error, HOST_INPUT,
                      "%s: all %u distinct points lie on one %s, so there is "
                      "no tetrahedron; give points that span three dimensions",
@@ -372,8 +373,11 @@ static int build_items(struct host_order *order, struct host_item *items,
     memcpy(cut.lo, order->lo, sizeof cut.lo);
     memcpy(cut.hi, order->hi, sizeof cut.hi);
     cut_regions(&cut);
+    if (host_call_cancelled())
+        return host_fail(error, HOST_BROKEN, "host: cancelled");
     uint64_t bricks = number_bricks(order);
     if (bricks > bricks_max) {
+        order->fault = HOST_ORDER_MANY;
         return host_fail(error, HOST_INPUT,
                          "host: %u points are more than vertex numbers of 32 "
                          "bits allow; split the input",
@@ -397,7 +401,8 @@ static int build_items(struct host_order *order, struct host_item *items,
                             .n = order->points,
                             .threads = host_threads()};
     build_regions(&spread);
-    make_boxes(order, lump);
+    if (!host_call_cancelled())
+        make_boxes(order, lump);
     host_unmap(lump, lumps);
     return 0;
 }
@@ -406,7 +411,8 @@ int host_order_make(struct host_order *order, const char *where,
                     const double *xyz, uint64_t rows,
                     enum host_partition partition, uint32_t regions, bool grid,
                     struct host_error *error) {
-    *order = (struct host_order){.rows = rows, .regions = regions};
+    *order = (struct host_order){
+        .rows = rows, .regions = regions, .regions_made = regions};
     struct host_distinct distinct;
     if (host_distinct_make(&distinct, xyz, rows, error) != 0) {
         return error->code;
@@ -415,6 +421,7 @@ int host_order_make(struct host_order *order, const char *where,
     order->duplicates = rows - distinct.count;
     order->negative_zeros = distinct.negative_zeros;
     if (distinct.count < 4) {
+        order->fault = HOST_ORDER_FEW;
         host_fail(error, HOST_INPUT,
                   "%s: %u distinct points (of %llu) where a tetrahedron has 4; "
                   "give more points",
@@ -422,22 +429,25 @@ int host_order_make(struct host_order *order, const char *where,
     }
     memcpy(order->lo, distinct.lo, sizeof order->lo);
     memcpy(order->hi, distinct.hi, sizeof order->hi);
-    order->region = calloc(regions, sizeof *order->region);
+    order->region = host_map(regions * sizeof *order->region);
     if (order->region == NULL) {
         host_fail_memory(error, "the regions");
     } else if (error->code == 0) {
         build_items(order, distinct.items, partition, error);
     }
     host_distinct_free(&distinct);
-    if (error->code == 0) {
+    if (error->code == 0 && !host_call_cancelled())
         check_dimension(order, where, error);
-    }
     if (error->code == 0 && grid && make_grid(order, error) == 0) {
         incode_tree_init(&order->tree, order->bricks,
                          order->cells[0] * order->cells[1] * order->cells[2]);
     }
+    if (error->code == 0 && host_call_cancelled())
+        host_fail(error, HOST_BROKEN, "%s: cancelled", where);
     if (error->code != 0) {
+        enum host_order_fault fault = order->fault;
         host_order_free(order);
+        order->fault = fault;
     }
     return error->code;
 }
@@ -460,7 +470,7 @@ void host_order_free(struct host_order *order) {
                                  sizeof *order->boxes);
     host_unmap(order->first_of_cell, (cells + 1) * sizeof(uint32_t));
     host_unmap(order->by_cell, (size_t)order->points * sizeof(uint32_t));
-    free(order->region);
+    host_unmap(order->region, order->regions_made * sizeof *order->region);
     *order = (struct host_order){0};
 }
 

@@ -35,6 +35,14 @@ struct host_region {
     double lo[3], hi[3];
 };
 
+/* Why points have no order. */
+enum host_order_fault {
+    HOST_ORDER_SOUND, /* or there was no memory, or the call was cancelled */
+    HOST_ORDER_FEW,   /* fewer than 4 distinct points */
+    HOST_ORDER_FLAT,  /* all points on one plane or line */
+    HOST_ORDER_MANY   /* more than 2^32 - 2^16 vertex numbers */
+};
+
 struct host_order {
     uint64_t rows;           /* of the input */
     uint64_t duplicates;     /* rows that stand for an earlier row */
@@ -46,19 +54,22 @@ struct host_order {
     uint32_t *row; /* [64 * bricks] vertex number -> lowest input row;
                       INCODE_NONE in unused slots */
     uint32_t regions;
-    struct host_region *region; /* [regions] */
-    double lo[3], hi[3];        /* tight box of all points */
-    uint32_t cells[3];          /* uniform grid of index `grid`, else 0 */
+    struct host_region *region; /* [regions]; made for regions_made */
+    uint32_t regions_made;
+    double lo[3], hi[3]; /* tight box of all points */
+    uint32_t cells[3];   /* uniform grid of index `grid`, else 0 */
     struct incode_tree tree;
-    struct incode_boxes *boxes; /* box pages, from tree.base[1] */
-    uint32_t *first_of_cell;    /* [cells + 1], with a grid */
-    uint32_t *by_cell;          /* [points] vertex numbers, with a grid */
+    struct incode_boxes *boxes;  /* box pages, from tree.base[1] */
+    uint32_t *first_of_cell;     /* [cells + 1], with a grid */
+    uint32_t *by_cell;           /* [points] vertex numbers, with a grid */
+    enum host_order_fault fault; /* of one that could not be made */
 };
 
 /* Orders `rows` points xyz[3 * row + d], all finite, into `regions` (a power of
  * two) regions.  `grid`: also the lists of index `grid`.  HOST_INPUT for fewer
  * than 4 distinct points, for points all on one line or plane, and for more
- * than 2^32 - 2^16 vertex numbers; `where` names the input in the message. */
+ * than 2^32 - 2^16 vertex numbers: order->fault.  `where` names the input in
+ * the message. */
 int host_order_make(struct host_order *order, const char *where,
                     const double *xyz, uint64_t rows,
                     enum host_partition partition, uint32_t regions, bool grid,

@@ -13,7 +13,8 @@ enum {
     INSERTION_MAX = 40,
     FORK_ROWS = 1 << 16,
     SAMPLE = 63,
-    AHEAD = 8 /* rows */
+    AHEAD = 8,          /* rows */
+    POLL_ROWS = 1 << 18 /* between two polls of whether it is cancelled */
 };
 
 typedef uint32_t row_t[4];
@@ -111,15 +112,17 @@ static inline __attribute__((always_inline)) void
 exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
     size_t next[BUCKETS], sum = 0, buckets = (size_t)d.mask + 1;
     memset(end, 0, buckets * sizeof *end);
-    for (size_t i = 0; i < n; i++) {
-        end[word(v[i], w) >> d.shift & d.mask]++;
-    }
+    for (size_t i = 0; i < n && !host_call_cancelled();)
+        for (size_t to = n - i > POLL_ROWS ? i + POLL_ROWS : n; i < to; i++)
+            end[word(v[i], w) >> d.shift & d.mask]++;
+    if (host_call_cancelled()) /* counts that are not whole lead astray */
+        return;
     for (size_t b = 0; b < buckets; b++) {
         next[b] = sum;
         sum += end[b];
         end[b] = sum;
     }
-    for (size_t b = 0; b < buckets; b++) {
+    for (size_t b = 0; b < buckets && !host_call_cancelled(); b++) {
         while (next[b] < end[b]) {
             row_t t;
             memcpy(t, v[next[b]], sizeof t);
@@ -150,9 +153,8 @@ static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS]) {
 static void flag_sort(row_t *v, size_t n, struct digit digit, int bits) {
     size_t end[BUCKETS], first = 0, buckets = (size_t)digit.mask + 1;
     exchange(v, n, digit, end);
-    if (!go_down(&digit, bits)) {
+    if (host_call_cancelled() || !go_down(&digit, bits))
         return;
-    }
     for (size_t b = 0; b < buckets; first = end[b++]) {
         size_t m = end[b] - first;
         if (m > INSERTION_MAX) {
@@ -190,13 +192,18 @@ static void sort_rows(void *argument) {
     if (s->threads > 1 && s->n >= FORK_ROWS) {
         uint32_t pivot = middle(s->v, s->n);
         size_t below = 0;
-        for (size_t i = 0; i < s->n; i++) {
-            row_t t;
-            memcpy(t, s->v[i], sizeof t);
-            memcpy(s->v[i], s->v[below], sizeof t);
-            memcpy(s->v[below], t, sizeof t);
-            below += t[0] < pivot;
+        for (size_t i = 0; i < s->n && !host_call_cancelled();) {
+            size_t end = s->n - i > POLL_ROWS ? i + POLL_ROWS : s->n;
+            for (; i < end; i++) {
+                row_t t;
+                memcpy(t, s->v[i], sizeof t);
+                memcpy(s->v[i], s->v[below], sizeof t);
+                memcpy(s->v[below], t, sizeof t);
+                below += t[0] < pivot;
+            }
         }
+        if (host_call_cancelled())
+            return;
         struct sort lower = {s->v, below, s->threads / 2};
         struct sort upper = {s->v + below, s->n - below,
                              s->threads - s->threads / 2};
@@ -226,7 +233,7 @@ static void sort_rows(void *argument) {
 struct canon {
     struct host_tetrahedra *tets;
     unsigned parts;
-    bool disordered[16];
+    bool disordered[HOST_THREADS_MAX];
 };
 
 static void canonical_part(void *context, unsigned part) {
@@ -234,10 +241,13 @@ static void canonical_part(void *context, unsigned part) {
     uint64_t each = c->tets->count / c->parts, first = each * part;
     uint64_t last = part + 1 == c->parts ? c->tets->count : first + each;
     bool disordered = false;
-    for (uint64_t i = first; i < last; i++) {
-        canonical(c->tets->v[i]);
-        disordered =
-            disordered || (i > first && less(c->tets->v[i], c->tets->v[i - 1]));
+    for (uint64_t i = first; i < last && !host_call_cancelled();) {
+        uint64_t end = last - i > POLL_ROWS ? i + POLL_ROWS : last;
+        for (; i < end; i++) {
+            canonical(c->tets->v[i]);
+            disordered = disordered ||
+                         (i > first && less(c->tets->v[i], c->tets->v[i - 1]));
+        }
     }
     c->disordered[part] = disordered;
 }

@@ -1,9 +1,5 @@
 #include "tetrahedra.h"
 
-#include <nettle/sha2.h>
-#include <stdio.h>
-#include <string.h>
-
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 
@@ -13,6 +9,11 @@ uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
         uint64_t capacity = tets->capacity + tets->capacity / 2 + n + 4096;
         void *v = host_remap(tets->v, tets->capacity * sizeof *tets->v,
                              capacity * sizeof *tets->v);
+        if (v == NULL) { /* no more than is needed */
+            capacity = tets->count + n;
+            v = host_remap(tets->v, tets->capacity * sizeof *tets->v,
+                           capacity * sizeof *tets->v);
+        }
         if (v == NULL) {
             host_fail_memory(error, "the tetrahedra");
             return NULL;
@@ -29,55 +30,62 @@ void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count) {
     }
 }
 
+void host_tetrahedra_trim(struct host_tetrahedra *tets) {
+    void *v = host_remap(tets->v, tets->capacity * sizeof *tets->v,
+                         tets->count * sizeof *tets->v);
+    if (v != NULL) {
+        tets->v = v;
+        tets->capacity = tets->count;
+    }
+}
+
 void host_tetrahedra_free(struct host_tetrahedra *tets) {
     host_unmap(tets->v, tets->capacity * sizeof *tets->v);
     *tets = (struct host_tetrahedra){0};
 }
 
 struct mapping {
-    struct host_tetrahedra *tets;
+    uint32_t (*to)[4];
+    const uint32_t (*from)[4];
+    uint64_t count;
     const uint32_t *map;
     unsigned parts;
 };
 
 static void map_part(void *context, unsigned part) {
+    enum { POLL = 1 << 16 };
     const struct mapping *m = context;
-    uint64_t each = m->tets->count / m->parts;
-    uint64_t first = each * part;
-    uint64_t last = part + 1 == m->parts ? m->tets->count : first + each;
-    for (uint64_t i = first; i < last; i++) {
-        for (int k = 0; k < 4; k++) {
-            m->tets->v[i][k] = m->map[m->tets->v[i][k]];
-        }
-    }
+    uint64_t each = m->count / m->parts, i = each * part;
+    uint64_t last = part + 1 == m->parts ? m->count : i + each;
+    while (i < last && !host_call_cancelled())
+        for (uint64_t end = last - i > POLL ? i + POLL : last; i < end; i++)
+            for (int k = 0; k < 4; k++)
+                m->to[i][k] = m->map[m->from[i][k]];
 }
 
-void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map) {
-    struct mapping m = {tets, map, host_threads()};
+static void map_rows(uint32_t (*to)[4], const uint32_t (*from)[4],
+                     uint64_t count, const uint32_t *map) {
+    struct mapping m = {to, from, count, map, host_threads()};
     host_fork_all(m.parts, map_part, &m);
 }
 
-void host_digest(const struct host_tetrahedra *tets,
-                 struct host_digest *digest) {
-    enum { ROWS = 2048 };
-    struct sha256_ctx sha;
-    sha256_init(&sha);
-    uint32_t row[ROWS][4];
-    for (uint64_t done = 0; done < tets->count;) {
-        uint64_t n = tets->count - done < ROWS ? tets->count - done : ROWS;
-        memcpy(row, tets->v + done, n * sizeof *row);
-        for (uint64_t i = 0; i < n; i++) {
-            uint32_t c = row[i][2], d = row[i][3];
-            row[i][2] = c < d ? c : d;
-            row[i][3] = c < d ? d : c;
-        }
-        sha256_update(&sha, n * sizeof *row, (const uint8_t *)row);
-        done += n;
+void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map) {
+    map_rows(tets->v, (const uint32_t(*)[4])tets->v, tets->count, map);
+}
+
+int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
+                         const uint32_t *map, struct host_error *error) {
+    uint64_t all = 0;
+    for (unsigned i = 1; i < lists; i++)
+        all += tets[i].count;
+    if (all > 0 && host_tetrahedra_room(&tets[0], all, error) == NULL)
+        return error->code;
+    host_tetrahedra_map(&tets[0], map);
+    for (unsigned i = 1; i < lists; i++) {
+        map_rows(tets[0].v + tets[0].count, (const uint32_t(*)[4])tets[i].v,
+                 tets[i].count, map);
+        tets[0].count += tets[i].count;
+        host_tetrahedra_free(&tets[i]);
     }
-    uint8_t sum[SHA256_DIGEST_SIZE];
-    sha256_digest(&sha, sizeof sum, sum);
-    char *out = digest->text + sprintf(digest->text, "sha256:");
-    for (size_t i = 0; i < sizeof sum; i++) {
-        out += sprintf(out, "%02x", sum[i]);
-    }
+    return 0;
 }

@@ -45,6 +45,13 @@ void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count);
 /* Replaces every vertex number by map[vertex]. */
 void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map);
 
+/* The same, of all lists, whose rows are put together in the first. */
+int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
+                         const uint32_t *map, struct host_error *error);
+
+/* Gives back what is mapped beyond the rows. */
+void host_tetrahedra_trim(struct host_tetrahedra *tets);
+
 /* Brings every row into the canonical form (smallest vertex first, then the
  * even permutation whose second is smallest) and the rows into the order of
  * the digest (by vertices sorted ascending).  Two threads, in place. */

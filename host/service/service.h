@@ -30,7 +30,7 @@
 #include "machine.h"
 #include "node/message.h"
 #include "onlookers.h"
-#include "spill.h"
+#include "host/mesh/spill.h"
 
 enum {
     HOST_PAGES_QUEUED_MAX = NODE_PAGES_IN_FLIGHT_MAX,

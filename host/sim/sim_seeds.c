@@ -142,7 +142,8 @@ int host_sim_seeds(const struct host_sim_options *options,
     struct totals totals = {0};
     double start = processor_s(), seconds = 0;
     bool late = false;
-    host_threads_limit(1);
+    static struct host_call alone = {.threads = 1, .memory_max = UINT64_MAX};
+    host_call_enter(&alone);
     watch_crashes();
     for (unsigned i = 0; i < options->ranges && !late; i++) {
         uint64_t seed = options->range[i].first;

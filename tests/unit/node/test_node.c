@@ -17,7 +17,7 @@
 #include "host/mesh/tetrahedra.h"
 #include "host/mesh/order.h"
 #include "host/service/ledger.h"
-#include "host/service/spill.h"
+#include "host/mesh/spill.h"
 #include "host/sim/sim_world.h"
 #include "node/node.h"
 #include "node/page_check.h"

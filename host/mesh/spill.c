@@ -31,7 +31,7 @@ int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
     spill->free = HOST_SPILL_END;
     spill->file = -1;
     spill->table_size = TABLE_START;
-    spill->table = calloc(TABLE_START, sizeof *spill->table);
+    spill->table = host_map(TABLE_START * sizeof *spill->table);
     return spill->table == NULL ? host_fail_memory(error, "spilled faces") : 0;
 }
 
@@ -45,7 +45,7 @@ void host_spill_clear(struct host_spill *spill) {
 
 void host_spill_free(struct host_spill *spill) {
     host_unmap(spill->blocks, spill->blocks_mapped * sizeof *spill->blocks);
-    free(spill->table);
+    host_unmap(spill->table, spill->table_size * sizeof *spill->table);
     if (spill->file >= 0) {
         close(spill->file);
     }
@@ -156,7 +156,7 @@ static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
 static int grow_table(struct host_spill *s, struct host_error *error) {
     struct host_spill old = *s;
     s->table_size = 2 * old.table_size;
-    s->table = calloc(s->table_size, sizeof *s->table);
+    s->table = host_map(s->table_size * sizeof *s->table);
     if (s->table == NULL) {
         *s = old;
         return host_fail_memory(error, "spilled faces");
@@ -166,7 +166,7 @@ static int grow_table(struct host_spill *s, struct host_error *error) {
             *find(s, old.table[i].node, old.table[i].brick) = old.table[i];
         }
     }
-    free(old.table);
+    host_unmap(old.table, old.table_size * sizeof *old.table);
     return 0;
 }
 

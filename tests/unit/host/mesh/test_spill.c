@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "host/service/spill.h"
+#include "host/mesh/spill.h"
 
 enum { NODES = 3, BRICKS = 40, FACES_MAX = 4000 };
 

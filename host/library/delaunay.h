@@ -1,0 +1,55 @@
+/* The library's way as `incode run` takes it: the tetrahedra of points that are
+ * in order, by a triangulator of the core for each thread, without messages.
+ *
+ * Each thread takes region after region, copies pages straight from the order,
+ * and appends tetrahedra to a list of its own.  The lists are put together when
+ * all regions are done.
+ *
+ * Memory: an arena a thread (host_direct_arena), spilled faces, the tetrahedra.
+ * Work: that of the triangulators.
+ *
+ *     if (host_direct_run(&order, &tets, NULL, &error) != HOST_DIRECT_DONE)
+ *         return error.code;
+ */
+#ifndef HOST_DELAUNAY_H
+#define HOST_DELAUNAY_H
+
+#include "host/base/parallel.h"
+#include "host/mesh/order.h"
+#include "host/mesh/tetrahedra.h"
+#include "incode/triangulator.h"
+
+enum host_direct {
+    HOST_DIRECT_DONE,
+    HOST_DIRECT_CANCELLED,
+    HOST_DIRECT_MEMORY,
+    HOST_DIRECT_BROKEN /* an invariant failed */
+};
+
+/* What one thread has done. */
+struct host_direct_part {
+    struct incode_statistics statistics; /* of all its regions */
+    uint64_t faces_spilled;
+    double cpu_s, wall_s;
+    size_t arena; /* bytes */
+};
+
+struct host_direct_sums {
+    unsigned threads;
+    struct host_direct_part part[HOST_THREADS_MAX];
+};
+
+/* Regions for so many threads and points: a power of two, at least one a
+ * thread. */
+uint32_t host_direct_regions(unsigned threads, uint64_t points);
+
+/* Appends the tetrahedra of all regions to an empty list, as rows of the input
+ * in no order.  sums: NULL, or what each thread has done.  The calling thread's
+ * host_call, if there is one, limits threads and memory, may be cancelled, and
+ * counts bricks. */
+enum host_direct host_direct_run(const struct host_order *order,
+                                 struct host_tetrahedra *tets,
+                                 struct host_direct_sums *sums,
+                                 struct host_error *error);
+
+#endif
