@@ -1,4 +1,4 @@
-/* A region a node, and one active face list that all share: EXCHANGE.md.  After
+/* A region a node, and one active face list that all share: README.md.  After
  * a loss what is left is completed as in `spatial`, in ranges of bricks, by
  * workers that hear nothing of each other. */
 #include <string.h>

@@ -1,6 +1,6 @@
 /* Spatial decomposition among clusters of nodes, master-slaves inside each: the
  * paper's hybrid, which it only estimated.  After a loss clusters go on with
- * the nodes that they have left; see HYBRID.md. */
+ * the nodes that they have left; see README.md. */
 #include <math.h>
 
 #include "builders.h"

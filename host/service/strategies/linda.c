@@ -1,5 +1,5 @@
 /* The paper's Linda program: a face manager and the tetrahedron builders that
- * it starts, which share a tuple space (figures 8 and 9); see LINDA.md. */
+ * it starts, which share a tuple space (figures 8 and 9); see README.md. */
 #include <math.h>
 
 #include "builders.h"

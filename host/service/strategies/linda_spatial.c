@@ -1,6 +1,6 @@
 /* The paper's spatial decomposition over Linda: regions as tuples.  The first
  * node that is not lost, the keeper, is sent a few at a time to put into the
- * space; whoever has taken one is given it as its job; see LINDA.md. */
+ * space; whoever has taken one is given it as its job; see README.md. */
 #include <string.h>
 
 #include "regions.h"

@@ -1,6 +1,6 @@
 /* One face manager and its tetrahedron builders: the paper's master-slaves
  * approach.  The first node that is not lost has the list of faces, the others
- * find their apexes; see MASTER-SLAVES.md. */
+ * find their apexes; see README.md. */
 #include <math.h>
 
 #include "builders.h"

@@ -1,6 +1,6 @@
 /* One node computes, and the others keep pages for it: node 0, and after a loss
  * the first that is there, which then has pages from the host alone; see
- * SEQUENTIAL.md. */
+ * README.md. */
 #include "regions.h"
 #include "strategies.h"
 

@@ -1,6 +1,6 @@
 /* A region a node, all at once: the paper's spatial decomposition.  After a
  * loss what is left is given to whoever is free, in ranges of bricks; see
- * SPATIAL.md. */
+ * README.md. */
 #include "regions.h"
 #include "strategies.h"
 
