@@ -223,7 +223,7 @@ $(BUILD)/tests/test_pause $(BUILD)/tests/test_pace: $(counted)
 $(BUILD)/counted/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
-	$(Q)$(CC) -std=c11 -I. -O1 -g1 $(FLOATING) -fno-builtin -MMD -MP \
+	$(Q)$(CC) -std=c11 -I. -O1 -g1 -Wno-psabi $(FLOATING) -fno-builtin -MMD -MP \
 		-fsanitize-coverage=trace-pc $(foreach \
 		f,memcpy memmove memset memcmp,-D$(f)=work_$(f)) -c $< -o $@
 

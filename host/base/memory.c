@@ -1,5 +1,7 @@
 #include "memory.h"
 
+#include <errno.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -75,8 +77,14 @@ static void *move(void *old, size_t old_bytes, size_t bytes) {
     char *space = reserve(to);
     if (space == NULL)
         return NULL;
-    /* Move, then grow: one call for both is more than valgrind can follow. */
-    void *array = mremap(old, from, from, MREMAP_MAYMOVE | MREMAP_FIXED, space);
+    /* Move, then grow: one call for both is more than valgrind can follow.
+     * Until it has grown, its old place stays mapped (since Linux 5.7): another
+     * thread may map there otherwise, what a failure would bring back. */
+    const int to_space = MREMAP_MAYMOVE | MREMAP_FIXED;
+    void *array = mremap(old, from, from, to_space | MREMAP_DONTUNMAP, space);
+    bool is_kept = array != MAP_FAILED;
+    if (!is_kept && errno == EINVAL)
+        array = mremap(old, from, from, to_space, space);
     if (array == MAP_FAILED) {
         (void)munmap(space, to);
         return NULL;
@@ -84,9 +92,11 @@ static void *move(void *old, size_t old_bytes, size_t bytes) {
     (void)munmap(space + from, to - from);
     array = mremap(space, from, to, MREMAP_MAYMOVE);
     if (array == MAP_FAILED) { /* the old array stays as it was */
-        (void)mremap(space, from, from, MREMAP_MAYMOVE | MREMAP_FIXED, old);
+        (void)mremap(space, from, from, to_space, old);
         return NULL;
     }
+    if (is_kept)
+        (void)munmap(old, from);
     return array;
 }
 

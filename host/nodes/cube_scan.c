@@ -53,7 +53,7 @@ static const char *take(struct scan *s) {
     case ':':
         return ++s->settings[s->depth] > BESIDE_MAX
                    ? "more settings beside each other than there are; see "
-                     "README.md for those"
+                     "host/nodes/README.md for those"
                    : NULL;
     case '@':
         return "@: a cube file stands alone; write what it would @include in "

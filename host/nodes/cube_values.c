@@ -28,8 +28,8 @@ int host_cube_check_names(const struct host_cube_file *file,
         if (!known) {
             char text[160];
             snprintf(text, sizeof text,
-                     "%.60s: no such setting here; see README.md for those "
-                     "that there are",
+                     "%.60s: no such setting here; see host/nodes/README.md "
+                     "for those that there are",
                      name);
             return host_cube_wrong(file, member, error, text);
         }

@@ -34,6 +34,45 @@ done < <(find "$doc" -name '*.md' -exec \
     grep -oHE '\]\([^)#:]+\.(md|svg|cube)' {} +)
 check 'install/what the documents link' "$lacks" [ -z "$lacks" ]
 
+# The library: the examples of its page, and the names that are seen from outside.
+export PKG_CONFIG_SYSROOT_DIR=$root LD_LIBRARY_PATH=$root/opt/incode/lib
+export PKG_CONFIG_PATH=$root/opt/incode/lib/pkgconfig
+example() { # LANGUAGE FILE
+    awk -v open="\`\`\`$1" '$0 == open { on = 1; next } /^```/ { on = 0 } on' \
+        host/library/README.md > "$2"
+}
+example c "$scratch/ten.c"
+example cpp "$scratch/surface.cpp"
+# shellcheck disable=SC2046
+succeeds 'install/an example in C' gcc -std=c11 -Wall -Wextra -Werror \
+    "$scratch/ten.c" $(pkg-config --cflags --libs incode) -o "$scratch/ten"
+check 'install/its tetrahedra' 'not two' \
+    [ "$("$scratch/ten" | tr '\n' ';')" = '0 1 2 3;1 2 3 4;' ]
+if command -v g++ > "$scratch/where"; then
+    # shellcheck disable=SC2046
+    succeeds 'install/an example in C++' g++ -Wall -Wextra -Werror \
+        "$scratch/surface.cpp" $(pkg-config --cflags --libs incode) \
+        -o "$scratch/surface"
+    "$scratch/surface" > "$scratch/hull" 2> "$scratch/progress"
+    check 'install/its hull' "$(cat "$scratch/hull")" grep -qE \
+        '^[0-9]{4} tetrahedra, [0-9]{3} facets of the hull, area 5\.[0-9]+$' \
+        "$scratch/hull"
+    check 'install/its progress' 'it does not end with 100 %' \
+        grep -q '^100 %' "$scratch/progress"
+else
+    skip 'install/an example in C++' 'g++ is not installed'
+fi
+names='incode_delaunay incode_status_text incode_tetrahedra_free incode_version'
+seen() { nm "$@" | awk 'NF == 3 && $2 ~ /[A-TV-Z]/ { print $3 }' | sort | xargs; }
+for file in libincode.so.0 libincode.a; do
+    kind=
+    [ $file = libincode.a ] || kind=-D
+    # shellcheck disable=SC2086
+    seen $kind "$root/opt/incode/lib/$file" > "$scratch/seen"
+    check "install/names of $file" "$(cat "$scratch/seen")" \
+        [ "$(cat "$scratch/seen")" = "$names" ]
+done
+
 # The firmware of boards, where the installed program finds it.
 if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
     command -v qemu-system-arm > "$scratch/where"; then

@@ -97,7 +97,8 @@ void *__wrap_mremap(void *old, size_t from, size_t to, int flags, void *at) {
     bool replaces = (flags & MREMAP_FIXED) != 0 && msync(at, 1, MS_ASYNC) == 0;
     void *p = __real_mremap(old, from, to, flags, at);
     if (p != MAP_FAILED)
-        mapped += pages(to) - pages(from) - (replaces ? pages(to) : 0);
+        mapped += pages(to) - (replaces ? pages(to) : 0) -
+                  ((flags & MREMAP_DONTUNMAP) != 0 ? 0 : pages(from));
     return p;
 }
 int __real_pthread_create(pthread_t *, const pthread_attr_t *,

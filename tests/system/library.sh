@@ -1,52 +1,9 @@
 #!/usr/bin/env bash
-# The library, as its page shows it and as programs use it: the rows of a cube's
-# run, byte for byte; two calls at once; cancelling; memory and threads that
-# fail; the names that are seen from outside.
+# The library as programs use it: the rows of a cube's run, byte for byte; two
+# calls at once; cancelling; memory and threads that fail.  install.sh has its
+# page's examples, and the names that are seen from outside.
 . tests/system/lib.sh
-user=$BUILD/tests/library
-first=$PWD
-
-# The page's two examples, against an installed library.
-root=$scratch/root
-"${MAKE:-make}" --no-print-directory BUILD="$BUILD" PREFIX="$root" install \
-    > "$scratch/said" 2>&1
-export PKG_CONFIG_PATH=$root/lib/pkgconfig LD_LIBRARY_PATH=$root/lib
-example() { # LANGUAGE FILE
-    awk -v open="\`\`\`$1" '$0 == open { on = 1; next } /^```/ { on = 0 } on' \
-        host/library/README.md > "$2"
-}
-if grep -q fsanitize "$BUILD/flags"; then
-    skip library/installed 'a sanitizer build is not installed'
-else
-    example c "$scratch/ten.c"
-    example cpp "$scratch/surface.cpp"
-    # shellcheck disable=SC2046
-    succeeds 'library/an example in C' gcc -std=c11 -Wall -Wextra -Werror \
-        "$scratch/ten.c" $(pkg-config --cflags --libs incode) \
-        -o "$scratch/ten"
-    check 'library/its tetrahedra' 'not two' \
-        [ "$("$scratch/ten" | tr '\n' ';')" = '0 1 2 3;1 2 3 4;' ]
-    if command -v g++ > "$scratch/where"; then
-        # shellcheck disable=SC2046
-        succeeds 'library/an example in C++' g++ -Wall -Wextra -Werror \
-            "$scratch/surface.cpp" $(pkg-config --cflags --libs incode) \
-            -o "$scratch/surface"
-        check 'library/its hull' "$("$scratch/surface" 2> "$scratch/errors")" \
-            grep -qE '^[0-9]{4} tetrahedra, [0-9]{3} facets of the hull, area 5\.[0-9]+$' \
-            <("$scratch/surface" 2> "$scratch/errors")
-        check 'library/its progress' 'it does not end with 100 %' \
-            grep -q '^100 %' "$scratch/errors"
-    else
-        skip 'library/an example in C++' 'g++ is not installed'
-    fi
-    names='incode_delaunay incode_status_text incode_tetrahedra_free incode_version'
-    seen() { nm "$@" | awk 'NF == 3 && $2 ~ /[A-TV-Z]/ { print $3 }' | sort | xargs; }
-    check 'library/names of libincode.so' "$(seen -D "$root/lib/libincode.so.0")" \
-        [ "$(seen -D "$root/lib/libincode.so.0")" = "$names" ]
-    check 'library/names of libincode.a' "$(seen "$root/lib/libincode.a")" \
-        [ "$(seen "$root/lib/libincode.a")" = "$names" ]
-fi
-cd "$first" || exit 1
+user=$BUILD/tests/library # as TOOL, of this build
 
 succeeds library/arguments "$user" arguments
 
