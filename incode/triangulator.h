@@ -8,7 +8,7 @@
  * incode_map), and anew where a job goes another way than the one before. Work:
  * a call of incode_triangulator_step closes at most one star, or takes one
  * search as far as one missing page, or some steps of an insertion
- * (points/insertion.h).  With the indexes `naive` and `grid` it builds at most
+ * (insertion/insertion.h).  With the indexes `naive` and `grid` it builds at most
  * one tetrahedron, and looks at no more than 256 pages of points or about 4,096
  * rows of cells and points.
  *

@@ -24,24 +24,18 @@
 extern "C" {
 #endif
 
-enum incode_status { /* incode_status_text(status) explains each */
-                     INCODE_OK = 0,
-                     INCODE_NO_MEMORY,    /* none, none within memory_max, or no
-                                             thread */
-                     INCODE_BAD_ARGUMENT, /* a NULL, an unknown flag, reserved
-                                           * that is not NULL
-                                           */
-                     INCODE_NOT_FINITE,   /* a coordinate is NaN or infinite:
-                                           * out->at is its row
-                                           */
-                     INCODE_TOO_FEW,      /* fewer than four distinct points */
-                     INCODE_FLAT,         /* all points on one plane or line */
-                     INCODE_TOO_MANY,     /* 2^32 - 1 points or more, less what
-                                             bricks leave     empty; 2^32 tetrahedra
-                                             with neighbours or hull */
-                     INCODE_IO,           /* of streams */
-                     INCODE_CANCELLED,    /* `progress` returned false */
-                     INCODE_INTERNAL      /* a defect: please report */
+/* incode_status_text(status) explains each. */
+enum incode_status {
+    INCODE_OK = 0,
+    INCODE_NO_MEMORY,    /* none, none within memory_max, or no thread */
+    INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, reserved that is not NULL */
+    INCODE_NOT_FINITE,   /* a coordinate is NaN or infinite, of row out->at */
+    INCODE_TOO_FEW,      /* fewer than four distinct points */
+    INCODE_FLAT,         /* all points on one plane or line */
+    INCODE_TOO_MANY,     /* points, or tetrahedra to be joined: see below */
+    INCODE_IO,           /* of streams */
+    INCODE_CANCELLED,    /* `progress` returned false */
+    INCODE_INTERNAL      /* a defect: please report */
 };
 
 enum {
@@ -86,8 +80,9 @@ struct incode_tetrahedra {
 
 /* Triangulates xyz[3 * points]: x, y, z of each row, read and not written.
  * `out` need not be initialised.  On an error it holds `at` alone and owns
- * nothing.  The caller's rounding mode and flush-to-zero are set aside and
- * restored.
+ * nothing.  At most 2^32 - 2 points, less what bricks leave empty; with
+ * neighbours or hull at most 2^32 - 2 tetrahedra.  The caller's rounding mode
+ * and flush-to-zero are set aside and restored.
  *
  * Memory: about 170 bytes a point at most, 108 of which are the result's.
  * Work: O(n log n) for points in a volume; the count of tetrahedra may grow

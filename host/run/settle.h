@@ -5,7 +5,7 @@
  *
  * Memory: 1 MB, while it works.  Work: a look at a thousand bricks; where they
  * do not, and the triangulation does not fit a node, 2,500 insertions
- * (order/open.h).
+ * (host/mesh/open.h).
  *
  *     host_settle(&options, points.count, &result);
  *     (void)host_settle_ordered(&options, &order, &result);

@@ -48,8 +48,9 @@ static void read_points(const char *path) {
             continue;
         if (points == room) {
             room = 2 * room + 1024;
-            xyz = realloc(xyz, room * 3 * sizeof *xyz);
-            demand(xyz != NULL);
+            double *grown = realloc(xyz, room * 3 * sizeof *xyz);
+            demand(grown != NULL);
+            xyz = grown;
         }
         memcpy(xyz + 3 * points++, p, sizeof p);
     }
