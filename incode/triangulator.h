@@ -8,9 +8,9 @@
  * incode_map), and anew where a job goes another way than the one before. Work:
  * a call of incode_triangulator_step closes at most one star, or takes one
  * search as far as one missing page, or some steps of an insertion
- * (insertion/insertion.h).  With the indexes `naive` and `grid` it builds at most
- * one tetrahedron, and looks at no more than 256 pages of points or about 4,096
- * rows of cells and points.
+ * (insertion/insertion.h).  With the indexes `naive` and `grid` it builds at
+ * most one tetrahedron, and looks at no more than 256 pages of points or about
+ * 4,096 rows of cells and points.
  *
  *     t = incode_triangulator_init(arena, bytes, &setup, &outside, &why);
  *     incode_triangulator_start(t, &job);
