@@ -15,7 +15,7 @@
 
 /* Whom to ask for the page: CUBE_HOST where there are no holders. */
 static inline uint16_t node_keeper(uint32_t page, uint32_t holders) {
-    return holders == 0 ? CUBE_HOST : (uint16_t)(1 + page % holders);
+    return (uint16_t)(holders == 0 ? CUBE_HOST : 1 + page % holders);
 }
 
 /* The page's place among those of its keeper, from 0 on; holders: 1 or more. */
