@@ -28,7 +28,7 @@ enum {
     SECOND = 1000000
 };
 
-static char wire[64];
+static char wire[128];
 static pid_t holder;
 static int end; /* closed: the holder ends */
 static struct host_error error;
