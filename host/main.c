@@ -219,7 +219,8 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
         status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
     }
     if (status == 0) {
-        status = host_verify(&points, &tets, &report, error);
+        status =
+            host_verify(&points, &tets, HOST_CHECK_DELAUNAY, &report, error);
         if (status == HOST_UNVERIFIED) {
             fputs(report.text, stderr);
         }

@@ -49,6 +49,7 @@ static int run(int argc, char **argv, struct host_error *error) {
     }
     options.nodes = nodes;
     options.begin = begin;
+    options.direct = false;
     ranks.cubes_due = options.table ? 2 : 1; /* one node alone comes first */
     return host_run(&options, &result, error);
 }

@@ -30,6 +30,7 @@ struct direct {
 struct worker {
     struct direct *run;
     struct host_call *call; /* or NULL */
+    bool is_caller;         /* it is the calling thread's */
     struct host_tetrahedra *tets;
     struct incode_triangulator *t;
     struct host_spill spill;
@@ -90,9 +91,16 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
 
 static void commit(void *context, uint32_t brick) {
     struct worker *w = context;
+    struct host_direct_sums *sums = w->run->sums;
     (void)brick;
     if (w->call != NULL)
         atomic_fetch_add_explicit(&w->call->bricks, 1, memory_order_relaxed);
+    if (sums != NULL) {
+        uint32_t done = 1 + atomic_fetch_add_explicit(&sums->bricks, 1,
+                                                      memory_order_relaxed);
+        if (w->is_caller && sums->committed != NULL)
+            sums->committed(done);
+    }
 }
 
 static bool spill(void *context, const struct incode_face *faces,
@@ -190,6 +198,7 @@ static void work(void *context, unsigned part) {
     struct direct *run = context;
     struct worker w = {.run = run,
                        .call = host_call(),
+                       .is_caller = part + 1 == run->threads,
                        .tets = &run->tets[part],
                        .wanted = INCODE_NONE};
     const struct incode_outside outside = {
@@ -277,4 +286,16 @@ enum host_direct host_direct_run(const struct host_order *order,
     for (unsigned i = 0; i < threads; i++)
         host_tetrahedra_free(&list[i]);
     return outcome;
+}
+
+int host_delaunay(const double *xyz, uint64_t count,
+                  struct host_tetrahedra *tets, struct host_error *error) {
+    struct host_order order;
+    uint32_t regions = host_direct_regions(host_threads(), count);
+    if (host_order_make(&order, "points", xyz, count, HOST_ADAPTIVE, regions,
+                        false, error) == 0 &&
+        host_direct_run(&order, tets, NULL, error) == HOST_DIRECT_DONE)
+        host_tetrahedra_sort(tets);
+    host_order_free(&order);
+    return error->code;
 }

@@ -35,6 +35,10 @@ struct host_direct_part {
 };
 
 struct host_direct_sums {
+    /* NULL, or called on the calling thread with the number of bricks that are
+     * done. */
+    void (*committed)(uint32_t bricks);
+    _Atomic uint32_t bricks;
     unsigned threads;
     struct host_direct_part part[HOST_THREADS_MAX];
 };
@@ -51,5 +55,9 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error);
+
+/* The same from points to tetrahedra that are sorted: 0, or error->code. */
+int host_delaunay(const double *xyz /* [3 * count] */, uint64_t count,
+                  struct host_tetrahedra *tets, struct host_error *error);
 
 #endif

@@ -24,99 +24,131 @@ static const struct argp_option options_of_run[] = {
      "What POINTS holds, where no extension tells, as with a pipe: that of %s, "
      "and .gz behind it",
      1},
-    {"strategy", KEY_STRATEGY, "NAME", 0, "How the work is shared out:", 1},
+    {"threads", KEY_THREADS, "N", 0,
+     "Threads that triangulate in this process, where no other option speaks "
+     "of a cube. Default: one a processor",
+     1},
+    {NULL, 0, NULL, 0, "A cube of nodes instead of threads:", 2},
+    {"strategy", KEY_STRATEGY, "NAME", 0, "How the work is shared out:", 2},
     {"partition", KEY_PARTITION, "NAME", 0,
      "Regions of equal counts (adaptive, the default) or equal cells "
      "(uniform)",
-     1},
+     2},
     {"index", KEY_INDEX, "NAME", 0,
      "How a node searches: naive (all points), grid (the paper's uniform "
      "grid) or kd, the default",
-     1},
+     2},
     {"face-rule", KEY_FACE_RULE, "NAME", 0,
      "Faces pursued by a region: those with a vertex of its own (own, the "
      "default) or at least partly inside it (paper)",
-     1},
+     2},
     {"build", KEY_BUILD, "NAME", 0,
      "How a node finds tetrahedra: by faces (InCoDe); by points inserted brick "
      "after brick, as long as what is not final fits in its memory; or auto, "
      "the default: by points where it has some of a surface, or all bricks of "
      "a volume, that fits. Other indexes than kd, the face rule paper, and "
      "other strategies than sequential, spatial and linda-spatial go by faces",
-     1},
+     2},
     {"nodes", KEY_NODES, "N", 0,
-     "Nodes of the cube: 1, 2, 4 .. 64. Default: what suits this machine", 1},
+     "Nodes of the cube: 1, 2, 4 .. 64. Default: what suits this machine", 2},
     {"linda", KEY_LINDA, "NAME", 0,
-     "Of --strategy linda: master-slaves (the default) or spatial", 1},
+     "Of --strategy linda: master-slaves (the default) or spatial", 2},
     {"cluster", KEY_CLUSTER, "N", 0,
-     "Nodes of a cluster in hybrid, a power of two. Default: 4", 1},
+     "Nodes of a cluster in hybrid, a power of two. Default: 4", 2},
     {"builders", KEY_BUILDERS, "N", 0,
      "Tetrahedron builders of each face manager. Default: all other nodes, of "
      "hybrid those of its cluster",
-     1},
+     2},
     {"faces-per-job", KEY_FACES_PER_JOB, "M", 0,
      "Faces that a face manager sends a builder at a time, 1 .. 96. Default: "
      "the number of nodes that share its list; of linda 30",
-     1},
+     2},
     {"jobs-per-worker", KEY_JOBS_PER_WORKER, "N", 0,
      "Such lists that a builder may have at a time, 1 .. 16. Default: 2; of "
      "linda 3",
-     1},
+     2},
     {"memory", KEY_MEMORY, "BYTES", 0,
      "Data memory of a node, stack included: 640K .. 1G; a small cube does "
      "with less, and an error says with how much. Default: 4M",
-     1},
-    {"link", KEY_LINK, "NAME", 0, "Wires between nodes:", 1},
-    {"board", KEY_BOARD, "NAME", 0, "What a node runs on:", 1},
+     2},
+    {"link", KEY_LINK, "NAME", 0, "Wires between nodes:", 2},
+    {"board", KEY_BOARD, "NAME", 0, "What a node runs on:", 2},
     {"patience", KEY_PATIENCE, "SECONDS", 0,
      "Give up a node that shows no progress for so long: start it again, or go "
      "on without it. Default: 60",
-     1},
+     2},
     {"cube", KEY_CUBE, "FILE", 0,
      "Run on the nodes that FILE describes, over the wires that it names; see "
      "README.md",
-     1},
-    {NULL, 0, NULL, 0, "What to report:", 2},
+     2},
+    {NULL, 0, NULL, 0, "What to report:", 3},
     {"verify", KEY_VERIFY, NULL, 0,
      "Check exactly that the result is the Delaunay triangulation; without it "
      "only that it is a triangulation. Default: with --cube, and after a loss",
-     2},
-    {"no-verify", KEY_NO_VERIFY, NULL, 0, "Leave the exact check out", 2},
-    {"stats", KEY_STATS, "FILE", 0, "Write statistics as JSON; - is stdout", 2},
-    {"table", KEY_TABLE, NULL, 0,
-     "Run on one node too, and print the columns of the paper's Table 2", 2},
-    {"map", KEY_MAP, NULL, 0, "Print the memory map of a node", 2},
-    {"explain", KEY_EXPLAIN, NULL, 0,
-     "Say why --strategy auto took the strategy that it took", 2},
-    {"quiet", 'q', NULL, 0, "Print nothing but errors", 2},
-    {"progress", KEY_PROGRESS, NULL, 0,
-     "Without a terminal, too: a line of progress every three seconds", 2},
-    {"no-progress", KEY_NO_PROGRESS, NULL, 0,
-     "No line of progress on a terminal", 2},
-    {NULL, 0, NULL, 0, "Testing:", 3},
-    {"window", KEY_WINDOW, "FRAMES", 0,
-     "Frames a link and direction, 1 .. 64. Default: by memory", 3},
-    {"shuffle-seed", KEY_SHUFFLE_SEED, "N", 0,
-     "Make arriving pages ready in a random order", 3},
-    {"host-stall", KEY_HOST_STALL, "MS", 0,
-     "The host sleeps up to MS milliseconds at random", 3},
-    {"host-rate", KEY_HOST_RATE, "BYTES", 0, "The host reads BYTES a second ..",
      3},
+    {"no-verify", KEY_NO_VERIFY, NULL, 0, "Leave the exact check out", 3},
+    {"stats", KEY_STATS, "FILE", 0, "Write statistics as JSON; - is stdout", 3},
+    {"table", KEY_TABLE, NULL, 0,
+     "Run on one node too, and print the columns of the paper's Table 2", 3},
+    {"map", KEY_MAP, NULL, 0, "Print the memory map of a node", 3},
+    {"explain", KEY_EXPLAIN, NULL, 0,
+     "Say why --strategy auto took the strategy that it took", 3},
+    {"quiet", 'q', NULL, 0, "Print nothing but errors", 3},
+    {"progress", KEY_PROGRESS, NULL, 0,
+     "Without a terminal, too: a line of progress every three seconds", 3},
+    {"no-progress", KEY_NO_PROGRESS, NULL, 0,
+     "No line of progress on a terminal", 3},
+    {NULL, 0, NULL, 0, "Testing:", 4},
+    {"window", KEY_WINDOW, "FRAMES", 0,
+     "Frames a link and direction, 1 .. 64. Default: by memory", 4},
+    {"shuffle-seed", KEY_SHUFFLE_SEED, "N", 0,
+     "Make arriving pages ready in a random order", 4},
+    {"host-stall", KEY_HOST_STALL, "MS", 0,
+     "The host sleeps up to MS milliseconds at random", 4},
+    {"host-rate", KEY_HOST_RATE, "BYTES", 0, "The host reads BYTES a second ..",
+     4},
     {"host-rate-time", KEY_HOST_RATE_TIME, "S", 0,
-     ".. for its first S seconds. Default: 30", 3},
+     ".. for its first S seconds. Default: 30", 4},
     {"host-unplug", KEY_HOST_UNPLUG, "MS", 0,
      "The host closes its serial wire every MS milliseconds, for half a second",
-     3},
+     4},
     {"board-reset", KEY_BOARD_RESET, "MS", 0,
      "One emulated board after the other, each once, is reset every MS "
      "milliseconds,",
-     3},
-    {"board-stop", KEY_BOARD_STOP, "MS", 0, "stopped for half of them,", 3},
-    {"board-kill", KEY_BOARD_KILL, "MS", 0, "or killed", 3},
-    {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 3},
+     4},
+    {"board-stop", KEY_BOARD_STOP, "MS", 0, "stopped for half of them,", 4},
+    {"board-kill", KEY_BOARD_KILL, "MS", 0, "or killed", 4},
+    {"seed", KEY_SEED, "N", 0, "Seed of --host-stall", 4},
     {"node-program", KEY_NODE_PROGRAM, "FILE", 0,
-     "Start FILE for a node instead of incode-node", 3},
+     "Start FILE for a node instead of incode-node", 4},
     {0}};
+
+static int of_cube(const struct host_arguments *p) {
+    for (int key = KEY_STRATEGY; key < KEY_THREADS; key++) {
+        if (host_arguments_given(p, key)) {
+            return key;
+        }
+    }
+    return 0;
+}
+
+static const char *option_name(int key) {
+    const struct argp_option *o = options_of_run;
+    while (o->key != key) {
+        o++;
+    }
+    return o->name;
+}
+
+static int check_threads(const struct host_arguments *p) {
+    int key = of_cube(p);
+    return key == 0 || !host_arguments_given(p, KEY_THREADS)
+               ? 0
+               : host_fail(p->error, HOST_USAGE,
+                           "--threads: are of this process, and --%s speaks of "
+                           "a cube of nodes; leave one of the two out",
+                           option_name(key));
+}
 
 typedef const char *row_name(unsigned i);
 
@@ -350,6 +382,7 @@ static error_t parse_report(int key, const char *value,
 
 static error_t parse_option(int key, char *value, struct argp_state *state) {
     struct host_arguments *p = state->input;
+    uint64_t n = 0;
     if (key >= KEY_STRATEGY && key < KEY_END) {
         p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
     }
@@ -368,6 +401,11 @@ static error_t parse_option(int key, char *value, struct argp_state *state) {
         return 0;
     case KEY_MEMORY:
         parse_memory(p, value);
+        return 0;
+    case KEY_THREADS:
+        (void)host_option_number("threads", value, 1, HOST_THREADS_MAX, &n,
+                                 p->error);
+        p->options->threads = (unsigned)n;
         return 0;
     case KEY_PATIENCE:
         (void)host_option_number("patience", value, 1, 86400,
@@ -393,8 +431,9 @@ static int parse_run(int argc, char **argv, unsigned flags,
         options_of_run,
         parse_option,
         "POINTS",
-        "Triangulates POINTS on a cube of nodes that it starts on this "
-        "machine, and writes each output by its extension.\v"
+        "Triangulates POINTS, and writes each output by its extension. The "
+        "work is done by threads of this process or, where an option speaks of "
+        "a cube, by nodes.\v"
         "POINTS: %s; .gz of any of them; - is .xyz from standard input. Of a "
         ".csv, .xyz or .txt whose first line names columns x, y and z, in any "
         "order and "
@@ -426,7 +465,9 @@ static int parse_run(int argc, char **argv, unsigned flags,
         host_arguments_given(&parse, KEY_LINDA)) {
         options->strategy = host_strategy_linda(parse.linda);
     }
-    return host_arguments_together(&parse);
+    options->direct = of_cube(&parse) == 0;
+    return check_threads(&parse) != 0 ? error->code
+                                      : host_arguments_together(&parse);
 }
 
 int host_arguments_run(int argc, char **argv, struct host_run_options *options,

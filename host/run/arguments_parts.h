@@ -14,6 +14,7 @@
 #include "run.h"
 
 enum {
+    /* Options of a cube of nodes. */
     KEY_STRATEGY = 256,
     KEY_PARTITION,
     KEY_INDEX,
@@ -30,11 +31,6 @@ enum {
     KEY_BUILDERS,
     KEY_FACES_PER_JOB,
     KEY_JOBS_PER_WORKER,
-    KEY_STATS,
-    KEY_VERIFY,
-    KEY_NO_VERIFY,
-    KEY_NO_PROGRESS,
-    KEY_PROGRESS,
     KEY_EXPLAIN,
     KEY_TABLE,
     KEY_MAP,
@@ -49,6 +45,13 @@ enum {
     KEY_BOARD_KILL,
     KEY_SEED,
     KEY_NODE_PROGRAM,
+    /* Options of every run. */
+    KEY_THREADS,
+    KEY_STATS,
+    KEY_VERIFY,
+    KEY_NO_VERIFY,
+    KEY_NO_PROGRESS,
+    KEY_PROGRESS,
     KEY_FORMAT,
     KEY_END
 };

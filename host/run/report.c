@@ -147,7 +147,8 @@ void host_report_run(FILE *file, const struct host_run_options *options,
     if (r->lost > 0) {
         fprintf(file, "%u of ", r->nodes - r->lost);
     }
-    fprintf(file, "%u node%s", r->nodes, r->nodes == 1 ? "" : "s");
+    fprintf(file, "%u %s%s", r->nodes, options->direct ? "thread" : "node",
+            r->nodes == 1 ? "" : "s");
     if (r->lost > 0 || r->restarts > 0) {
         fprintf(file, ", %u lost, %u started again", r->lost, r->restarts);
     }

@@ -77,6 +77,11 @@ void host_run_sum(const struct host_service *service,
     r->restarts = service->restarts;
     r->lost = r->nodes - service->work.living;
     r->generations = service->generations;
+    host_run_sum_nodes(r);
+}
+
+void host_run_sum_nodes(struct host_run_result *result) {
+    struct host_run_result *r = result;
     for (unsigned i = 0; i < r->nodes; i++) {
         const struct node_finished_message *f = &r->node[i].statistics;
         const struct incode_statistics *s = &f->statistics;
@@ -478,17 +483,25 @@ static int run_on(const struct host_run_options *options,
                   struct host_run_result *result, struct host_run_result *alone,
                   struct host_error *error) {
     struct host_tetrahedra tets = {0};
+    struct host_call call = {
+        .threads = options->threads == 0 ? host_processors() : options->threads,
+        .memory_max = UINT64_MAX};
+    if (options->direct) {
+        host_call_enter(&call); /* all that follows takes so many threads */
+    }
     alone->time_io_s = result->time_read_s;
     if (options->table && run_alone(options, points, alone, error) != 0) {
-        return error->code;
+        return error->code; /* of a cube: no call has begun */
     }
     result->time_io_s = result->time_read_s;
     result->host_cpu_s = -used_seconds(CLOCK_PROCESS_CPUTIME_ID);
-    int status = host_triangulate(options, points, &tets, result, error);
+    int status = (options->direct ? host_triangulate_direct : host_triangulate)(
+        options, points, &tets, result, error);
     if (status == 0) {
         status = finish(options, points, &tets, result, error);
     }
     host_tetrahedra_free(&tets);
+    host_call_enter(NULL);
     return status;
 }
 

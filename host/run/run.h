@@ -32,6 +32,8 @@ struct host_run_options {
     const char *format; /* of the input, for host_format_told; NULL: by name */
     const char *output[HOST_OUTPUTS_MAX];
     unsigned outputs;
+    bool direct;      /* on threads of this process, without nodes */
+    unsigned threads; /* then: so many; 0: one a processor */
     const struct host_strategy *strategy; /* NULL: auto */
     struct host_sharing sharing;
     enum host_partition partition;
@@ -122,6 +124,13 @@ int host_triangulate(const struct host_run_options *options,
                      struct host_tetrahedra *tets,
                      struct host_run_result *result, struct host_error *error);
 
+/* The same by threads of this process, the library's way. */
+int host_triangulate_direct(const struct host_run_options *options,
+                            const struct host_points *points,
+                            struct host_tetrahedra *tets,
+                            struct host_run_result *result,
+                            struct host_error *error);
+
 /* The same on nodes that are there already, result->nodes of them, with
  * result's strategy and memory as they are.  Ends the machine, whatever
  * happens. */
@@ -137,6 +146,9 @@ int host_triangulate_on(const struct host_run_options *options,
  * time at work: neither of holders, nor of nodes lost before they told. */
 void host_run_sum(const struct host_service *service,
                   struct host_run_result *result);
+
+/* The sums over the reports of result->node. */
+void host_run_sum_nodes(struct host_run_result *result);
 
 /* The whole command: reads, triangulates, verifies, writes. */
 int host_run(const struct host_run_options *options,

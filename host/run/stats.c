@@ -70,6 +70,7 @@ static json_t *map_object(const struct host_run_result *r, unsigned i) {
     return o;
 }
 
+/* Of a node, or of a thread that takes its place. */
 static json_t *node_object(const struct host_run_result *r, unsigned i) {
     const struct host_node_report *report = &r->node[i];
     const struct node_finished_message *f = &report->statistics;

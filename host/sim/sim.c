@@ -3,11 +3,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/library/delaunay.h"
 #include "host/verify/verify.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
 #include "sim_draw.h"
-#include "sim_reference.h"
 #include "sim_run.h"
 
 enum {
@@ -209,9 +209,10 @@ static int compare(struct host_sim_run *r, struct host_error *error) {
     static struct host_check_report report;
     struct host_tetrahedra right = {0};
     struct host_digest digest = {{0}};
-    int status = host_reference(&r->points, &right, error);
+    int status = host_delaunay(r->points.xyz, r->points.count, &right, error);
     if (status == 0) {
-        status = host_verify(&r->points, &right, &report, error);
+        status = host_verify(&r->points, &right, HOST_CHECK_DELAUNAY, &report,
+                             error);
     }
     if (status == 0) {
         host_digest(&right, &digest);

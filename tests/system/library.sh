@@ -19,7 +19,10 @@ same() {
             cmp -s "$scratch/rows.npy" "$scratch/cube.npy"
         rm -f "$scratch/rows.npy"
     done
-    rm -f "$scratch/cube.npy"
+    succeeds "library/$1, incode run" incode run "$2" -q -o "$scratch/rows.npy"
+    check "library/$1, incode run, rows" 'they differ from the cube'"'"'s' \
+        cmp -s "$scratch/rows.npy" "$scratch/cube.npy"
+    rm -f "$scratch/cube.npy" "$scratch/rows.npy"
 }
 for kind in uniform bubbles bluntfin sphere grid hub; do
     "$INCODE" gen $kind 3000 --seed 7 -o "$scratch/$kind.xyz"
@@ -51,3 +54,34 @@ succeeds library/cancelled "$user" cancel "$scratch/many.xyz" \
     > "$scratch/longest"
 check 'library/it tells how long that took' "after $(cat "$scratch/longest") ms" \
     grep -qE '^[0-9]+$' "$scratch/longest"
+
+# What `incode run` does where no option speaks of a cube.
+direct="$scratch/uniform.xyz"
+for threads in 1 3; do
+    succeeds "direct/$threads threads" incode run "$direct" --threads $threads \
+        --verify --stats "$scratch/stats.json" -o "$scratch/rows.npy" \
+        > "$scratch/output"
+    check "direct/$threads threads, last line" "$(last "$scratch/output")" \
+        grep -q "^direct on $threads thread.*; verified$" "$scratch/output"
+    check "direct/$threads threads, statistics" "$(head -30 "$scratch/stats.json")" \
+        jq -e ".strategy == \"direct\" and .link == \"memory\" and
+            .nodes == $threads and (.per_node | length) == $threads and
+            .verified and .hull_facets > 0 and .distinct_points == 3000 and
+            .tetrahedra_per_second > 0 and .checks_failed == 0 and
+            ([.per_node[].tetrahedra_built] | add) >= .tetrahedra and
+            ([.per_node[].cpu_s] | add) > 0" "$scratch/stats.json" > /dev/null
+done
+for option in '--nodes 2' '--strategy spatial' '--link tcp' '--memory 4M' \
+    '--board linux' '--index kd' '--partition uniform' '--face-rule own' \
+    '--build points' '--patience 60'; do
+    # shellcheck disable=SC2086
+    refuses "direct/--threads with ${option% *}" 2 \
+        "^incode: --threads: .* ${option% *} " "$INCODE" run "$direct" \
+        --threads 2 $option -o "$scratch/left/o.npy"
+done
+refuses 'direct/no threads' 2 '^incode: --threads 0: ' "$INCODE" run "$direct" \
+    --threads 0 -o "$scratch/left/o.npy"
+incode run "$direct" -q --patience 60 --stats "$scratch/stats.json"
+check 'direct/an option of a cube' "$(head -30 "$scratch/stats.json")" \
+    jq -e '.strategy != "direct" and .link == "tcp"' \
+    "$scratch/stats.json" > /dev/null

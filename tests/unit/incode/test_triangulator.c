@@ -396,7 +396,8 @@ static void rough_at_both_ends(void **unused) {
                          .memory = 4 << 20};
         struct host_check_report report;
         solo_run(&s, both.xyz, both.count);
-        if (host_verify(&both, &s.tets, &report, &error) != 0)
+        if (host_verify(&both, &s.tets, HOST_CHECK_DELAUNAY, &report, &error) !=
+            0)
             fail_msg("%s", report.text);
         assert_int_equal(s.by_points > 0, build == INCODE_BUILD_POINTS);
         solo_close(&s);

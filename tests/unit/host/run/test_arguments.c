@@ -48,6 +48,29 @@ static void test_defaults(void **unused) {
     assert_int_equal(o.verifying, HOST_VERIFY_WHERE_DUE);
     assert_false(o.quiet || o.table || o.map || o.explain || o.anywhere);
     assert_true(o.progress);
+    assert_true(o.direct);
+    assert_int_equal(o.threads, 0);
+}
+
+static void test_direct(void **unused) {
+    (void)unused;
+    struct host_run_options o;
+    struct host_error error;
+    static const char *const threads[] = {"a.xyz",   "--threads=3", "--verify",
+                                          "--stats", "b.json",      NULL};
+    assert_int_equal(parse(threads, &o, &error), 0);
+    assert_true(o.direct);
+    assert_int_equal(o.threads, 3);
+    static const char *const cube[] = {"--strategy=auto", "--nodes=2",
+                                       "--memory=4M",     "--patience=9",
+                                       "--explain",       "--map"};
+    for (size_t i = 0; i < sizeof cube / sizeof cube[0]; i++) {
+        const char *const alone[] = {"a.xyz", cube[i], NULL};
+        assert_int_equal(parse(alone, &o, &error), 0);
+        assert_false(o.direct);
+        const char *const both[] = {"a.xyz", cube[i], "--threads=2", NULL};
+        assert_int_equal(parse(both, &o, &error), HOST_USAGE);
+    }
 }
 
 static void test_options(void **unused) {
@@ -330,11 +353,11 @@ static void test_strategies(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),   cmocka_unit_test(test_options),
-        cmocka_unit_test(test_linda),      cmocka_unit_test(test_bare_boards),
-        cmocka_unit_test(test_refused),    cmocka_unit_test(test_in_vain),
-        cmocka_unit_test(test_names),      cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_strategies),
+        cmocka_unit_test(test_defaults),    cmocka_unit_test(test_direct),
+        cmocka_unit_test(test_options),     cmocka_unit_test(test_linda),
+        cmocka_unit_test(test_bare_boards), cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_in_vain),     cmocka_unit_test(test_names),
+        cmocka_unit_test(test_rows),        cmocka_unit_test(test_strategies),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

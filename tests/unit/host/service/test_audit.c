@@ -2,8 +2,8 @@
  * done again, and when the run gives up. */
 #include "given_messages.h"
 
+#include "host/library/delaunay.h"
 #include "host/service/generations.h"
-#include "host/sim/sim_reference.h"
 
 enum { ALL = UINT16_MAX, NOBODY = UINT16_MAX, NO_TET = -1 };
 
@@ -32,7 +32,8 @@ static void triangulate(const struct host_points *points) {
     struct host_error error = {0};
     uint32_t *vertex = calloc(points->count, sizeof *vertex);
     assert_non_null(vertex);
-    assert_int_equal(host_reference(points, &truth, &error), 0);
+    assert_int_equal(host_delaunay(points->xyz, points->count, &truth, &error),
+                     0);
     for (uint32_t v = 0; v < order.bricks * INCODE_BRICK_POINTS; v++) {
         if (order.row[v] != INCODE_NONE) {
             vertex[order.row[v]] = v;

@@ -23,7 +23,8 @@ struct fixture {
 
 static int verify(struct fixture *f, struct host_check_report *report) {
     struct host_error error = {0};
-    return host_verify(&f->points, &f->tets, report, &error);
+    return host_verify(&f->points, &f->tets, HOST_CHECK_DELAUNAY, report,
+                       &error);
 }
 
 static void close_fixture(struct fixture *f) {
@@ -44,8 +45,9 @@ static struct fixture made(const char *kind, uint32_t n, uint64_t seed) {
 static void expect(struct fixture *f, const char *what) {
     struct host_check_report report;
     struct host_error error = {0};
-    assert_int_equal(host_verify(&f->points, &f->tets, &report, &error),
-                     HOST_UNVERIFIED);
+    assert_int_equal(
+        host_verify(&f->points, &f->tets, HOST_CHECK_DELAUNAY, &report, &error),
+        HOST_UNVERIFIED);
     assert_true(report.faults > 0);
     if (strstr(report.text, what) == NULL) {
         fail_msg("expected '%s' in:\n%s", what, report.text);
@@ -107,7 +109,8 @@ static void data_agrees(void **unused) {
             for (uint64_t c = 0; c < 3 * f.points.count; c++) {
                 f.points.xyz[c] = ldexp(f.points.xyz[c], powers[k]);
             }
-            assert_int_equal(host_verify(&f.points, &f.tets, &report, &error),
+            assert_int_equal(host_verify(&f.points, &f.tets,
+                                         HOST_CHECK_DELAUNAY, &report, &error),
                              0);
             assert_int_equal(report.faults, 0);
         }
