@@ -8,7 +8,7 @@
 #include "host/base/options.h"
 #include "host/base/parse.h"
 #include "host/base/text.h"
-#include "host/bench/bench_arguments.h"
+#include "host/bench/bench.h"
 #include "host/verify/verify.h"
 #include "host/console/console.h"
 #include "host/console/nodes.h"

@@ -5,18 +5,106 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "bench_end.h"
-#include "bench_sim.h"
+#include "transport/drivers/sim.h"
+#include "bench.h"
 #include "host/nodes/cluster.h"
 #include "transport/drivers/secure_sodium.h"
 #include "transport/drivers/serial.h"
 #include "transport/drivers/tcp_wire.h"
+#include "host/service/strategies/strategies.h"
+#include "host/sim/sim_world.h"
+
+enum { PATIENCE_US = 20000000, SIM_STEP_US = 20, SIM_COUNT = 400 };
+
+struct sim_bench {
+    uint64_t now_us;
+    struct sim_wire wire;
+    struct link *link[2];
+    uint32_t got[2], due[2];
+    bool echo;
+};
+
+/* One step of time: end 1 echoes, where that is asked. */
+static void sim_turn(struct sim_bench *s, size_t size) {
+    static const uint8_t bytes[HOST_BENCH_MESSAGE];
+    struct link_message message;
+    s->now_us += SIM_STEP_US;
+    for (unsigned who = 0; who < 2; who++) {
+        (void)link_poll_receive(s->link[who], s->now_us);
+        while (link_read(s->link[who], &message)) {
+            link_release(s->link[who]);
+            s->got[who]++;
+            s->due[who] += s->echo && who == 1 ? 1 : 0;
+        }
+        while (s->due[who] > 0 &&
+               link_write(s->link[who], bytes, size, NULL, 0) == 0) {
+            s->due[who]--;
+        }
+        (void)link_poll_send(s->link[who], s->now_us);
+    }
+}
+
+/* Virtual microseconds until end 0 has had `count` messages. */
+static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
+                        size_t size) {
+    uint64_t begin = s->now_us;
+    s->echo = echo;
+    s->got[0] = 0;
+    s->due[0] = count;
+    s->due[1] = echo ? 0 : count;
+    while (s->got[0] < count && s->now_us - begin < PATIENCE_US) {
+        sim_turn(s, size);
+    }
+    return (double)(s->now_us - begin);
+}
+
+int host_bench_sim(struct host_bench_row *row, struct host_error *error) {
+    static struct sim_bench s;
+    static const struct sim_quality quality = {.bytes_per_s =
+                                                   HOST_BENCH_SIM_BYTES,
+                                               .latency_us = 100,
+                                               .room = 512,
+                                               .bytes = SIM_BYTES_MIN};
+    void *memory[3] = {malloc(sim_wire_bytes(&quality)), NULL, NULL};
+    memset(&s, 0, sizeof s);
+    if (memory[0] != NULL) {
+        sim_wire_init(&s.wire, memory[0], &quality, &s.now_us, 1);
+    }
+    for (unsigned who = 0; who < 2 && memory[0] != NULL; who++) {
+        struct link_config c = host_bench_serial(0);
+        c.epoch = who + 1;
+        c.node = (uint16_t)who;
+        c.peer_node = (uint16_t)(1 - who);
+        c.pipe = sim_pipe(&s.wire.end[who]);
+        memory[1 + who] = malloc(link_bytes(&c));
+        s.link[who] = memory[1 + who] == NULL
+                          ? NULL
+                          : link_init(memory[1 + who], link_bytes(&c), &c);
+    }
+    if (s.link[0] != NULL && s.link[1] != NULL) {
+        (void)sim_count(&s, 1, true, HOST_BENCH_SMALL);
+        row->round_trip_us = sim_count(&s, 1, true, HOST_BENCH_SMALL);
+        row->hop_us = sim_count(&s, 1, true, HOST_BENCH_MESSAGE) / 2;
+        uint64_t used = host_bench_used_us();
+        double us = sim_count(&s, SIM_COUNT, false, HOST_BENCH_MESSAGE);
+        row->cpu_us = (double)(host_bench_used_us() - used) / (2.0 * SIM_COUNT);
+        row->bytes_per_s = 1e6 * SIM_COUNT * HOST_BENCH_MESSAGE / us;
+    }
+    bool made = s.link[1] != NULL;
+    for (unsigned i = 0; i < 3; i++) {
+        free(memory[i]);
+    }
+    return made ? 0 : host_fail_memory(error, "the simulated links");
+}
+
+/* --- bench links ---------------------------------------------------------- */
 
 enum { FIFO_BYTES = 64 }; /* of a serial port: so many are brought at once */
 
@@ -303,4 +391,118 @@ int host_bench_links(struct host_error *error) {
                "mpi, two ranks");
     }
     return 0;
+}
+
+/* --- virtual run ---------------------------------------------------------- */
+
+enum { HOST_US = 2 }; /* the host's own work is not modelled */
+
+struct virtual_world {
+    struct host_virtual_run *run;
+    struct host_world world;
+    struct host_service service;
+    struct host_order order;
+    struct host_tetrahedra tets;
+    uint64_t page_bytes_to_all;
+};
+
+static uint64_t used_ns(void *context, unsigned i, const struct node *node) {
+    const struct virtual_world *v = context;
+    const struct cube_statistics *m = node_messages(node);
+    struct node_finished_message totals;
+    node_account(node, &totals);
+    double times = v->run->slow > 0 && i == 0 ? v->run->slow : 1;
+    return (uint64_t)(times * host_bench_node_ns(v->run->machine, &totals,
+                                                 m->written + m->read));
+}
+
+static int open_world(struct virtual_world *v, struct host_error *error) {
+    const struct host_run_options *run = v->run->options;
+    const struct host_bench_machine *m = v->run->machine;
+    struct host_world_options o = {
+        .cube = {.dimension = (unsigned)__builtin_ctz(run->nodes),
+                 .seed = 1,
+                 .wire = m->wire,
+                 .host_wire = m->host_wire,
+                 .gather_us = m->gather_us,
+                 .shared = m->shared},
+        .memory = run->memory,
+        .host_us = HOST_US,
+        .step_us = 1,
+        .used_ns = used_ns,
+        .used_context = v,
+        .routers = m->routers,
+        .time_us_max = UINT64_MAX / 4,
+        .steps_max = UINT64_MAX};
+    return host_world_open(&v->world, &o, error);
+}
+
+static int serve(struct virtual_world *v, struct host_machine *machine,
+                 struct host_error *error) {
+    const struct host_run_options *run = v->run->options;
+    struct host_service *s = &v->service;
+    s->machine = machine;
+    s->order = &v->order;
+    s->tets = &v->tets;
+    s->strategy = run->strategy;
+    s->sharing = run->sharing;
+    s->setup.setup.index = (uint8_t)run->index;
+    s->setup.setup.face_rule = (uint8_t)run->face_rule;
+    s->setup.setup.build = (uint8_t)run->build;
+    int status = host_service_start(s, error);
+    if (status == 0) {
+        uint64_t start_us = v->world.now_us;
+        status = host_service_run(s, error);
+        v->run->result.time_triangulation_s =
+            1e-6 * (double)(v->world.now_us - start_us);
+        host_run_sum(s, &v->run->result);
+        v->page_bytes_to_all = s->page_bytes_to_all;
+    }
+    host_service_end(s);
+    return status;
+}
+
+static void sum(struct virtual_world *v) {
+    struct host_virtual_run *run = v->run;
+    struct host_run_result *r = &run->result;
+    uint64_t bytes = v->page_bytes_to_all;
+    run->work_ns = 0;
+    for (unsigned i = 0; i < r->nodes; i++) {
+        double counts[HOST_BENCH_COUNTS];
+        host_bench_counts(&r->node[i].statistics, counts);
+        run->work_ns += host_bench_work_ns(run->machine->price, counts);
+        bytes += r->node[i].page_bytes;
+    }
+    r->tetrahedra = v->tets.count;
+    r->points = v->order.points;
+    r->time_io_s =
+        host_bench_io_s(run->machine, bytes, (unsigned)__builtin_ctz(r->nodes));
+}
+
+int host_virtual_run(struct host_virtual_run *run,
+                     const struct host_points *points,
+                     struct host_error *error) {
+    struct virtual_world *v = calloc(1, sizeof *v);
+    if (v == NULL) {
+        return host_fail_memory(error, "the simulated cube");
+    }
+    const struct host_run_options *o = run->options;
+    v->run = run;
+    memset(&run->result, 0, sizeof run->result);
+    run->result.nodes = o->nodes;
+    run->result.strategy = o->strategy;
+    int status = host_order_make(
+        &v->order, "points", points->xyz, points->count,
+        host_strategy_partition(o->strategy, o->partition),
+        o->strategy->regions(o->nodes), o->index == INCODE_GRID, error);
+    if (status == 0 && open_world(v, error) == 0) {
+        struct host_machine machine = host_world_machine(&v->world);
+        status = serve(v, &machine, error);
+        sum(v);
+        host_world_close(&v->world);
+    }
+    host_order_free(&v->order);
+    host_tetrahedra_free(&v->tets);
+    free(v);
+    return status != 0 ? status : error->code;
 }

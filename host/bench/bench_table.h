@@ -1,16 +1,14 @@
 /* A class of `incode bench peers` as a table: a row a set, goals beside what
  * is held to them, and the ratios of all rows.
  *
- * Memory: struct host_bench_table.  Work: a line a row.
- *
- *     host_bench_table_begin(&table, class, peers, 60);
- *     host_bench_table_row(&table, &result);
- *     host_bench_table_end(&table);
- */
+ * Memory: struct host_bench_table.  Work: a line a row. */
 #ifndef HOST_BENCH_TABLE_H
 #define HOST_BENCH_TABLE_H
 
-#include "bench_class.h"
+#include <stdio.h>
+
+#include "bench_peers.h"
+#include "host/base/error.h"
 
 enum { HOST_BENCH_ROWS_MAX = 4096 };
 
@@ -46,5 +44,15 @@ void host_bench_table_row(struct host_bench_table *table,
 
 /* How many goals of the class are not reached. */
 unsigned host_bench_table_end(struct host_bench_table *table);
+
+/* Figures through gnuplot (Debian's gnuplot-nox): a script in, an SVG out. */
+
+/* 0; HOST_INPUT where there is no gnuplot, which the file needs. */
+int host_gnuplot_there(const char *path, struct host_error *error);
+
+/* What the script, from its beginning, writes to standard output becomes the
+ * file.  0, HOST_INPUT where it cannot be made, or HOST_BROKEN where gnuplot
+ * does not draw. */
+int host_gnuplot_draw(FILE *script, const char *path, struct host_error *error);
 
 #endif

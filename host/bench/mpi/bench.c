@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "host/bench/bench_end.h"
+#include "host/bench/bench.h"
 #include "transport/drivers/mpi.h"
 
 static struct mpi_place place;

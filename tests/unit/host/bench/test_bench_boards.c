@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "host/bench/bench_boards_plot.h"
+#include "host/bench/bench_boards.h"
 
 /* As a linker writes it: what is left out before, long names on a line of their
  * own, sections that are no code behind. */

@@ -9,9 +9,8 @@
 
 #include <cmocka.h>
 
-#include "host/bench/calibrate.h"
+#include "host/bench/paper.h"
 #include "host/bench/model.h"
-#include "host/bench/paper_figures.h"
 
 static const double prices[HOST_BENCH_COUNTS] = {[HOST_BENCH_CALLS] = 7,
                                                  [HOST_BENCH_BUILT] = 11,

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "host/bench/virtual_run.h"
+#include "host/bench/bench_links.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
 
