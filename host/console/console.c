@@ -2,15 +2,126 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
+#include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "host/base/options.h"
 #include "host/base/progress.h"
+#include "host/base/options.h"
 #include "place.h"
-#include "script.h"
 #include "terminal.h"
+
+enum { TEND_US = 20000, IDLE_MS = 1000 };
+
+static volatile sig_atomic_t ending;
+
+/* A second one finds the default action. */
+static void interrupt(int number) {
+    ending = number;
+}
+
+int host_script_ending(void) {
+    return ending;
+}
+
+static void show_line(void *context, const char *text) {
+    (void)context;
+    (void)printf("%s\n", text);
+}
+
+static void show_note(void *context, const char *text) {
+    (void)context;
+    (void)fflush(stdout);
+    host_note("%s", text);
+}
+
+static void show_failed(void *context, const char *text) {
+    (void)context;
+    (void)fflush(stdout);
+    (void)fprintf(stderr, "incode: %s\n", text);
+}
+
+static bool interrupted(void *context) {
+    (void)context;
+    return ending != 0;
+}
+
+const struct host_shell_sink *host_script_sink(void) {
+    static const struct host_shell_sink sink = {
+        NULL, show_line, show_note, show_failed, NULL, NULL, interrupted};
+    const struct sigaction action = {.sa_handler = interrupt,
+                                     .sa_flags = (int)SA_RESETHAND};
+    struct sigaction before;
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    if (sigaction(SIGHUP, NULL, &before) == 0 &&
+        before.sa_handler != SIG_IGN) { /* as nohup has it */
+        (void)sigaction(SIGHUP, &action, NULL);
+    }
+    return &sink;
+}
+
+/* Waits for bytes, and tends the cube; false: it was interrupted. */
+static bool await_bytes(struct host_shell *shell, int file) {
+    struct pollfd input = {file, POLLIN, 0};
+    for (;;) {
+        bool tended = shell->open || shell->running;
+        int n = poll(&input, 1, tended ? 0 : IDLE_MS);
+        if (ending != 0) {
+            return false;
+        }
+        if (n > 0) {
+            return true;
+        }
+        if (tended) {
+            host_shell_tend(shell, TEND_US);
+        }
+    }
+}
+
+/* Each whole line of the buffer; what is left of it is moved to its start. */
+static size_t do_lines(struct host_shell *shell, char *text, size_t used) {
+    char *at = text, *end;
+    while (!shell->leaves && ending == 0 &&
+           (end = memchr(at, '\n', used - (size_t)(at - text))) != NULL) {
+        *end = '\0';
+        (void)host_shell_line(shell, at);
+        (void)fflush(stdout);
+        at = end + 1;
+    }
+    used -= (size_t)(at - text);
+    memmove(text, at, used);
+    return used;
+}
+
+int host_script_read(struct host_shell *shell, const char *name, int file,
+                     struct host_error *error) {
+    static char text[HOST_SCRIPT_LINE];
+    size_t used = 0;
+    while (!shell->leaves && await_bytes(shell, file)) {
+        ssize_t n = read(file, text + used, sizeof text - 1 - used);
+        if (n < 0 && errno != EINTR) {
+            return host_fail(error, HOST_INPUT, "%s: %s; give another file",
+                             name, strerror(errno));
+        }
+        if (n == 0) {
+            text[used] = '\n'; /* the last line may lack it */
+            (void)do_lines(shell, text, used + 1);
+            break;
+        }
+        used = do_lines(shell, text, used + (n > 0 ? (size_t)n : 0));
+        if (used == sizeof text - 1) {
+            return host_fail(error, HOST_INPUT,
+                             "%s: a line of more than %d bytes; give commands",
+                             name, HOST_SCRIPT_LINE - 2);
+        }
+    }
+    return 0;
+}
+
+/* --- console -------------------------------------------------------------- */
 
 enum { LINES = 64, KEY_FILE = 512, KEY_JSON };
 
@@ -108,7 +219,7 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
     bool person = options.lines == 0 && options.file == NULL &&
                   isatty(STDIN_FILENO) && isatty(STDOUT_FILENO) &&
                   !options.json;
-    int status, ending = 0;
+    int status, signal_number = 0;
     host_console_place_init(&place, &options.site);
     host_shell_init(&shell, &place.place,
                     person ? host_terminal_sink() : host_script_sink(),
@@ -118,7 +229,7 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
         status = host_site_read(&options.site, error);
     }
     if (status == 0) {
-        status = person ? host_terminal_run(&shell, &ending, error)
+        status = person ? host_terminal_run(&shell, &signal_number, error)
                         : do_script(&shell, &options, error);
     }
     if (status != 0 && options.json) {
@@ -127,10 +238,94 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
     }
     host_shell_close(&shell);
     host_console_place_end(&place);
-    ending = person ? ending : host_script_ending();
-    if (ending != 0) {
-        (void)signal(ending, SIG_DFL);
-        (void)raise(ending);
+    signal_number = person ? signal_number : host_script_ending();
+    if (signal_number != 0) {
+        (void)signal(signal_number, SIG_DFL);
+        (void)raise(signal_number);
     }
     return status != 0 ? status : person ? 0 : shell.first;
+}
+
+/* --- nodes ---------------------------------------------------------------- */
+
+enum { NODES_KEY_JSON = 512, SETTLE_US = 12000000 };
+
+struct nodes_options {
+    struct host_site_options site;
+    bool json;
+    struct host_error *error;
+};
+
+static const struct argp_option nodes_own_rows[] = {
+    {NULL, 0, NULL, 0, "What is printed:", 3},
+    {"json", NODES_KEY_JSON, NULL, 0, "Print an object of JSON", 3},
+    {0}};
+
+static error_t nodes_parse(int key, char *value, struct argp_state *state) {
+    struct nodes_options *o = state->input;
+    switch (key) {
+    case NODES_KEY_JSON:
+        o->json = true;
+        return 0;
+    case ARGP_KEY_ARG:
+        host_fail(o->error, HOST_USAGE,
+                  "%s: no argument of nodes; to name a cube file, write --cube",
+                  value);
+        return 0;
+    default:
+        return host_site_option(&o->site, key, value, o->error);
+    }
+}
+
+/* Those that begin may need a moment. */
+static int wait_for_all(struct host_shell *shell, struct host_error *error) {
+    struct host_node_set all;
+    host_node_set_all(&all, shell->machine.nodes);
+    return host_visit_settle(&shell->visit, &all, SETTLE_US, error);
+}
+
+/* Beside another program it looks on, and says beside whom. */
+static int reach(struct host_shell *shell, struct host_error *error) {
+    struct host_holder holder;
+    char text[HOST_HOLDER_TEXT];
+    if (host_shell_is_held(shell, &holder)) {
+        host_note("nodes: a look beside %s, which has the cube",
+                  host_holder_text(&holder, text, sizeof text));
+        return 0;
+    }
+    return host_shell_open(shell, error) != 0 ? error->code
+                                              : wait_for_all(shell, error);
+}
+
+int host_nodes_command(int argc, char **argv, struct host_error *error) {
+    static struct host_console_place place;
+    static struct host_shell shell;
+    struct nodes_options nodes_options = {.error = error};
+    struct argp_option rows[HOST_OPTIONS_MAX];
+    host_site_table(rows, nodes_own_rows);
+    const struct argp argp = {
+        rows,
+        nodes_parse,
+        "",
+        "Tells which nodes of a cube are there, what is missing, what is wired "
+        "wrongly, and what to do next. Exit status: 0 all nodes and wires are "
+        "there, 4 not.",
+        NULL,
+        NULL,
+        NULL};
+    if (host_options_parse(&argp, argc, argv, 0, &nodes_options, error) != 0) {
+        return error->code;
+    }
+    host_console_place_init(&place, &nodes_options.site);
+    host_shell_init(&shell, &place.place, host_script_sink(),
+                    nodes_options.json);
+    struct host_error lost = {0};
+    int status = host_site_check(&nodes_options.site, &lost);
+    status = status == 0 ? reach(&shell, &lost) : status;
+    status = status != 0 && !shell.open && !shell.in_use
+                 ? host_shell_fail(&shell, "nodes", &lost)
+                 : host_shell_line(&shell, "nodes"); /* says what it is */
+    host_shell_close(&shell);
+    host_console_place_end(&place);
+    return status;
 }

@@ -1,12 +1,7 @@
 /* A drawing of the cube's wires in letters, dead and wrong ones marked: as a
  * person sees it up to dimension 4, as a matrix beyond.
  *
- * Memory: the text.  Work: a few letters a wire.
- *
- *     struct host_drawing drawing = {.dimension = 3};
- *     drawing.wire[0][2] = HOST_WIRE_DEAD; // from node 0 to node 4
- *     host_drawing_draw(&drawing, stdout);
- */
+ * Memory: the text.  Work: a few letters a wire. */
 #ifndef HOST_CONSOLE_DRAWING_H
 #define HOST_CONSOLE_DRAWING_H
 

@@ -2,13 +2,7 @@
  * with the set of those who said it, as cluster shells show it.
  *
  * Memory: each row that differs, and 128 bytes.  Work: a row is compared with
- * those that differ.
- *
- *     host_fold_add(&fold, 3, "up  0.4 ms");
- *     host_fold_add(&fold, 4, "up  0.4 ms");
- *     host_fold_print(&fold, "STATE RTT", say, NULL); // "3-4    up  0.4 ms"
- *     host_fold_free(&fold);
- */
+ * those that differ. */
 #ifndef HOST_CONSOLE_FOLD_H
 #define HOST_CONSOLE_FOLD_H
 

@@ -1,20 +1,45 @@
 /* The console's cube where its options say it is: the wires, lines that reset
  * boards, and runs beside it.
  *
- * Memory: struct host_console_place.  Work: as its parts'.
- *
- *     struct host_console_place here;
- *     host_console_place_init(&here, &options);
- *     host_shell_init(&shell, &here.place, &sink, false);
- *     host_console_place_end(&here);
- */
+ * Memory: struct host_console_place.  Work: as its parts'. */
 #ifndef HOST_CONSOLE_PLACE_H
 #define HOST_CONSOLE_PLACE_H
 
-#include "child_run.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/types.h>
+
+#include "host/base/error.h"
 #include "host/cube/lines.h"
 #include "host/cube/site.h"
 #include "shell.h"
+
+/* `incode run` as a child of the console, with its own group, so that Ctrl-C at
+ * the console's line is not its.
+ *
+ * Memory: struct host_child_run.  Work: a fork and an exec; a look reads what
+ * the child has said. */
+
+struct host_child_run {
+    pid_t pid; /* 0: none runs */
+    int said;  /* what it says comes there; -1: it has the terminal */
+    size_t used;
+    char line[1024];
+};
+
+/* words: its arguments, the program's name first, NULL last.  quiet: its output
+ * comes by `look`, not on the terminal. */
+int host_child_run_begin(struct host_child_run *run, const char *const *words,
+                         bool quiet, struct host_error *error);
+
+/* Whether it has ended, and then *status, as a shell has it. */
+bool host_child_run_look(struct host_child_run *run, int *status,
+                         void (*say)(void *context, const char *text),
+                         void *context, uint64_t wait_us);
+
+/* As Ctrl-C does. */
+void host_child_run_interrupt(const struct host_child_run *run);
 
 enum { HOST_CONSOLE_PATH = 4200 };
 

@@ -3,22 +3,45 @@
  * Between two lines it has to be tended, for the cube's links wait for nobody.
  *
  * Memory: the visit's, 100 bytes a link, and what one answer takes; none of it
- * grows with time.  Work: a line returns when it is done, or abandoned.
- *
- *     host_shell_init(&shell, &place, &sink, false);
- *     status = host_shell_line(&shell, "ping 0-3,7");
- *     while (!shell.leaves)
- *         host_shell_tend(&shell, 20000);
- *     host_shell_close(&shell);
- */
+ * grows with time.  Work: a line returns when it is done, or abandoned. */
 #ifndef HOST_CONSOLE_SHELL_H
 #define HOST_CONSOLE_SHELL_H
 
 #include <jansson.h>
 
+#include "host/service/machine.h"
 #include "host/watch/look.h"
 #include "host/cube/visit.h"
-#include "watch.h"
+
+/* A machine as it is, but that a person may cut its waits short, that what it
+ * has to tell goes where the person reads, and that bytes which are no frame
+ * can be shown.
+ *
+ * Memory: struct host_watch.  Work: a copy of the last bytes that came. */
+
+struct host_shell_sink;
+
+enum { HOST_WATCH_BYTES = 48 };
+
+struct host_watch {
+    struct host_machine beneath;
+    const struct host_shell_sink *sink;
+    bool cut;          /* a wait was cut short */
+    uint64_t received; /* bytes, in all */
+    unsigned used;
+    uint8_t last[HOST_WATCH_BYTES]; /* that came */
+};
+
+void host_watch_init(struct host_watch *watch,
+                     const struct host_machine *machine,
+                     const struct host_shell_sink *sink);
+
+/* Stays valid as long as the watch stays where it is.  Where a person has
+ * interrupted, its `check` fails with HOST_CUBE, and watch->cut is set. */
+struct host_machine host_watch_machine(struct host_watch *watch);
+
+/* The last bytes that came, as a person can read them. */
+void host_watch_noise(const struct host_watch *watch, char *text, size_t size);
 
 /* Where the cube is, and what is beside it. */
 struct host_shell_place {

@@ -7,16 +7,12 @@
  * it.
  *
  * Memory: struct host_lines, a pointer a line.  Work: a system call a change; a
- * reset sleeps.
- *
- *     if (host_lines_open(&lines, &file, NULL, &error) != 0)
- *         return error.code;
- *     if (host_lines_has(&file, 3, HOST_LINE_RESET))
- *         (void)host_lines_reset(&lines, 3, false, &error);
- *     host_lines_close(&lines);
- */
+ * reset sleeps. */
 #ifndef HOST_LINES_H
 #define HOST_LINES_H
+
+#include <signal.h>
+#include <stdbool.h>
 
 #include "host/nodes/remote.h"
 
@@ -48,5 +44,30 @@ int host_lines_reset(struct host_lines *lines, unsigned node, bool stay,
                      struct host_error *error);
 
 void host_lines_close(struct host_lines *lines);
+
+/* A stretch of time in which a signal that would end, or stop, the program
+ * waits until something is put right: Ctrl-C, Ctrl-\, Ctrl-Z, SIGTERM, SIGHUP.
+ * What the program does about signals beside is as it was again afterwards, and
+ * happens then.  SIGKILL waits for nobody.
+ *
+ * Memory: struct host_guard; one at a time in the process.  Work: some system
+ * calls; waiting sleeps. */
+
+enum { HOST_GUARD_SIGNALS = 5 };
+
+struct host_guard {
+    struct sigaction before[HOST_GUARD_SIGNALS];
+    bool taken[HOST_GUARD_SIGNALS]; /* not one that is ignored */
+    int ends[2];                    /* of the pipe that a signal writes to */
+};
+
+/* 0, or -1 and errno. */
+int host_guard_begin(struct host_guard *guard);
+
+/* Sleeps; false: cut short by a signal.  Ctrl-Z does not cut it short. */
+bool host_guard_wait(struct host_guard *guard, unsigned ms);
+
+/* Signals that came meanwhile are raised before it returns. */
+void host_guard_end(struct host_guard *guard);
 
 #endif

@@ -1,16 +1,7 @@
 /* Where a person's cube is, as the commands for it say: --cube FILE, --port
  * DEV, --tcp HOST:PORT, --unix PATH.  Without a file one wire to node 0 is all
  * that is known: the cube's dimension is what node 0 greets with, or
- * --cube-nodes.
- *
- * Memory: the struct.  Work: reading the file, opening the wires.
- *
- *     struct host_site_options options = {.cube = "lab.cube"};
- *     if (host_site_open(&site, &options, &error) != 0)
- *         return error.code;
- *     status = host_visit_open(&visit, &site.machine, &error);
- *     host_site_close(&site);
- */
+ * --cube-nodes. */
 #ifndef HOST_SITE_H
 #define HOST_SITE_H
 
@@ -18,6 +9,7 @@
 
 #include "host/base/options.h"
 #include "host/nodes/remote.h"
+#include "host/service/machine.h"
 
 struct host_site_options {
     const char *cube, *port, *tcp, *unix_path; /* one of them */
@@ -65,5 +57,25 @@ int host_site_open(struct host_site *site,
                    const struct host_site_options *options,
                    struct host_error *error);
 void host_site_close(struct host_site *site);
+
+/* Who is at the other end of a wire of which nothing else is known: a node
+ * greets with its number and the dimension of its cube where it is asked as
+ * PROTOCOL.md says, whatever its link does meanwhile. */
+
+struct host_greeting {
+    bool found;
+    bool learns;   /* a board that waits to be told who it is */
+    uint16_t node; /* who greets, by this port of its */
+    uint8_t port;
+    uint16_t peer_node; /* whom it expects here */
+    uint8_t dimension;
+    uint16_t frame_payload; /* bytes */
+};
+
+/* Asks by machine->pipe until somebody greets, wait_us at most; first_hello:
+ * who is there listens for a link's greeting first, as over a socket. */
+void host_greeting_wait(struct host_greeting *greeting,
+                        const struct host_machine *machine, bool first_hello,
+                        uint64_t wait_us);
 
 #endif

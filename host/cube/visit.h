@@ -7,13 +7,6 @@
  * answered (again after a second, as it may have been lost with a node on its
  * way), and sleeps when there is nothing to do.  Pings, a second apart for each
  * node, grow rarer where pongs take long: they are to leave the wire to others.
- *
- *     if (host_visit_open(&visit, &machine, &error) != 0)
- *         return error.code;
- *     if (host_visit_wait(&visit, &set, 3000000, &error) != 0 ||
- *         host_visit_ask(&visit, &set, NODE_LINKS, 0, 2000000, &error) != 0)
- *         return error.code;
- *     host_visit_close(&visit);
  */
 #ifndef HOST_VISIT_H
 #define HOST_VISIT_H

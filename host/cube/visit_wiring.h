@@ -5,14 +5,7 @@
  * seconds, say so by the cube's wiring; nodes that have no limit for that (bare
  * boards) say with their pongs which of their links are silent, and which have
  * been up.  Where that differs from what the generation was begun with, another
- * is begun, soon after the last news: all at once where there are many.
- *
- * Memory: none of its own.  Work: a pass over nodes and links a look, twenty
- * times a second.
- *
- *     host_visit_wiring_begin(&visit);
- *     host_visit_wiring_look(&visit);
- */
+ * is begun, soon after the last news: all at once where there are many. */
 #ifndef HOST_VISIT_WIRING_H
 #define HOST_VISIT_WIRING_H
 

@@ -1,14 +1,12 @@
 /* What a board is sent for what it is and has, and how that is told.
  *
  * Memory: the reply and the unit's text, on the heap.  Work: a digest of each.
- *
- *     if (host_answer(&board, &job) != 0)
- *         return board.error.code;
  */
 #ifndef HOST_ANSWER_H
 #define HOST_ANSWER_H
 
 #include "board.h"
+#include "host/nodes/cube_file.h"
 
 /* Once all facts are there: reply, program, unit, result.  0, or board->error.
  */
@@ -17,5 +15,22 @@ int host_answer(struct host_deploy_board *board,
 
 /* What its result is, once it is done. */
 void host_answer_done(struct host_deploy_board *board, const char *state);
+
+/* What starts a node on a board: a unit of systemd, or where none runs a few
+ * lines for a shell.  Both hold what `incode cube FILE` prints, with the
+ * board's own paths.
+ *
+ * Memory: the text, up to 64 KiB.  Work: one pass over the node's options. */
+
+struct host_unit {
+    const struct host_cube_file *file;
+    unsigned node;
+    const char *folder;  /* the node's own on its board, from the root */
+    const char *manager; /* "system" or "user" of systemd, or "none" */
+    const char *user;    /* who runs it */
+};
+
+/* To be freed; NULL: no memory. */
+char *host_unit_text(const struct host_unit *unit);
 
 #endif

@@ -3,15 +3,7 @@
  * polls, and says which file has something.
  *
  * Memory: 6 KiB, and while it is at work the text of its unit.  Work: as bytes
- * come and go; nothing waits.
- *
- *     if (host_board_begin(&board, &job, 3) != 0)
- *         return board.error.code;
- *     while (!board.ended) {
- *         (void)poll(files, n = host_board_files(&board, files), 1000);
- *         host_board_step(&board, &job, files, n);
- *     }
- */
+ * come and go; nothing waits. */
 #ifndef HOST_BOARD_H
 #define HOST_BOARD_H
 
@@ -19,8 +11,8 @@
 #include <stdbool.h>
 #include <sys/types.h>
 
-#include "host/deploy/programs.h"
-#include "host/deploy/script.h"
+#include "deploy.h"
+#include "script.h"
 #include "host/nodes/cube_file.h"
 
 enum {
@@ -78,5 +70,23 @@ void host_board_step(struct host_deploy_board *board,
                      const struct pollfd *files, unsigned count);
 
 void host_board_free(struct host_deploy_board *board);
+
+/* The boards' lines: on a terminal that has room for all of them a row a board
+ * shows what it is at; what came of it is printed once, when all are done. */
+
+struct host_deploy_lines {
+    bool quiet, live;
+};
+
+void host_deploy_lines_begin(struct host_deploy_lines *lines, unsigned boards,
+                             bool quiet);
+/* When anything may have changed. */
+void host_deploy_lines_show(const struct host_deploy_lines *lines,
+                            const struct host_deploy_board *boards,
+                            unsigned count);
+/* When all is done: last lines, what is wrong, and notes. */
+void host_deploy_lines_end(const struct host_deploy_lines *lines,
+                           const struct host_deploy_board *boards,
+                           unsigned count);
 
 #endif

@@ -1,6 +1,8 @@
 #include "draw.h"
 
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "host/base/progress.h"
@@ -8,6 +10,7 @@
 #include "host/formats/claims.h"
 #include "host/formats/read.h"
 #include "picture.h"
+#include "host/base/options.h"
 
 /* No output may be a file that is read. */
 static int check_claims(const struct host_draw_options *options,
@@ -81,4 +84,141 @@ int host_draw(const struct host_draw_options *options,
     host_points_free(&points);
     host_tetrahedra_free(&tets);
     return host_output_commit(error);
+}
+
+/* --- arguments ------------------------------------------------------------ */
+
+enum { KEY_AXIS = 256, KEY_AT, KEY_WIDTH, WIDTH = 640 };
+
+struct parse_draw {
+    struct host_draw_options *options;
+    struct host_error *error;
+};
+
+static void parse_axis(struct parse_draw *p, const char *value) {
+    const char *axis = strlen(value) == 1 ? strchr("xyz", value[0]) : NULL;
+    if (axis == NULL) {
+        host_fail(p->error, HOST_USAGE,
+                  "--axis %s: not an axis; allowed: x, y, z", value);
+        return;
+    }
+    p->options->axis = value[0] - 'x';
+}
+
+static void parse_at(struct parse_draw *p, const char *value) {
+    char *end = NULL;
+    p->options->at = strtod(value, &end);
+    p->options->has_at = true;
+    if (end == value || *end != '\0' || !isfinite(p->options->at)) {
+        host_fail(p->error, HOST_USAGE,
+                  "--at %s: not a coordinate; give a number, as in 0.5", value);
+    }
+}
+
+static void parse_width(struct parse_draw *p, const char *value) {
+    uint64_t n = 0;
+    (void)host_option_number("width", value, HOST_PICTURE_MIN, HOST_PICTURE_MAX,
+                             &n, p->error);
+    p->options->width = (unsigned)n;
+}
+
+static void parse_argument(struct parse_draw *p, const char *value) {
+    struct host_draw_options *o = p->options;
+    if (o->points == NULL) {
+        o->points = value;
+    } else if (o->tets == NULL) {
+        o->tets = value;
+    } else {
+        host_fail(p->error, HOST_USAGE,
+                  "%s: one argument too many; give POINTS, TETS and -o FILE",
+                  value);
+    }
+}
+
+static error_t parse_draw_option(int key, char *value,
+                                 struct argp_state *state) {
+    struct parse_draw *p = state->input;
+    switch (key) {
+    case 'o':
+        p->options->output = value;
+        return 0;
+    case 'q':
+        p->options->quiet = true;
+        return 0;
+    case KEY_AXIS:
+        parse_axis(p, value);
+        return 0;
+    case KEY_AT:
+        parse_at(p, value);
+        return 0;
+    case KEY_WIDTH:
+        parse_width(p, value);
+        return 0;
+    case ARGP_KEY_ARG:
+        parse_argument(p, value);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static int check(const struct host_draw_options *options,
+                 struct host_error *error) {
+    char formats[64];
+    host_picture_formats(formats, sizeof formats);
+    if (error->code == 0 && options->tets == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "POINTS TETS: too few arguments; give both, as in "
+                         "incode draw a.xyz a.ele -o a.svg");
+    }
+    if (error->code == 0 && options->output == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "-o FILE: missing; give a name that ends in %s, or -",
+                         formats);
+    }
+    if (error->code == 0 && host_picture_format(options->output) == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "-o %s: no format of pictures has this extension; "
+                         "use %s, or -",
+                         options->output, formats);
+    }
+    return error->code;
+}
+
+int host_draw_arguments(int argc, char **argv,
+                        struct host_draw_options *options,
+                        struct host_error *error) {
+    static const struct argp_option options_of_draw[] = {
+        {"output", 'o', "FILE", 0,
+         "Write the picture to FILE, .svg or .png; - is .svg on standard "
+         "output",
+         0},
+        {"axis", KEY_AXIS, "x|y|z", 0,
+         "The plane is at right angles to this axis. Default: the one along "
+         "which the points extend least, or z",
+         0},
+        {"at", KEY_AT, "COORDINATE", 0,
+         "Where on that axis the plane is. Default: the middle", 0},
+        {"width", KEY_WIDTH, "PIXELS", 0,
+         "Of the picture, 16 to 8192. Default: 640", 0},
+        {"quiet", 'q', NULL, 0, "Print nothing but errors", 0},
+        {0}};
+    static const struct argp argp = {
+        options_of_draw,
+        parse_draw_option,
+        "POINTS TETS",
+        "Draws a plane section through the triangulation TETS of POINTS: each "
+        "tetrahedron that the plane cuts, the smaller the bluer.  Points on "
+        "the plane count as above it.  An .svg has one path a colour, and "
+        "tetrahedra below a pixel share one.\v"
+        "Examples:\n"
+        "  incode draw a.xyz a.ele -o a.svg\n"
+        "  incode draw a.xyz a.vtu -o a.png --axis x --at 0.25 --width 1600",
+        NULL,
+        NULL,
+        NULL};
+    struct parse_draw parse = {options, error};
+    *options = (struct host_draw_options){.axis = -1, .width = WIDTH};
+    int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
+    return status != 0 ? status : check(options, error);
 }

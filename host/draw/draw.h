@@ -1,12 +1,7 @@
 /* `incode draw`: a plane section through a triangulation, as a picture.
  *
  * Memory: the points, the tetrahedra, the section and the picture.  Work: what
- * reading takes, as a rule.
- *
- *     if (host_draw_arguments(argc, argv, &draw, &error) != 0)
- *         return error.code;
- *     return host_draw(&draw, &error);
- */
+ * reading takes, as a rule. */
 #ifndef HOST_DRAW_H
 #define HOST_DRAW_H
 

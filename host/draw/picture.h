@@ -2,19 +2,33 @@
  * smaller a tetrahedron is, the bluer - and the formats that it is written in.
  *
  * Memory: an output's buffer; see svg.c and png.c.  Work: one pass over the
- * cells for each of the colours (SVG) or a few ns a pixel (PNG).
- *
- *     const struct host_picture_format *format = host_picture_format("a.png");
- *     struct host_picture picture = host_picture_of(&section, 640);
- *     if (host_output_open(&out, "a.png", &error) == 0)
- *         format->write(&out, &picture, &error);
- *     host_output_close(&out, 1, &error);
- */
+ * cells for each of the colours (SVG) or a few ns a pixel (PNG). */
 #ifndef HOST_PICTURE_H
 #define HOST_PICTURE_H
 
 #include "host/formats/output.h"
 #include "section.h"
+
+/* Convex polygons into pixels, by the part of each pixel that they cover: what
+ * cells that adjoin cover adds up to 1, so that no seam shows between them, in
+ * whatever order they come.
+ *
+ * Memory: the raster.  Work: a few ns for each pixel that a polygon covers, and
+ * 20 ns for each line of them. */
+
+/* Red, green and blue times the covered part; that part; the part that lines
+ * cover. */
+enum { HOST_CHANNELS = 5 };
+
+struct host_raster {
+    unsigned width, height;
+    float (*pixels)[HOST_CHANNELS]; /* [width * height], row by row */
+};
+
+/* Adds `channels` times the covered part to each pixel.  What lies outside is
+ * left out. */
+void host_raster_add(struct host_raster *raster, double corner[][2],
+                     unsigned corners, const float channels[HOST_CHANNELS]);
 
 enum {
     HOST_PICTURE_MIN = 16, /* pixels a side */

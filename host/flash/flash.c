@@ -1,18 +1,281 @@
 #include "flash.h"
 
 #include <argp.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/random.h>
 
-#include "flash_cut.h"
-#include "flash_show.h"
+#include "host/base/text.h"
+#include "spread.h"
 #include "host/base/options.h"
 #include "host/base/progress.h"
-#include "host/base/text.h"
 #include "host/cube/lines.h"
 #include "host/cube/site.h"
-#include "image_file.h"
+#include "sign.h"
+
+enum { LINE = 2048, LIST = 160 };
+
+static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+enum { SIGNALS = sizeof signals / sizeof signals[0] };
+
+static struct sigaction before[SIGNALS];
+static volatile sig_atomic_t came;
+
+static void keep(int number) {
+    came = number;
+}
+
+void host_flash_cut_begin(void) {
+    const struct sigaction action = {.sa_handler = keep,
+                                     .sa_flags = (int)SA_RESETHAND};
+    came = 0;
+    for (int i = 0; i < SIGNALS; i++) {
+        if (sigaction(signals[i], NULL, &before[i]) == 0 &&
+            before[i].sa_handler != SIG_IGN) { /* as nohup has it */
+            (void)sigaction(signals[i], &action, NULL);
+        }
+    }
+}
+
+void host_flash_cut_end(void) {
+    for (int i = 0; i < SIGNALS; i++) {
+        (void)sigaction(signals[i], &before[i], NULL);
+    }
+}
+
+int host_flash_cut(void) {
+    return came;
+}
+
+/* What a node does now that nobody sends it anything; of several as well. */
+static const char *state_of(const struct host_spread *spread, unsigned i) {
+    const struct host_spread_node *n = &spread->node[i];
+    switch (n->phase) {
+    case HOST_SPREAD_BEGINS:
+    case HOST_SPREAD_TAKES:
+    case HOST_SPREAD_WHOLE:
+        return "in the loader, and what has come is kept; turned off and on, "
+               "what was there before runs";
+    case HOST_SPREAD_VERIFIED:
+        return "in the loader; turned off and on, the new image runs";
+    case HOST_SPREAD_STARTS:
+    case HOST_SPREAD_DONE:
+    case HOST_SPREAD_HAS:
+        return "with the new image";
+    default:
+        return n->left ? "on the way into the loader; turned off and on, "
+                         "what was there before runs"
+                       : "as before";
+    }
+}
+
+static void tell_states(FILE *out, const struct host_spread *spread) {
+    struct host_node_set told = {{0}};
+    unsigned nodes = spread->visit->machine->nodes;
+    for (unsigned i = 0; i < nodes; i++) {
+        struct host_node_set set = {{0}};
+        char name[LIST];
+        if (!spread_wanted(spread, i) || host_node_set_has(&told, i)) {
+            continue;
+        }
+        for (unsigned k = i; k < nodes; k++) {
+            if (spread_wanted(spread, k) &&
+                state_of(spread, k) == state_of(spread, i)) {
+                host_node_set_add(&set, k);
+                host_node_set_add(&told, k);
+            }
+        }
+        host_node_set_name(&set, name, sizeof name);
+        host_say(out, "incode: flash: %s: %s\n", name, state_of(spread, i));
+    }
+}
+
+void host_flash_cut_tell(FILE *out, const struct host_spread *spread, int argc,
+                         char *const *argv) {
+    char line[LINE];
+    int used = snprintf(line, sizeof line, "incode flash");
+    tell_states(out, spread);
+    for (int i = 1; i < argc && used + 2 < LINE; i++) {
+        line[used++] = ' ';
+        if (host_text_quote(line + used, sizeof line - (size_t)used, argv[i]) !=
+            0) {
+            snprintf(line, sizeof line, "the same command");
+            break;
+        }
+        used += (int)strlen(line + used);
+    }
+    host_say(out, "incode: flash: interrupted; go on with: %s\n", line);
+}
+
+void host_flash_cut_finish(void) {
+    if (came != 0) {
+        (void)signal(came, SIG_DFL);
+        (void)raise(came);
+    }
+}
+
+/* --- flash show ----------------------------------------------------------- */
+
+enum { FLASH_SHOW_LIST = 160, FLASH_SHOW_LINE = 600 };
+
+static const struct host_spread_node *node_of(const struct host_flash_show *s,
+                                              unsigned i) {
+    return &s->spread->node[i];
+}
+
+void host_flash_show_begin(struct host_flash_show *show,
+                           const struct host_spread *spread, bool quiet) {
+    *show = (struct host_flash_show){.spread = spread, .quiet = quiet};
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+        if (host_node_set_has(&spread->options.nodes, i)) {
+            show->node[show->wanted++] = (uint16_t)i;
+        }
+    }
+    host_progress_begin(!quiet);
+    unsigned most = host_progress_rows_max();
+    if (most > 0) {
+        show->nodes_a_row = (show->wanted + most - 1) / most;
+        show->rows = (show->wanted + show->nodes_a_row - 1) / show->nodes_a_row;
+        host_progress_rows(show->rows);
+    }
+}
+
+/* Of several nodes, what the one says that is farthest behind. */
+static void draw_row(const struct host_flash_show *s, unsigned row) {
+    struct host_node_set set = {{0}};
+    enum host_spread_phase phase = HOST_SPREAD_LOST;
+    unsigned from = row * s->nodes_a_row, count = 0;
+    char head[FLASH_SHOW_LIST + 8], tail[FLASH_SHOW_LIST];
+    double part = 0.0;
+    for (unsigned k = from; k < s->wanted && k < from + s->nodes_a_row; k++) {
+        const struct host_spread_node *n = node_of(s, s->node[k]);
+        bool whole = n->phase > HOST_SPREAD_TAKES;
+        phase = n->phase < phase ? n->phase : phase;
+        part += whole ? 1.0 : (double)n->held / (double)n->blocks;
+        count++;
+        host_node_set_add(&set, s->node[k]);
+    }
+    bool moves =
+        phase >= HOST_SPREAD_BEGINS && phase <= HOST_SPREAD_DONE && count > 0;
+    host_node_set_name(&set, head, sizeof head);
+    snprintf(tail, sizeof tail, "%s", host_spread_phase_text(phase));
+    host_progress_row(row, head, moves ? part / count : -1.0, tail);
+}
+
+void host_flash_show_draw(const struct host_flash_show *show) {
+    for (unsigned row = 0; row < show->rows; row++) {
+        draw_row(show, row);
+    }
+    host_progress_draw();
+}
+
+void host_flash_show_change(const struct host_flash_show *show, unsigned node) {
+    const struct host_spread_node *n = node_of(show, node);
+    bool silent = n->phase == HOST_SPREAD_BEGINS ||
+                  n->phase == HOST_SPREAD_WHOLE ||
+                  (n->phase == HOST_SPREAD_TAKES && n->held != 0) ||
+                  n->phase >= HOST_SPREAD_HAS;
+    if (show->rows == 0 && !show->quiet && !silent) {
+        host_note("flash: node %u: %s", node, host_spread_phase_text(n->phase));
+    }
+}
+
+/* --- at the end ----------------------------------------------------------- */
+
+/* Those that are as node `first` is, by what is said of them. */
+static struct host_node_set alike(const struct host_flash_show *s,
+                                  unsigned first) {
+    struct host_node_set set = {{0}};
+    const struct host_visit_node *seen = s->spread->visit->node;
+    for (unsigned k = 0; k < s->wanted; k++) {
+        unsigned i = s->node[k];
+        const struct host_spread_node *a = node_of(s, i),
+                                      *b = node_of(s, first);
+        if (a->phase == b->phase && strcmp(a->text, b->text) == 0 &&
+            memcmp(seen[i].who.version, seen[first].who.version,
+                   sizeof seen[i].who.version) == 0) {
+            host_node_set_add(&set, i);
+        }
+    }
+    return set;
+}
+
+/* "mps2-an500 0.1.0, number 3" */
+static const char *name_image(const struct host_flash_show *s,
+                              char text[FLASH_SHOW_LIST]) {
+    const struct loader_image *image = &s->spread->image;
+    snprintf(text, FLASH_SHOW_LIST, "%s %s, number %u", image->board,
+             image->version, image->number);
+    return text;
+}
+
+static void say_each(const struct host_flash_show *s,
+                     void (*say)(const struct host_flash_show *s, unsigned i,
+                                 bool one, char line[FLASH_SHOW_LINE])) {
+    struct host_node_set told = {{0}};
+    for (unsigned k = 0; k < s->wanted; k++) {
+        char nodes[FLASH_SHOW_LIST + 8], line[FLASH_SHOW_LINE] = "";
+        unsigned i = s->node[k];
+        if (host_node_set_has(&told, i)) {
+            continue;
+        }
+        struct host_node_set set = alike(s, i);
+        for (unsigned b = 0; b < sizeof told.bits; b++) {
+            told.bits[b] |= set.bits[b];
+        }
+        say(s, i, host_node_set_count(&set) == 1, line);
+        if (line[0] != '\0') {
+            host_node_set_name(&set, nodes, sizeof nodes);
+            host_say(stdout, "%s: %s\n", nodes, line);
+        }
+    }
+    (void)fflush(stdout);
+}
+
+static void say_result(const struct host_flash_show *s, unsigned i, bool one,
+                       char line[FLASH_SHOW_LINE]) {
+    const struct host_spread_node *n = node_of(s, i);
+    char image[FLASH_SHOW_LIST];
+    name_image(s, image);
+    if (n->phase == HOST_SPREAD_DONE) {
+        snprintf(line, FLASH_SHOW_LINE, "%s %s", one ? "runs" : "run", image);
+    } else if (n->phase == HOST_SPREAD_HAS) {
+        snprintf(line, FLASH_SHOW_LINE, "had %s already", image);
+    } else if (n->phase == HOST_SPREAD_PASSED) {
+        snprintf(line, FLASH_SHOW_LINE, "passed over, as it %s", n->text);
+    }
+}
+
+void host_flash_show_result(const struct host_flash_show *show) {
+    if (!show->quiet) {
+        say_each(show, say_result);
+    }
+}
+
+static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
+                     char line[FLASH_SHOW_LINE]) {
+    const struct host_spread_node *n = node_of(s, i);
+    const struct node_who *who = &s->spread->visit->node[i].who;
+    char image[FLASH_SHOW_LIST];
+    name_image(s, image);
+    if (n->phase == HOST_SPREAD_LEAVES) {
+        snprintf(line, FLASH_SHOW_LINE,
+                 "would restart and be given %s: it runs %.*s", image,
+                 (int)sizeof who->version, (const char *)who->version);
+    } else if (n->phase == HOST_SPREAD_BEGINS) {
+        snprintf(line, FLASH_SHOW_LINE,
+                 "would be given %s: it is in its loader", image);
+    } else {
+        say_result(s, i, one, line);
+    }
+}
+
+void host_flash_show_plan(const struct host_flash_show *show) {
+    say_each(show, say_plan);
+}
+
+/* --- flash ---------------------------------------------------------------- */
 
 enum {
     KEY_NODES = 1024,

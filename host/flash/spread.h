@@ -6,14 +6,7 @@
  *
  * Memory: struct host_spread, and 800 bytes a node.  Work: a step is a round of
  * the visit, and sends as many blocks as there is room for; a node that gets no
- * further for patience_us is given up, and the others are done.
- *
- *     if (host_spread_open(&spread, &visit, &options, &error) != 0)
- *         return error.code;
- *     if (host_spread_run(&spread, &error) == 0)
- *         (void)host_spread_result(&spread, &error);
- *     host_spread_close(&spread);
- */
+ * further for patience_us is given up, and the others are done. */
 #ifndef HOST_SPREAD_H
 #define HOST_SPREAD_H
 
@@ -113,5 +106,47 @@ void host_spread_close(struct host_spread *spread);
 
 /* "takes blocks", for a person. */
 const char *host_spread_phase_text(enum host_spread_phase phase);
+
+/* What the parts of spread.h share: judging a node by what it answers, and
+ * sending what is due.
+ *
+ * Memory: struct host_spread.  Work: a pass over the nodes. */
+
+enum {
+    SPREAD_AGAIN_US = 4000000 /* an order that had no effect is repeated */
+};
+
+static inline bool spread_wanted(const struct host_spread *spread, unsigned i) {
+    return host_node_set_has(&spread->options.nodes, i);
+}
+
+static inline bool spread_ended(const struct host_spread_node *node) {
+    return node->phase >= HOST_SPREAD_DONE;
+}
+
+/* Whether its loader is there, and has not come to its end. */
+bool spread_in_loader(const struct host_spread *spread, unsigned i);
+
+/* Whether it was told to start the program that it had, and has not yet. */
+bool spread_goes_home(const struct host_spread *spread, unsigned i);
+
+void spread_set(struct host_spread *spread, unsigned i,
+                enum host_spread_phase phase);
+
+/* By what the visit knows of it; by what its loader says. */
+void spread_judge(struct host_spread *spread, unsigned i);
+void spread_hear(struct host_spread *spread, unsigned i,
+                 const struct loader_state_message *state);
+
+/* Adds to what is said of a node that fell back its answer to NODE_LOG. */
+void spread_explain(struct host_spread *spread, unsigned i);
+
+/* A node that has got no further for too long. */
+void spread_expire(struct host_spread *spread, unsigned i);
+
+/* Restarts, beginnings, questions, verifications and starts that are due; the
+ * blocks that there is room for. */
+int spread_orders(struct host_spread *spread, struct host_error *error);
+void spread_blocks(struct host_spread *spread);
 
 #endif

@@ -1,6 +1,6 @@
 #include <string.h>
 
-#include "spread_internal.h"
+#include "spread.h"
 #include "transport/frame.h"
 
 enum {

@@ -21,21 +21,53 @@
  *
  * Memory: a KB for each watcher, and an answer of up to 2.1 KB a node.  Work: a
  * system call every 50 ms; with a watcher also a message to each node asked
- * for, and its answer.
- *
- *     struct host_look look;
- *     if (host_look_open(&look, "serial:/dev/ttyUSB0", &error) != 0 ||
- *         host_look_ask(&look, &set, NODE_TOP, 3000000, &error) != 0)
- *         return error.code;
- *     memcpy(&top, look.node[3].answer, look.node[3].size);
- *     host_look_close(&look);
- */
+ * for, and its answer. */
 #ifndef HOST_LOOK_H
 #define HOST_LOOK_H
 
-#include "holder.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <sys/socket.h>
+#include <sys/types.h>
+#include <sys/un.h>
+
+#include "host/base/error.h"
 #include "host/base/node_set.h"
 #include "node/questions.h"
+
+/* Who has a wire on this machine. */
+
+enum {
+    HOST_WIRE_NAME = 4400, /* bytes of a wire's name: KIND:PATH */
+    HOST_HOLDER_TEXT = 320
+};
+
+struct host_holder {
+    pid_t pid; /* 0: not known, it takes no calls */
+    uid_t uid;
+    char user[40];     /* its name, or number */
+    char command[200]; /* line, printable, as much of it as fits */
+    int64_t since_s;   /* of the epoch, when it began; 0: not known */
+};
+
+/* The program that is using a wire.  False: none, this process, or one that is
+ * not believed. */
+bool host_holder_find(struct host_holder *holder, const char *wire);
+
+/* "incode run bunny.xyz --cube lab.cube, process 4711 of alice, since 19:02" */
+const char *host_holder_text(const struct host_holder *holder, char *text,
+                             size_t size);
+
+/* For look.h and offer.h: the meeting place of a wire, and the process at the
+ * other end of a socket there. */
+socklen_t host_holder_address(const char *wire, struct sockaddr_un *address);
+bool host_holder_of(struct host_holder *holder, int file);
+
+/* Any user may take a meeting place.  A holder is believed if it belongs to
+ * this user or to root.  Root also believes another user's process that has the
+ * wire open. */
+bool host_holder_believed(const struct host_holder *holder, const char *wire);
 
 enum { HOST_LOOKERS_MAX = 4 };
 
@@ -73,5 +105,14 @@ int host_look_ask(struct host_look *look, const struct host_node_set *set,
 
 /* After host_look_open, whatever that returned. */
 void host_look_close(struct host_look *look);
+
+/* What those who look on may ask, as look.h names it. */
+
+/* Of a question's line, every second node of the largest cube named. */
+enum { HOST_LOOK_QUESTION_BYTES = 4096 };
+
+/* 0: no question by that name, or of NULL; NULL: it is not to be asked. */
+enum node_question host_look_question(const char *name);
+const char *host_look_name(enum node_question what);
 
 #endif

@@ -14,10 +14,8 @@
 
 #include <jansson.h>
 
-#include "holder.h"
-#include "host/service/onlookers.h"
 #include "look.h"
-#include "names.h"
+#include "host/service/onlookers.h"
 
 struct host_looker {
     int file; /* -1: none */

@@ -13,9 +13,9 @@
 
 #include <cmocka.h>
 
-#include "host/deploy/programs.h"
+#include "host/deploy/deploy.h"
 #include "host/deploy/script.h"
-#include "host/deploy/unit.h"
+#include "host/deploy/answer.h"
 
 static const char *const cube =
     "dimension = 0; memory = \"1M\";\n"

@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 #include "host/draw/picture.h"
-#include "host/draw/raster.h"
 
 enum { SIDE = 6, ROWS = SIDE + 1 };
 

@@ -16,8 +16,7 @@
 #include <cmocka.h>
 
 #include "host/base/progress.h"
-#include "host/flash/flash_cut.h"
-#include "host/flash/flash_show.h"
+#include "host/flash/flash.h"
 
 enum { NODES = 8, TEXT = 4000 };
 

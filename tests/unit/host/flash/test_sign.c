@@ -13,9 +13,7 @@
 
 #include <cmocka.h>
 
-#include "host/flash/image_file.h"
 #include "host/flash/sign.h"
-#include "host/flash/sign_key.h"
 #include "host/nodes/cube_key.h"
 #include "transport/bytes.h"
 #include "transport/drivers/sign_sodium.h"
