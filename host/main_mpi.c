@@ -11,7 +11,6 @@
 #include "host/bench/mpi/bench.h"
 #include "host/nodes/mpi/ranks.h"
 #include "host/run/arguments.h"
-#include "host/run/begin.h"
 #include "host/run/launch.h"
 #include "host/run/run.h"
 #include "incode/predicates/predicates.h"

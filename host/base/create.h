@@ -18,7 +18,7 @@
 #include <stdio.h>
 #include <sys/types.h>
 
-#include "host/base/error.h"
+#include "error.h"
 
 /* A new file, open for writing.  -1 and errno: EEXIST if the name exists, even
  * as a link to nothing. */

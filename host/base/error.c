@@ -2,6 +2,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <time.h>
 
 #include "text.h"
 
@@ -25,4 +26,12 @@ int host_fail_memory(struct host_error *error, const char *what) {
                      "host: no memory for %s; free some memory or take a "
                      "machine with more",
                      what);
+}
+
+/* --- clock ---------------------------------------------------------------- */
+
+uint64_t host_now_us(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
 }

@@ -1,15 +1,9 @@
 /* What went wrong, as a value: an exit status and one line of text for the
- * user.  Nothing in host/ but main.c ends the program.
- *
- * Memory: the struct alone.  Work: one vsnprintf.
- *
- *     struct host_error error = {0};
- *     if (fopen("a.xyz", "rb") == NULL)
- *         return host_fail(&error, HOST_INPUT, "a.xyz: %s; give a file",
- *                          strerror(errno));
- */
+ * user.  Nothing in host/ but main.c ends the program. */
 #ifndef HOST_ERROR_H
 #define HOST_ERROR_H
+
+#include <stdint.h>
 
 /* Exit statuses of the program. */
 enum host_code {
@@ -33,5 +27,10 @@ int host_fail(struct host_error *error, int code, const char *format, ...)
 
 /* The memory of this machine does not suffice for `what`: HOST_BROKEN. */
 int host_fail_memory(struct host_error *error, const char *what);
+
+/* The clock by which the host measures and waits. */
+
+/* Microseconds since any fixed time, never going back. */
+uint64_t host_now_us(void);
 
 #endif

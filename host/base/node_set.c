@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "parse.h"
 #include "text.h"
 
 enum { PART_BYTES = 16 };

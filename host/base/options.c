@@ -9,7 +9,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "parse.h"
 #include "text.h"
 
 enum {

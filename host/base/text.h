@@ -2,19 +2,15 @@
  * file or a peer says - on their way to a terminal and to a shell.
  *
  * Memory: the caller's; HOST_SAY_BYTES of stack to say something.  Work: one
- * pass.
- *
- *     char line[80];
- *     host_text_printable(line, sizeof line, "node \x1b[2J");
- *     if (host_text_quote(line, sizeof line, "a b; c") != 0) return -1;
- *     host_say(stderr, "incode: %s: %u bytes\n", "a\nb", n);
- */
+ * pass. */
 #ifndef HOST_TEXT_H
 #define HOST_TEXT_H
 
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+
+#include "error.h"
 
 enum { HOST_SAY_BYTES = 4096 };
 
@@ -43,5 +39,25 @@ const char *host_text_nearest(const char *word,
                               const char *(*name)(const void *context,
                                                   unsigned i),
                               const void *context);
+
+/* Numbers and sizes as a user writes them: on a command line, in a cube file,
+ * in the environment. */
+
+/* A whole number in decimal, lo to hi, also as 1e6, 2.5e3, or 10k and 2M,
+ * thousands and millions.  0, or -1: *number
+ * stays as it is. */
+int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
+                      uint64_t *number);
+
+/* Bytes, with an optional K, M or G, which are powers of 1024 as memory comes,
+ * of either case and with or without B or iB: 4M, 4MB, "4 MiB".  0, or -1:
+ * *bytes stays as it is. */
+int host_parse_bytes(const char *text, uint64_t *bytes);
+
+/* The value of `option`, as --nodes: a power of two, up to `most`, which is
+ * one.  `more`: what else to do for more nodes, or "". */
+int host_parse_nodes(const char *option, const char *text, unsigned most,
+                     const char *more, unsigned *nodes,
+                     struct host_error *error);
 
 #endif

@@ -7,14 +7,14 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "bench_boards.h"
 #include "bench_peers.h"
 #include "bench_links.h"
 #include "paper.h"
 #include "bench_scaling.h"
 #include "host/base/options.h"
-#include "host/base/parse.h"
+#include "host/base/text.h"
 #include "host/service/machine.h"
 #include "bench_table.h"
 #include "host/base/progress.h"

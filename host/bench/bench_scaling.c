@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "bench_table.h"
 #include "host/base/progress.h"
 #include "bench_peers.h"

@@ -10,7 +10,7 @@
 #include "host/service/strategies/strategies.h"
 #include "bench_links.h"
 #include "host/mesh/names.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "incode/front/afl.h"
 #include "incode/pages/bricks.h"
 

@@ -3,9 +3,9 @@
 #include <string.h>
 
 #include "commands.h"
-#include "host/base/parse.h"
+#include "host/base/text.h"
 #include "transport/routes.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 
 enum { BEGIN_US = 3000000 }; /* within which a cube is found */
 

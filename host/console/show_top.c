@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "commands.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "node/roles/roles.h"
 
 enum {

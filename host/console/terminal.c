@@ -19,7 +19,7 @@
 #include "host/base/create.h"
 #include "host/base/progress.h"
 #include "commands.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 
 #define NAME "history"
 

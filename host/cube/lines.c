@@ -7,7 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "gpio.h"
 
 static const int signals[HOST_GUARD_SIGNALS] = {SIGINT, SIGTERM, SIGHUP,

@@ -9,10 +9,9 @@
 #include "transport/bytes.h"
 #include "transport/frame.h"
 #include "transport/link_internal.h"
-#include "host/base/parse.h"
-#include "host/base/progress.h"
 #include "host/base/text.h"
-#include "host/nodes/resolve.h"
+#include "host/base/progress.h"
+#include "host/nodes/port.h"
 #include "transport/drivers/key_file.h"
 #include "transport/secure_wipe.h"
 

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "answer.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "transport/secure_wipe.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"

@@ -15,7 +15,7 @@
 
 #include "node/loader/messages.h"
 #include "transport/drivers/sign_sodium.h"
-#include "host/nodes/cube_key.h"
+#include "host/nodes/cube_file.h"
 #include "transport/drivers/key_file.h"
 #include "transport/secure_wipe.h"
 #include "host/base/options.h"

@@ -3,22 +3,14 @@
  * board is a file that defines host_board_NAME, and a row of boards.c.  A run
  * on a cube file has its board's name alone, and starts what the file says.
  * Ranks of MPI, whose program is that of boards/mpi, are a kind of link: they
- * are processes of the board linux.
- *
- * Memory: the table.  Work: as that of the board's start.
- *
- *     const struct host_board *board = host_board_named("linux");
- *     if (board == NULL || board->start(board, &options, &started, &error))
- *         return error.code;
- *     service.machine = &started.machine;
- */
+ * are processes of the board linux. */
 #ifndef HOST_BOARDS_H
 #define HOST_BOARDS_H
 
 #include <stdbool.h>
 
-#include "host/nodes/cluster.h"
-#include "host/nodes/emulator.h"
+#include "cluster.h"
+#include "emulator.h"
 #include "host/service/machine.h"
 
 /* A cube of nodes that a board has started. */

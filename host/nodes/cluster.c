@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +12,179 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
+#include "transport/drivers/serial.h"
+#include "transport/drivers/tcp.h"
+#include "transport/drivers/unix_file.h"
+#include "host/base/error.h"
 #include "host/base/parallel.h"
+
+static const struct host_link rows[] = {
+    {.name = "tcp",
+     .help = "connected sockets",
+     .pair = tcp_pair,
+     .needs = "loopback connections"},
+    {.name = "serial",
+     .help = "pseudo-terminals",
+     .pair = serial_pair,
+     .needs = "pseudo-terminals",
+     .terminals = true},
+    {.name = "mpi",
+     .help = "ranks of Open MPI, also under mpirun",
+     .ranks = true},
+};
+
+/* What cube files and boards have besides. */
+static const struct host_link of_files[] = {
+    {.name = "unix", .help = "sockets with a path"},
+    {.name = "mixed", .help = "wires of several kinds"},
+    {.name = "uart",
+     .help = "those of emulated boards",
+     .pair = unix_file_pair,
+     .needs = "socket pairs"},
+};
+
+const struct host_link *host_link_row(unsigned i) {
+    return i < sizeof rows / sizeof rows[0] ? &rows[i] : NULL;
+}
+
+const char *host_link_name(unsigned i) {
+    const struct host_link *link = host_link_row(i);
+    return link == NULL ? NULL : link->name;
+}
+
+const struct host_link *host_link_named(const char *name) {
+    const struct host_link *link;
+    unsigned i;
+    for (i = 0; (link = host_link_row(i)) != NULL; i++) {
+        if (strcmp(name, link->name) == 0) {
+            return link;
+        }
+    }
+    for (i = 0; i < sizeof of_files / sizeof of_files[0]; i++) {
+        if (strcmp(name, of_files[i].name) == 0) {
+            return &of_files[i];
+        }
+    }
+    return NULL;
+}
+
+/* --- trouble -------------------------------------------------------------- */
+
+bool host_trouble_due(struct host_troubled *troubled, uint64_t now_us,
+                      enum host_trouble_kind *kind, unsigned *node) {
+    struct host_troubled *t = troubled;
+    if (t->stopped && now_us - t->last_us[HOST_TROUBLE_STOP] >=
+                          t->trouble.every_us[HOST_TROUBLE_STOP] / 2) {
+        t->stopped = false;
+        *kind = HOST_TROUBLE_CONT;
+        *node = t->stopped_node;
+        return true;
+    }
+    for (unsigned k = 0; k < HOST_TROUBLES; k++) {
+        uint64_t every_us = t->trouble.every_us[k];
+        if (t->last_us[k] == 0) {
+            t->last_us[k] = now_us;
+        }
+        if (every_us == 0 || t->turn[k] == t->nodes ||
+            now_us - t->last_us[k] < every_us) {
+            continue;
+        }
+        t->last_us[k] = now_us;
+        *kind = (enum host_trouble_kind)k;
+        *node = t->turn[k]++;
+        if (k == HOST_TROUBLE_STOP) {
+            t->stopped = true;
+            t->stopped_node = *node;
+        }
+        return true;
+    }
+    return false;
+}
+
+/* --- wires ---------------------------------------------------------------- */
+
+static void close_end(int *end) {
+    if (*end >= 0) {
+        close(*end);
+        *end = -1;
+    }
+}
+
+static int make_between_nodes(struct host_wires *wires,
+                              const struct host_link *link, unsigned nodes,
+                              unsigned dimension, struct host_error *error) {
+    int pair[2];
+    for (unsigned i = 0; i < nodes; i++) {
+        for (unsigned d = 0; d < dimension; d++) {
+            unsigned other = i ^ 1u << d;
+            if (other < i) {
+                continue;
+            }
+            if (link->pair(pair) != 0) {
+                return host_fail(error, HOST_CUBE,
+                                 "wire between nodes %u and %u: %s; are %s "
+                                 "and %u open files allowed?",
+                                 i, other, strerror(errno), link->needs,
+                                 nodes * (dimension + 1) + 16);
+            }
+            wires->end[i][d] = pair[0];
+            wires->end[other][d] = pair[1];
+        }
+    }
+    return 0;
+}
+
+static int make_to_host(struct host_wires *wires, const struct host_link *link,
+                        unsigned dimension, unsigned node,
+                        struct host_error *error) {
+    int pair[2];
+    if (link->pair(pair) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node %u: %s; are %s allowed?",
+                         node, strerror(errno), link->needs);
+    }
+    wires->end[node][dimension] = pair[0];
+    wires->host[node] = pair[1];
+    if (node == 0 && link->terminals &&
+        ttyname_r(pair[1], wires->host_path, sizeof wires->host_path) != 0) {
+        return host_fail(error, HOST_CUBE,
+                         "wire between host and node 0: a pseudo-terminal "
+                         "without a name; is /dev/pts mounted?");
+    }
+    return 0;
+}
+
+int host_wires_make(struct host_wires *wires, const struct host_link *link,
+                    unsigned nodes, unsigned dimension, unsigned host_ports,
+                    struct host_error *error) {
+    memset(wires, -1, sizeof *wires);
+    wires->host_path[0] = '\0';
+    int status = make_between_nodes(wires, link, nodes, dimension, error);
+    for (unsigned i = 0; status == 0 && i < host_ports; i++) {
+        status = make_to_host(wires, link, dimension, i, error);
+    }
+    if (status != 0) {
+        host_wires_close(wires);
+    }
+    return status;
+}
+
+void host_wires_close_nodes(struct host_wires *wires) {
+    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
+        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+            close_end(&wires->end[i][d]);
+        }
+    }
+}
+
+void host_wires_close(struct host_wires *wires) {
+    host_wires_close_nodes(wires);
+    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
+        close_end(&wires->host[i]);
+    }
+}
+
+/* --- cluster -------------------------------------------------------------- */
 
 /* Sanitizers map memory by the terabyte: no limit then. */
 #ifdef INCODE_SANITIZED
@@ -301,4 +473,155 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster) {
     machine.ended = machine_ended;
     machine.stop = machine_stop;
     return machine;
+}
+
+/* --- throttle ------------------------------------------------------------- */
+
+enum { RATE_IDLE_US = 1000 };
+
+static uint64_t draw(uint64_t *state) {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    return *state;
+}
+
+static void sleep_us(uint64_t us) {
+    struct timespec wait = {(time_t)(us / 1000000),
+                            (long)(us % 1000000) * 1000};
+    (void)nanosleep(&wait, NULL);
+}
+
+static uint64_t now_us(void *context) {
+    struct host_throttled *t = context;
+    return t->machine.now_us(t->machine.context);
+}
+
+static int send_on(void *context, const uint8_t *bytes, size_t size) {
+    struct host_throttled_wire *wire = context;
+    return wire->pipe.send(wire->pipe.context, bytes, size);
+}
+
+static int receive_slowly(void *context, uint8_t *bytes, size_t size) {
+    struct host_throttled_wire *wire = context;
+    struct host_throttled *t = wire->throttled;
+    uint64_t passed = now_us(t) - t->start_us;
+    if (t->throttle.stall_us_max != 0 && draw(&t->random) % 32 == 0) {
+        sleep_us(draw(&t->random) % t->throttle.stall_us_max);
+    }
+    if (t->throttle.bytes_a_second != 0 && passed < t->throttle.slow_us) {
+        uint64_t allowed = passed * t->throttle.bytes_a_second / 1000000 + 1;
+        if (t->taken >= allowed) {
+            return 0;
+        }
+        size = allowed - t->taken < size ? (size_t)(allowed - t->taken) : size;
+    }
+    int got = wire->pipe.receive(wire->pipe.context, bytes, size);
+    t->taken += got > 0 ? (uint64_t)got : 0;
+    return got;
+}
+
+/* Bytes that may not be read yet must not wake. */
+static void idle(void *context, uint64_t wait_us) {
+    struct host_throttled *t = context;
+    if (t->throttle.bytes_a_second != 0) {
+        sleep_us(wait_us < RATE_IDLE_US ? wait_us : RATE_IDLE_US);
+    } else {
+        t->machine.idle(t->machine.context, wait_us);
+    }
+}
+
+static int check(void *context, struct host_error *error) {
+    struct host_throttled *t = context;
+    return t->machine.check(t->machine.context, error);
+}
+
+static void missing(void *context, unsigned node, unsigned link) {
+    struct host_throttled *t = context;
+    t->machine.missing(t->machine.context, node, link);
+}
+
+static void told(void *context, const char *line) {
+    struct host_throttled *t = context;
+    t->machine.told(t->machine.context, line);
+}
+
+static unsigned restarts(void *context) {
+    struct host_throttled *t = context;
+    return t->machine.restarts(t->machine.context);
+}
+
+static uint64_t starved_us(void *context, unsigned node) {
+    struct host_throttled *t = context;
+    return t->machine.starved_us(t->machine.context, node);
+}
+
+static bool kill_node(void *context, unsigned node) {
+    struct host_throttled *t = context;
+    return t->machine.kill(t->machine.context, node);
+}
+
+static const char *doubt(void *context, unsigned node) {
+    struct host_throttled *t = context;
+    return t->machine.doubt(t->machine.context, node);
+}
+
+static const char *start_line(void *context, unsigned node) {
+    struct host_throttled *t = context;
+    return t->machine.start_line(t->machine.context, node);
+}
+
+static const char *address(void *context, unsigned node) {
+    struct host_throttled *t = context;
+    return t->machine.address(t->machine.context, node);
+}
+
+static void rest(void *context, uint64_t rest_us) {
+    struct host_throttled *t = context;
+    t->machine.rest(t->machine.context, rest_us);
+}
+
+static bool ended(void *context) {
+    struct host_throttled *t = context;
+    return t->machine.ended(t->machine.context);
+}
+
+static void stop(void *context) {
+    struct host_throttled *t = context;
+    t->machine.stop(t->machine.context);
+}
+
+struct host_machine
+host_throttle_machine(struct host_throttled *throttled,
+                      const struct host_machine *machine,
+                      const struct host_throttle *throttle) {
+    struct host_machine result = *machine;
+    throttled->machine = *machine;
+    throttled->throttle = *throttle;
+    throttled->taken = 0;
+    throttled->random = throttle->seed * 2 + 88172645463325253u;
+    throttled->start_us = machine->now_us(machine->context);
+    result.context = throttled;
+    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
+        throttled->wire[i] = (struct host_throttled_wire){
+            throttled, i == 0 ? machine->pipe : machine->wires[i]};
+        result.wires[i] =
+            (struct link_pipe){&throttled->wire[i], send_on, receive_slowly};
+    }
+    result.pipe = result.wires[0];
+    result.now_us = now_us;
+    result.idle = idle;
+    result.check = check;
+    result.missing = machine->missing != NULL ? missing : NULL;
+    result.told = machine->told != NULL ? told : NULL;
+    result.restarts = machine->restarts != NULL ? restarts : NULL;
+    result.starved_us = machine->starved_us != NULL ? starved_us : NULL;
+    result.kill = machine->kill != NULL ? kill_node : NULL;
+    result.doubt = machine->doubt != NULL ? doubt : NULL;
+    result.start_line = machine->start_line != NULL ? start_line : NULL;
+    result.address = machine->address != NULL ? address : NULL;
+    result.rest = machine->rest != NULL ? rest : NULL;
+    result.ended = ended;
+    result.stop = stop;
+    return result;
 }

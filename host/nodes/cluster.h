@@ -4,13 +4,7 @@
  * started again, on the same wires; one that dies too often is an error.
  *
  * Memory: 24 bytes a node; both ends of every wire, for nodes that start again.
- * Work: a fork and an exec a start of a node.
- *
- *     if (host_cluster_start(&cluster, &options, &error) != 0)
- *         return error.code;
- *     machine = host_cluster_machine(&cluster);
- *     host_cluster_stop(&cluster); // or the machine's own stop
- */
+ * Work: a fork and an exec a start of a node. */
 #ifndef HOST_CLUSTER_H
 #define HOST_CLUSTER_H
 
@@ -18,12 +12,92 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-#include "child.h"
 #include "host/base/error.h"
-#include "host/service/machine.h"
+#include "transport/cube.h"
 #include "port.h"
-#include "trouble.h"
-#include "wires.h"
+#include "host/service/machine.h"
+
+/* What the links of a cube may run over, one row a kind of wire, by which
+ * --link, statistics and messages name it, and which says how it differs. */
+
+struct host_link {
+    const char *name;
+    const char *help; /* what it is, in one line */
+    /* Both ends of a wire as open files of this machine: 0, or -1 with errno;
+     * NULL: this machine makes none. */
+    int (*pair)(int fds[2]);
+    const char *needs; /* what the machine may not allow of it */
+    bool terminals;    /* ends are terminals, opened by name as a port would be,
+                          and may be closed and opened again */
+    bool ranks;        /* the nodes are ranks, which mpirun starts */
+};
+
+/* Row i of those that --link knows, the first being the default; NULL past the
+ * last. */
+const struct host_link *host_link_row(unsigned i);
+const char *host_link_name(unsigned i);
+
+/* Of those, or of those that only a cube file or a board has (`unix`, `mixed`,
+ * `uart`); NULL: there is none of that name. */
+const struct host_link *host_link_named(const char *name);
+
+/* For tests: emulated boards that are reset, stopped for a while or killed, one
+ * after the other, each once, so many microseconds apart.
+ *
+ * Memory: struct host_troubled.  Work: a look at the clock a call; a request to
+ * an emulator's monitor now and then. */
+
+enum host_trouble_kind {
+    HOST_TROUBLE_RESET,
+    HOST_TROUBLE_STOP,
+    HOST_TROUBLE_KILL,
+    HOST_TROUBLES,
+    HOST_TROUBLE_CONT = HOST_TROUBLES /* the end of a stop */
+};
+
+struct host_trouble {
+    uint64_t every_us[HOST_TROUBLES]; /* 0: never.  A stop lasts half of it. */
+};
+
+struct host_troubled {
+    struct host_trouble trouble;
+    unsigned nodes;
+    uint64_t last_us[HOST_TROUBLES]; /* 0: not begun */
+    unsigned turn[HOST_TROUBLES];
+    bool stopped;
+    unsigned stopped_node;
+};
+
+/* Whether one is due, which, and whose. */
+bool host_trouble_due(struct host_troubled *troubled, uint64_t now_us,
+                      enum host_trouble_kind *kind, unsigned *node);
+
+/* The wires between nodes that this machine emulates, and from the host to the
+ * first of them: pairs of open files, one end for each side, by kind.
+ *
+ * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
+ * a wire of its kind takes.  Work: a few system calls a wire. */
+
+enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
+
+struct host_wires {
+    int host[CUBE_HOST_PORTS_MAX]; /* its ends of its wires; -1: none */
+    char host_path[64]; /* of the one to node 0, where it is a terminal */
+    int end[HOST_PROCESSES_MAX][CUBE_LINKS_MAX]; /* [node][link]; -1: none */
+};
+
+/* Of a kind that has pairs; all ends non-blocking and closed on exec.  The host
+ * has wires to nodes 0 .. host_ports - 1.  HOST_CUBE where the machine does not
+ * give so many; what was made is closed then. */
+int host_wires_make(struct host_wires *wires, const struct host_link *link,
+                    unsigned nodes, unsigned dimension, unsigned host_ports,
+                    struct host_error *error);
+
+/* Closes the nodes' ends here, once the nodes have theirs. */
+void host_wires_close_nodes(struct host_wires *wires);
+
+/* Closes all. */
+void host_wires_close(struct host_wires *wires);
 
 enum {
     HOST_MEMORY_MIN = 256 * 1024,  /* bytes a node */
@@ -91,5 +165,30 @@ bool host_cluster_ended(struct host_cluster *cluster);
 
 /* Ends what still runs and waits for it.  Also after a failed start. */
 void host_cluster_stop(struct host_cluster *cluster);
+
+/* A machine whose host is slow on purpose, for tests: reads no faster than a
+ * rate for a while, all its wires together, and stalls at random. */
+
+struct host_throttle {
+    uint64_t stall_us_max;   /* sleeps up to this long, at random; 0: never */
+    uint64_t bytes_a_second; /* reads no faster; 0: unlimited */
+    uint64_t slow_us;        /* as long as this after the start */
+    uint64_t seed;
+};
+
+struct host_throttled {
+    struct host_machine machine; /* the one beneath */
+    struct host_throttled_wire {
+        struct host_throttled *throttled;
+        struct link_pipe pipe; /* beneath */
+    } wire[CUBE_HOST_PORTS_MAX];
+    struct host_throttle throttle;
+    uint64_t start_us, taken, random;
+};
+
+/* `machine` as it looks from a host so throttled. */
+struct host_machine host_throttle_machine(struct host_throttled *throttled,
+                                          const struct host_machine *machine,
+                                          const struct host_throttle *throttle);
 
 #endif

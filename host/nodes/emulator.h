@@ -4,20 +4,17 @@
  * wait for each other's way between them.
  *
  * Memory: 16 KB, in the child.  Work: a look at PATH, and of a start an exec.
- *
- *     if (host_emulator_find(&bare, &emulator, &error) != 0)
- *         return error.code;
- *     emulator.uart[0].wire.fd = wire;
- *     host_emulator_become(&emulator, node); // in the child
  */
 #ifndef HOST_EMULATOR_H
 #define HOST_EMULATOR_H
 
 #include <limits.h>
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "host/base/error.h"
-#include "host/nodes/links.h"
+#include "cluster.h"
 
 enum {
     HOST_UARTS_MAX = 5,
@@ -81,5 +78,34 @@ bool host_firmware_find(const char *board, char path[PATH_MAX]);
 /* In the child: becomes the emulator.  turn: of the processors, by which one
  * is taken.  Returns where that fails, with errno. */
 void host_emulator_become(const struct host_emulator *emulator, unsigned turn);
+
+/* QEMU's monitor, by which an emulated board is stopped, resumed and reset,
+ * over a socket that it has inherited.  It is spoken to in lines of JSON;
+ * events and answers to others are passed over.
+ *
+ * Memory: struct host_qmp.  Work: a request waits for its answer, which takes
+ * milliseconds on a quiet machine, and never waits longer than wait_us. */
+
+enum { HOST_QMP_US = 10000000, HOST_QMP_LINE = 4096 };
+
+enum host_qmp_request { HOST_QMP_STOP, HOST_QMP_CONT, HOST_QMP_RESET };
+
+struct host_qmp {
+    int fd;           /* connected, non-blocking; stays the caller's */
+    uint64_t wait_us; /* for an answer; at first HOST_QMP_US */
+    bool ready;       /* it has heard the greeting, and been told so */
+    size_t used;
+    bool skipping; /* to the end of a line that is too long */
+    char line[HOST_QMP_LINE];
+};
+
+void host_qmp_init(struct host_qmp *qmp, int fd);
+
+/* 0, or HOST_CUBE: no answer in time, or the monitor refuses. */
+int host_qmp_ask(struct host_qmp *qmp, enum host_qmp_request request,
+                 struct host_error *error);
+
+/* What was said so far was said by a process that is gone. */
+void host_qmp_forget(struct host_qmp *qmp);
 
 #endif

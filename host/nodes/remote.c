@@ -10,7 +10,7 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"
 #include "transport/drivers/secure_sodium.h"

@@ -12,11 +12,9 @@
 #ifndef HOST_REMOTE_H
 #define HOST_REMOTE_H
 
-#include "child.h"
-#include "console.h"
+#include "port.h"
 #include "cube_file.h"
 #include "host/watch/offer.h"
-#include "port.h"
 
 enum { HOST_ABSENT_MIN_S = 3 };
 

@@ -1,12 +1,11 @@
 #include "arguments.h"
 
+#include <argp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "arguments_parts.h"
 #include "host/base/options.h"
-#include "host/base/parse.h"
 #include "host/base/text.h"
 #include "host/formats/formats.h"
 #include "host/mesh/names.h"
@@ -479,4 +478,148 @@ int host_arguments_try(int argc, char **argv,
                        struct host_run_options *options) {
     struct host_error error = {0};
     return parse_run(argc, argv, ARGP_SILENT, options, &error);
+}
+
+/* --- arguments help ------------------------------------------------------- */
+
+static const char *link_help(unsigned i) {
+    return host_link_row(i)->help;
+}
+
+static const char *board_help(unsigned i) {
+    return host_board_row(i)->help;
+}
+
+/* Option's help with the rows of the table that its values are from; usual: the
+ * default's name. */
+static char *list_rows(const char *text, const char *(*name)(unsigned i),
+                       const char *(*help)(unsigned i), const char *usual) {
+    size_t size = strlen(text) + 1;
+    for (unsigned i = 0; name(i) != NULL; i++) {
+        size += strlen(name(i)) + strlen(help(i)) + sizeof " (; the default),";
+    }
+    char *whole = malloc(size);
+    size_t used = 0;
+    if (whole == NULL) {
+        return NULL;
+    }
+    used += (size_t)snprintf(whole, size, "%s", text);
+    for (unsigned i = 0; name(i) != NULL; i++) {
+        used += (size_t)snprintf(whole + used, size - used, "%s %s (%s%s)",
+                                 i == 0 ? "" : ",", name(i), help(i),
+                                 strcmp(name(i), usual) == 0 ? "; the default"
+                                                             : "");
+    }
+    return whole;
+}
+
+/* `text` with the formats of a use, as `put` has them, in the place of its %s.
+ */
+static char *list_formats(const char *text, enum host_use use,
+                          void (*put)(enum host_use use, char *text,
+                                      size_t size)) {
+    char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
+    const char *place = strstr(text, "%s");
+    put(use, list, sizeof list);
+    return asprintf(&whole, "%.*s%s%s", (int)(place - text), text, list,
+                    place + strlen("%s")) < 0
+               ? NULL
+               : whole;
+}
+
+char *host_arguments_help(int key, const char *text, void *input) {
+    (void)input;
+    switch (key) {
+    case 'o':
+        return list_formats(text, HOST_WRITE_TETRAHEDRA, host_format_help);
+    case KEY_FORMAT:
+        return list_formats(text, HOST_READ_POINTS, host_format_list);
+    case ARGP_KEY_HELP_POST_DOC:
+        return list_formats(text, HOST_READ_POINTS, host_format_help);
+    case KEY_STRATEGY:
+        return list_rows(text, host_strategy_name, host_strategy_help, "auto");
+    case KEY_LINK:
+        return list_rows(text, host_link_name, link_help, host_link_name(0));
+    case KEY_BOARD:
+        return list_rows(text, host_board_name, board_help, host_board_name(0));
+    default:
+        return (char *)text;
+    }
+}
+
+/* --- arguments together --------------------------------------------------- */
+
+bool host_arguments_given(const struct host_arguments *p, int key) {
+    return (p->given >> (key - KEY_STRATEGY) & 1) != 0;
+}
+
+/* What a bare board settles: the wires, the memory, the most nodes. */
+static int settle_bare(const struct host_arguments *p) {
+    struct host_run_options *o = p->options;
+    unsigned most = host_bare_nodes_max(o->board->bare);
+    if (o->nodes > most) {
+        return host_fail(p->error, HOST_USAGE,
+                         "--nodes %u: %s has UARTs for a cube of %u; give %u "
+                         "or fewer",
+                         o->nodes, o->board->name, most, most);
+    }
+    if (o->memory != HOST_BOARD_MEMORY) {
+        return host_fail(p->error, HOST_USAGE,
+                         "--memory: %s has 4M, no more and no less; leave it "
+                         "out",
+                         o->board->name);
+    }
+    o->link = host_link_named("uart");
+    o->wire_bytes_s = HOST_BARE_WIRE_BYTES;
+    return 0;
+}
+
+int host_arguments_together(const struct host_arguments *p) {
+    const struct host_run_options *o = p->options;
+    bool cube = o->cube != NULL, bare = !cube && o->board->bare != NULL;
+    bool ranks = !cube && !bare && o->link->ranks;
+    unsigned heeds = o->strategy == NULL ? 0 : o->strategy->sharing;
+    const struct {
+        int key;
+        bool vain;
+        const char *why;
+    } options[] = {
+        {KEY_MEMORY, cube, "--memory: the cube file of --cube says it"},
+        {KEY_LINK, cube, "--link: the cube file of --cube says it"},
+        {KEY_BOARD, cube, "--board: the cube file of --cube says it"},
+        {KEY_WINDOW, cube, "--window: the cube file of --cube says it"},
+        {KEY_LINK, bare, "--link: this board's wires are its UARTs"},
+        {KEY_WINDOW, bare, "--window: this board's firmware settles it"},
+        {KEY_NODE_PROGRAM, bare, "--node-program: this board has firmware"},
+        {KEY_BOARD_RESET, !bare, "--board-reset: goes with emulated boards"},
+        {KEY_BOARD_STOP, !bare, "--board-stop: goes with emulated boards"},
+        {KEY_BOARD_KILL, !bare, "--board-kill: goes with emulated boards"},
+        {KEY_HOST_UNPLUG, cube || !o->link->terminals,
+         "--host-unplug: goes with --link serial alone"},
+        {KEY_NODE_PROGRAM, ranks, "--node-program: not with --link mpi"},
+        {KEY_HOST_RATE_TIME, !host_arguments_given(p, KEY_HOST_RATE),
+         "--host-rate-time: goes with --host-rate alone"},
+        {KEY_SEED, !host_arguments_given(p, KEY_HOST_STALL),
+         "--seed: goes with --host-stall alone"},
+        {KEY_PROGRESS, o->quiet, "--progress: -q prints none"},
+        {KEY_EXPLAIN, o->quiet, "--explain: -q prints nothing"},
+        {KEY_EXPLAIN, o->strategy != NULL,
+         "--explain: goes with --strategy auto alone"},
+        {KEY_LINDA, o->strategy == NULL || o->strategy->linda == NULL,
+         "--linda: goes with --strategy linda alone"},
+        {KEY_CLUSTER, (heeds & HOST_SHARING_CLUSTER) == 0,
+         "--cluster: goes with a strategy of clusters alone, as hybrid"},
+        {KEY_BUILDERS, (heeds & HOST_SHARING_BUILDERS) == 0,
+         "--builders: goes with strategies that lend lists of faces"},
+        {KEY_FACES_PER_JOB, (heeds & HOST_SHARING_LISTS) == 0,
+         "--faces-per-job: goes with strategies that lend lists of faces"},
+        {KEY_JOBS_PER_WORKER, (heeds & HOST_SHARING_LISTS) == 0,
+         "--jobs-per-worker: goes with strategies that lend lists of faces"}};
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        if (options[i].vain && host_arguments_given(p, options[i].key)) {
+            return host_fail(p->error, HOST_USAGE, "%s; leave it out",
+                             options[i].why);
+        }
+    }
+    return bare ? settle_bare(p) : 0;
 }

@@ -14,9 +14,8 @@
 
 #include "host/base/create.h"
 #include "host/base/options.h"
-#include "host/base/parse.h"
-#include "host/base/progress.h"
 #include "host/base/text.h"
+#include "host/base/progress.h"
 #include "host/formats/output.h"
 #include "host/nodes/board_emulated.h"
 #include "transport/drivers/tcp_address.h"

@@ -15,10 +15,30 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "host/base/clock.h"
-#include "host/base/parse.h"
 #include "host/formats/output.h"
+#include "host/base/error.h"
+#include "host/base/text.h"
 #include "transport/drivers/mpi_environment.h"
+
+/* Of what was closed, nothing is read, and writing to it remains an error. */
+static void open_standard(void) {
+    int file;
+    do {
+        file = open("/dev/null", O_RDONLY);
+    } while (file >= 0 && file <= STDERR_FILENO);
+    if (file > STDERR_FILENO) {
+        (void)close(file);
+    }
+}
+
+void host_begin(const char *name) {
+    (void)prctl(PR_SET_NAME, name);
+    open_standard();
+    (void)signal(SIGCHLD, SIG_DFL);
+    host_output_guard();
+}
+
+/* --- launch --------------------------------------------------------------- */
 
 #define SOCKET_NAME "INCODE_LAUNCHER"
 #define REPORT_NAME "INCODE_REPORT"

@@ -8,15 +8,20 @@
  * ranks do not start or one is lost.
  *
  * Memory: 16 KiB of what mpirun says.  Work: sleeps until the ranks are done.
- *
- *     if (host_launch_rank() >= 0)
- *         return host_launch_become(host_launch_rank(), argv, &error);
- *     return host_launch_mpi(argv, &options, &error);
  */
 #ifndef HOST_LAUNCH_H
 #define HOST_LAUNCH_H
 
 #include "run.h"
+
+/* What a program of the host needs of its process, whatever started it:
+ * descriptors 0 to 2 are open, so that no file or wire gets their numbers; the
+ * ends of its children are reported, even if its parent ignores those of its
+ * own; and signals are set as outputs need them (output.h). */
+
+/* Called first of all.  name: the process is listed under it, even if it was
+ * started as /proc/self/exe. */
+void host_begin(const char *name);
 
 /* Of the launcher's making, as the environment has it; -1: no rank. */
 int host_launch_rank(void);

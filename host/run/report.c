@@ -1,5 +1,7 @@
 #include "report.h"
 
+#include <jansson.h>
+#include <math.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -7,6 +9,7 @@
 #include "host/mesh/names.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
+#include "host/formats/output.h"
 
 /* The processor time of the busiest node: what t_max would be if every node
  * had a processor to itself. */
@@ -170,4 +173,209 @@ void host_report_run(FILE *file, const struct host_run_options *options,
     if (options->map) {
         host_report_map(file, r);
     }
+}
+
+/* --- stats ---------------------------------------------------------------- */
+
+double host_candidates_mean(const struct host_run_result *result) {
+    return result->make_tetra_calls == 0
+               ? 0.0
+               : (double)result->candidates / (double)result->make_tetra_calls;
+}
+
+double host_candidates_p99(const struct host_run_result *result) {
+    uint64_t calls = 0, seen = 0;
+    for (unsigned k = 0; k < 24; k++) {
+        calls += result->candidates_histogram[k];
+    }
+    for (unsigned k = 0; k < 24; k++) {
+        seen += result->candidates_histogram[k];
+        if (calls > 0 && seen >= calls - calls / 100) {
+            return exp2(0.5 * (k + 1));
+        }
+    }
+    return 0.0;
+}
+
+static void put(json_t *object, const char *name, uint64_t value) {
+    json_object_set_new(object, name, json_integer((json_int_t)value));
+}
+
+static void put_real(json_t *object, const char *name, double value) {
+    json_object_set_new(object, name, json_real(value));
+}
+
+static void put_text(json_t *object, const char *name, const char *value) {
+    json_object_set_new(object, name, json_string(value));
+}
+
+/* How a node found its tetrahedra, over all of its jobs. */
+static const char *built_by(const struct incode_statistics *s) {
+    return s->tetrahedra_built == 0                         ? "none"
+           : s->tetrahedra_by_points == 0                   ? "faces"
+           : s->tetrahedra_by_points == s->tetrahedra_built ? "points"
+                                                            : "both";
+}
+
+/* How the node's memory is filled, in bytes. */
+static json_t *map_object(const struct host_run_result *r, unsigned i) {
+    const struct node_map *m = &r->node[i].map.map;
+    const struct node_role *role = node_role_named(r->node[i].map.role);
+    uint64_t stack = host_node_stack_bytes(&r->node[i]);
+    json_t *o = json_object();
+    put(o, "stack", stack);
+    put(o, "static", m->fixed > stack ? m->fixed - stack : 0);
+    put(o, "node", m->node);
+    put(o, "links", m->cube);
+    uint64_t used = m->fixed + m->node + m->cube;
+    for (unsigned k = 0; role != NULL && k < NODE_TABLES_MAX; k++) {
+        if (role->tables[k].name != NULL) {
+            put(o, role->tables[k].name, m->tables[k].bytes);
+        }
+        used += m->tables[k].bytes;
+    }
+    put(o, "left_over", r->memory > used ? r->memory - used : 0);
+    return o;
+}
+
+/* Of a node, or of a thread that takes its place. */
+static json_t *node_object(const struct host_run_result *r, unsigned i) {
+    const struct host_node_report *report = &r->node[i];
+    const struct node_finished_message *f = &report->statistics;
+    const struct incode_statistics *s = &f->statistics;
+    const struct node_role *role = node_role_named(report->map.role);
+    json_t *o = json_object();
+    put(o, "node", i);
+    put_text(o, "role", role == NULL ? "none" : role->name);
+    put_text(o, "built_by", built_by(s));
+    put(o, "tetrahedra_built", s->tetrahedra_built);
+    put(o, "tetrahedra_kept", s->tetrahedra_kept);
+    put(o, "make_tetra_calls", s->make_tetra_calls);
+    put_real(o, "cpu_s", 1e-6 * (double)f->busy_us);
+    put_real(o, "wall_s", 1e-6 * (double)f->wall_us);
+    put(o, "vertices", s->vertices);
+    put(o, "vertices_waited", s->vertices_waited);
+    put(o, "stars_lent", s->stars_lent);
+    put(o, "stars_borrowed", s->stars_borrowed);
+    put(o, "tetrahedra_late", s->tetrahedra_late);
+    put(o, "tree_searches", s->tree_searches);
+    put(o, "seeds", s->seeds);
+    put(o, "page_requests", s->page_requests);
+    put(o, "page_faults", s->page_faults);
+    put(o, "page_evictions", s->page_evictions);
+    put(o, "page_bytes", report->page_bytes);
+    put(o, "pages_held", f->pages_held);
+    put(o, "pages_forwarded", f->pages_forwarded);
+    put(o, "afl_max", s->afl_max);
+    put(o, "afl_spilled", s->afl_spilled);
+    put(o, "exact_orient3d", s->tally.exact_orient3d);
+    put(o, "exact_in_sphere", s->tally.exact_in_sphere);
+    put(o, "bytes_in", f->bytes_in);
+    put(o, "bytes_out", f->bytes_out);
+    put(o, "retransmitted_frames", f->retransmitted);
+    put(o, "memory_high_water_bytes", f->memory_high_water);
+    put(o, "memory_frames", report->map.map.pages);
+    put(o, "look_us_max", f->look_us_max);
+    if (f->stack_bytes > 0) { /* its board tells */
+        put(o, "stack_bytes", f->stack_bytes);
+        put(o, "stack_high_water_bytes", f->stack_high_water);
+        put(o, "overruns", f->overruns);
+    }
+    json_object_set_new(o, "memory_map", map_object(r, i));
+    return o;
+}
+
+static void put_times(json_t *o, const struct host_run_result *r) {
+    put_real(o, "time_total_s", r->time_total_s);
+    put_real(o, "time_io_s", r->time_io_s);
+    put_real(o, "time_triangulation_s", r->time_triangulation_s);
+    put_real(o, "time_start_up_s", r->time_start_up_s);
+    put_real(o, "time_read_s", r->time_read_s);
+    put_real(o, "time_order_s", r->time_order_s);
+    put_real(o, "time_verify_s", r->time_verify_s);
+    put_real(o, "time_write_s", r->time_write_s);
+    put_real(o, "t_min_s", r->t_min_s);
+    put_real(o, "t_max_s", r->t_max_s);
+}
+
+static json_t *run_object(const struct host_run_result *r) {
+    json_t *o = json_object();
+    json_t *nodes = json_array();
+    put(o, "points", r->rows);
+    put(o, "distinct_points", r->points);
+    put(o, "duplicates", r->duplicates);
+    put(o, "negative_zeros", r->negative_zeros);
+    put(o, "tetrahedra", r->tetrahedra);
+    put(o, "hull_facets", r->hull_facets);
+    put_text(o, "digest", r->digest.text);
+    put_text(o, "strategy", r->strategy->name);
+    put_text(o, "strategy_why", r->why);
+    put_text(o, "partition", host_partitions[r->partition]);
+    put_text(o, "index", host_indexes[r->index]);
+    put_text(o, "link", r->link->name);
+    put_text(o, "board", r->board->name);
+    put(o, "nodes", r->nodes);
+    put(o, "memory_bytes", r->memory);
+    json_object_set_new(o, "memory_limited", json_boolean(r->limited));
+    json_object_set_new(o, "verified", json_boolean(r->verified));
+    put_times(o, r);
+    put_real(o, "host_cpu_s", r->host_cpu_s);
+    put_real(o, "host_triangulation_cpu_s", r->host_triangulation_cpu_s);
+    put(o, "host_peak_bytes", r->host_peak_bytes);
+    put(o, "pages", r->pages);
+    put_real(o, "tetrahedra_per_second",
+             r->time_triangulation_s > 0.0
+                 ? (double)r->tetrahedra / r->time_triangulation_s
+                 : 0.0);
+    put(o, "make_tetra_calls", r->make_tetra_calls);
+    put_real(o, "duplication_factor",
+             r->tetrahedra > 0 ? (double)r->built / (double)r->tetrahedra
+                               : 0.0);
+    put(o, "exact_orient3d", r->exact_orient3d);
+    put(o, "exact_in_sphere", r->exact_in_sphere);
+    put_real(o, "candidates_mean", host_candidates_mean(r));
+    put_real(o, "candidates_p99", host_candidates_p99(r));
+    put(o, "vertices", r->vertices);
+    put(o, "vertices_waited", r->vertices_waited);
+    put(o, "stars_lent", r->stars_lent);
+    put(o, "stars_borrowed", r->stars_borrowed);
+    put(o, "tetrahedra_late", r->tetrahedra_late);
+    put(o, "faces_spilled", r->faces_spilled);
+    put(o, "socket_send_bytes", (uint64_t)r->socket_send_bytes);
+    put(o, "socket_receive_bytes", (uint64_t)r->socket_receive_bytes);
+    put(o, "host_bytes_sent", r->bytes_sent);
+    put(o, "host_bytes_received", r->bytes_received);
+    put(o, "retransmitted_frames", r->retransmitted);
+    put(o, "nodes_lost", r->lost);
+    put(o, "nodes_excluded", r->excluded);
+    put(o, "checks_failed", r->checks_failed);
+    put(o, "node_restarts", r->restarts);
+    put(o, "generations", r->generations);
+    put(o, "missing_wires", r->missing_wires);
+    for (unsigned i = 0; i < r->nodes; i++) {
+        json_array_append_new(nodes, node_object(r, i));
+    }
+    json_object_set_new(o, "per_node", nodes);
+    return o;
+}
+
+static int put_bytes(const char *bytes, size_t n, void *out) {
+    host_output_bytes(out, bytes, n);
+    return 0;
+}
+
+int host_stats_write(const char *path, const struct host_run_result *result,
+                     struct host_error *error) {
+    size_t flags = JSON_INDENT(2) | JSON_REAL_PRECISION(9);
+    json_t *object = run_object(result);
+    struct host_output out;
+    if (host_output_open(&out, path, error) == 0) {
+        if (json_dump_callback(object, put_bytes, &out, flags) != 0) {
+            host_fail_memory(error, "the statistics");
+        }
+        host_output_text(&out, "\n");
+        host_output_close(&out, 1, error);
+    }
+    json_decref(object);
+    return error->code;
 }

@@ -1,11 +1,5 @@
 /* What a run prints for people, and the paper's table of which benches are made
- * too.
- *
- * Memory: none.  Work: a line a node or a row.
- *
- *     host_report_run(stdout, &options, &result, NULL);
- *     host_report_map(stdout, &result);
- */
+ * too. */
 #ifndef HOST_REPORT_H
 #define HOST_REPORT_H
 
@@ -31,5 +25,19 @@ void host_report_head(FILE *file, const char *title);
 void host_report_row(FILE *file, const struct host_run_result *result,
                      const struct host_run_result *alone);
 void host_report_notes(FILE *file);
+
+/* The statistics of a run as one JSON object.
+ *
+ * Memory: about 1 KiB a node while it is written.  Work: O(nodes). */
+
+/* "-" is standard output.  The file has its name when host_output_commit gives
+ * it.  0, or HOST_INPUT where the file cannot be made. */
+int host_stats_write(const char *path, const struct host_run_result *result,
+                     struct host_error *error);
+
+/* Mean, and the upper end of the 99th percentile's class, of the candidates
+ * that a call of MakeTetra looked at. */
+double host_candidates_mean(const struct host_run_result *result);
+double host_candidates_p99(const struct host_run_result *result);
 
 #endif

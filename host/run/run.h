@@ -16,7 +16,7 @@
 
 #include "host/verify/check.h"
 #include "host/nodes/boards.h"
-#include "host/nodes/throttle.h"
+#include "host/nodes/cluster.h"
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/mesh/order.h"

@@ -4,8 +4,101 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "node/node.h"
 #include "host/mesh/open.h"
-#include "memory_needed.h"
+#include "host/nodes/remote.h"
+#include "transport/secure_wipe.h"
+
+static unsigned cube_dimension(unsigned nodes) {
+    unsigned dimension = 0;
+    while (1u << dimension < nodes) {
+        dimension++;
+    }
+    return dimension;
+}
+
+static bool does_with(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned dimension,
+                      const struct node_setup_message *setup, uint64_t memory) {
+    struct node_identity identity = {.dimension = (uint8_t)dimension,
+                                     .window = (uint8_t)options->window,
+                                     .epoch = 1};
+    return host_strategy_arena(strategy, 1u << dimension, &identity, memory,
+                               &options->sharing, setup) +
+               HOST_STACK_BYTES + HOST_STATIC_BYTES <=
+           memory;
+}
+
+/* The least memory that every node does with. */
+static uint64_t memory_needed(const struct host_run_options *options,
+                              const struct host_strategy *strategy,
+                              unsigned dimension,
+                              const struct node_setup_message *setup) {
+    uint64_t memory = HOST_MEMORY_MIN;
+    while (!does_with(options, strategy, dimension, setup, memory)) {
+        memory += 16384;
+    }
+    return memory;
+}
+
+/* What can be done where a cube needs more memory than its nodes have. */
+static const char *memory_advice(const struct host_run_options *options,
+                                 const struct host_strategy *strategy,
+                                 unsigned nodes,
+                                 const struct node_setup_message *setup) {
+    struct host_run_options narrow = *options;
+    narrow.window = 0;
+    bool fewer = nodes > 1 &&
+                 memory_needed(options, strategy, 0, setup) <= options->memory;
+    if (options->cube != NULL) {
+        return "";
+    }
+    if (options->window > 0 &&
+        memory_needed(&narrow, strategy, cube_dimension(nodes), setup) <=
+            options->memory) {
+        return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
+    }
+    return fewer ? ", or fewer --nodes" : "";
+}
+
+static struct node_setup_message
+setup_of(const struct host_run_options *options, uint32_t bricks,
+         const uint32_t cells[3]) {
+    struct node_setup_message setup = {0};
+    setup.setup.bricks = bricks;
+    setup.setup.index = (uint8_t)options->index;
+    memcpy(setup.setup.cells, cells, sizeof setup.setup.cells);
+    return setup;
+}
+
+bool host_memory_fits(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3]) {
+    struct node_setup_message setup = setup_of(options, bricks, cells);
+    return does_with(options, strategy, cube_dimension(nodes), &setup,
+                     options->memory);
+}
+
+int host_memory_check(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3],
+                      struct host_error *error) {
+    struct node_setup_message setup = setup_of(options, bricks, cells);
+    uint64_t needed =
+        memory_needed(options, strategy, cube_dimension(nodes), &setup);
+    return needed <= options->memory
+               ? 0
+               : host_fail(error, HOST_USAGE,
+                           "%s%s %lluK: a node of %u needs at least %lluK; "
+                           "give that%s",
+                           options->cube == NULL ? "" : options->cube,
+                           options->cube == NULL ? "--memory" : ": memory",
+                           (unsigned long long)options->memory / 1024, nodes,
+                           (unsigned long long)needed / 1024,
+                           memory_advice(options, strategy, nodes, &setup));
+}
+
+/* --- settle --------------------------------------------------------------- */
 
 /* The largest power of two of nodes that have a processor each. */
 static unsigned suitable_nodes(void) {
@@ -173,4 +266,78 @@ bool host_settle_ordered(const struct host_run_options *options,
         result->nodes = result->strategy->nodes_default;
     }
     return result->strategy != before;
+}
+
+/* --- on cube -------------------------------------------------------------- */
+
+/* Until another program of this machine has ended. */
+enum { IN_USE_US = 5000000 };
+
+/* One run a program. */
+static struct host_cube_file the_file;
+static void (*stop_remote)(void *context);
+
+/* Its wires are closed: nothing needs the key. */
+static void stop(void *context) {
+    stop_remote(context);
+    secure_wipe(the_file.key, sizeof the_file.key);
+}
+
+static int begin(const struct host_run_options *options,
+                 struct host_run_result *result, struct host_machine *machine,
+                 struct host_error *error) {
+    static struct host_remote remote;
+    static char program[4096];
+    (void)result;
+    if (host_remote_free(&the_file, IN_USE_US, error) != 0 ||
+        host_remote_program(&the_file, options->node_program, program,
+                            sizeof program, error) != 0 ||
+        host_remote_start(&remote, &the_file, program, error) != 0) {
+        return error->code;
+    }
+    *machine = host_remote_machine(&remote);
+    stop_remote = machine->stop;
+    machine->stop = stop;
+    return 0;
+}
+
+int host_run_on_cube(struct host_run_options *options,
+                     struct host_error *error) {
+    unsigned asked = options->nodes;
+    if (host_cube_file_read(&the_file, options->cube, error) != 0) {
+        return error->code;
+    }
+    if (asked != 0 && asked != the_file.nodes) {
+        return host_fail(error, HOST_USAGE,
+                         "--nodes %u: the cube of %s has %u; leave it out",
+                         asked, options->cube, the_file.nodes);
+    }
+    if (options->table) {
+        return host_fail(error, HOST_USAGE,
+                         "--table: compares with one node, and the cube of %s "
+                         "has its own; leave it out",
+                         options->cube);
+    }
+    if (options->node_program != NULL &&
+        host_remote_started(&the_file) == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "--node-program: the host starts none of the nodes of "
+                         "%s; leave it out",
+                         options->cube);
+    }
+    options->nodes = the_file.nodes;
+    options->memory = the_file.memory;
+    options->board = the_file.board;
+    options->link = host_cube_link(&the_file);
+    for (unsigned i = 0; i < the_file.nodes; i++) {
+        options->processors += !the_file.local[i];
+    }
+    const struct host_cube_wire *wire = host_cube_host_wire(&the_file, 0);
+    options->wire_bytes_s = wire == NULL   ? 0
+                            : wire->serial ? wire->baud / 10
+                            : host_cube_is_bare(&the_file, wire->node)
+                                ? HOST_BARE_WIRE_BYTES
+                                : 0;
+    options->begin = begin;
+    return 0;
 }

@@ -5,16 +5,26 @@
  *
  * Memory: 1 MB, while it works.  Work: a look at a thousand bricks; where they
  * do not, and the triangulation does not fit a node, 2,500 insertions
- * (host/mesh/open.h).
- *
- *     host_settle(&options, points.count, &result);
- *     (void)host_settle_ordered(&options, &order, &result);
- *     printf("%s, as %s\n", result.strategy->name, result.why);
- */
+ * (host/mesh/open.h). */
 #ifndef HOST_SETTLE_H
 #define HOST_SETTLE_H
 
 #include "run.h"
+
+/* The memory that a run's nodes need, and what is said where they have less.
+ */
+
+/* Whether every node does with the memory of the options.  bricks, cells: of
+ * the order, where it is known; else 1 and none. */
+bool host_memory_fits(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3]);
+
+/* 0, or HOST_USAGE: the options give less, and what can be done. */
+int host_memory_check(const struct host_run_options *options,
+                      const struct host_strategy *strategy, unsigned nodes,
+                      uint32_t bricks, const uint32_t cells[3],
+                      struct host_error *error);
 
 /* Fills in the result's strategy, nodes and what else is as in the options. */
 void host_settle(const struct host_run_options *options, uint64_t points,
@@ -27,5 +37,15 @@ void host_settle(const struct host_run_options *options, uint64_t points,
 bool host_settle_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result);
+
+/* `incode run --cube FILE`: a run on nodes that are wired as a cube file says.
+ *
+ * Memory: that of the cube file and of remote.h.  Work: as theirs. */
+
+/* Reads options->cube and makes these options those of its cube, on whose
+ * nodes host_run will be.  0, HOST_USAGE for options that do not fit that
+ * cube, or what host_cube_file_read says.  Once a program. */
+int host_run_on_cube(struct host_run_options *options,
+                     struct host_error *error);
 
 #endif

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "host/library/delaunay.h"
-#include "host/verify/verify.h"
+#include "host/verify/check.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
 #include "sim_draw.h"

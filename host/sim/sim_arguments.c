@@ -1,7 +1,7 @@
 #include <string.h>
 
 #include "host/base/options.h"
-#include "host/base/parse.h"
+#include "host/base/text.h"
 #include "host/service/machine.h"
 #include "sim.h"
 

@@ -16,18 +16,13 @@
  * hull; and 8 a tetrahedron for the Delaunay depth, or for tiling 12 for each
  * tetrahedron whose lowest or second vertex is the lowest of a facet of the
  * hull.  Work: O(n) on all threads for vertices of bounded degree.  The
- * tetrahedra stay as they are.
- *
- *     struct host_sites sites = host_sites_of_order(&order);
- *     if (host_check(&sites, &tets, HOST_CHECK_TILING, NULL, &report,
- *                    &error) == HOST_UNVERIFIED)
- *         fputs(report.text, stderr);
- */
+ * tetrahedra stay as they are. */
 #ifndef HOST_CHECK_H
 #define HOST_CHECK_H
 
 #include "host/mesh/tetrahedra.h"
 #include "host/mesh/order.h"
+#include "host/mesh/points.h"
 
 /* What vertex numbers stand for: vertices of an order (order != NULL), or rows
  * of points (xyz and lowest). */
@@ -97,5 +92,20 @@ int host_check(const struct host_sites *sites,
                const struct host_tetrahedra *tets, enum host_check_depth depth,
                const struct host_check_listener *listener,
                struct host_check_report *report, struct host_error *error);
+
+/* The exact check (check.h) of tetrahedra whose vertices are rows of points.
+ *
+ * Memory: 4 bytes a point beyond that of the check.  Work: that of the check.
+ *
+ *     if (host_verify(&points, &tets, HOST_CHECK_DELAUNAY, &report, &error) ==
+ * HOST_UNVERIFIED) fputs(report.text, stderr); */
+
+/* Whether tets are the Delaunay triangulation of points under the tie rule, or
+ * (HOST_CHECK_TILING) any; of equal points only the lowest row counts.  0: they
+ * are; HOST_UNVERIFIED: they are not; another code: the check could not be
+ * done. */
+int host_verify(const struct host_points *points,
+                const struct host_tetrahedra *tets, enum host_check_depth depth,
+                struct host_check_report *report, struct host_error *error);
 
 #endif

@@ -1,4 +1,4 @@
-#include "hull.h"
+#include "parts.h"
 
 #include <float.h>
 #include <math.h>
@@ -45,7 +45,7 @@ struct edge {
     uint32_t facet; /* and which of its edges, times 4 */
 };
 
-struct check {
+struct hull_check {
     struct host_hull *hull;
     const struct host_hull_listener *listener;
     bool scaled;
@@ -61,26 +61,27 @@ struct check {
     bool grazed; /* the ray meets an edge */
 };
 
-static void fault(struct check *c, const uint64_t *tets, int tet_count,
+static void fault(struct hull_check *c, const uint64_t *tets, int tet_count,
                   const uint32_t *v, int n, const char *what) {
     __atomic_store_n(&c->broken, true, __ATOMIC_RELAXED);
     c->listener->fault(c->listener->context, tets, tet_count, v, n, what);
 }
 
-static void at(const struct check *c, uint32_t vertex, double p[3]) {
+static void at(const struct hull_check *c, uint32_t vertex, double p[3]) {
     host_site(c->hull->sites, vertex, p);
     for (int d = 0; d < 3 && c->scaled; d++) {
         p[d] = scalbn(p[d] - c->shift[d], c->power[d]);
     }
 }
 
-static void outward(const struct check *c, size_t facet, uint32_t v[3]) {
+static void outward(const struct hull_check *c, size_t facet, uint32_t v[3]) {
     const struct host_hull_facet *f = &c->hull->facet[facet];
     host_facet_outward(c->hull->tets->v[f->tet], f->corner, v);
 }
 
 /* +1 where p lies outside the facet's plane. */
-static int side(const struct check *c, const uint32_t v[3], const double *p) {
+static int side(const struct hull_check *c, const uint32_t v[3],
+                const double *p) {
     struct incode_tally tally = {0};
     double a[3][3];
     for (int k = 0; k < 3; k++) {
@@ -89,7 +90,7 @@ static int side(const struct check *c, const uint32_t v[3], const double *p) {
     return incode_orient3d(&tally, a[0], a[1], a[2], p);
 }
 
-static int side_of_vertex(const struct check *c, const uint32_t v[3],
+static int side_of_vertex(const struct hull_check *c, const uint32_t v[3],
                           uint32_t vertex) {
     double p[3];
     at(c, vertex, p);
@@ -99,8 +100,8 @@ static int side_of_vertex(const struct check *c, const uint32_t v[3],
 /* Calls function(c, first, last) for ranges of facets or vertices that together
  * are all, on all threads. */
 struct all {
-    struct check *c;
-    void (*function)(struct check *c, size_t first, size_t last);
+    struct hull_check *c;
+    void (*function)(struct hull_check *c, size_t first, size_t last);
     uint64_t count;
 };
 
@@ -115,8 +116,8 @@ static void run_some(void *context, unsigned part) {
     }
 }
 
-static void for_all(struct check *c, uint64_t count,
-                    void (*function)(struct check *c, size_t first,
+static void for_all(struct hull_check *c, uint64_t count,
+                    void (*function)(struct hull_check *c, size_t first,
                                      size_t last)) {
     struct all all = {c, function, count};
     c->next = 0;
@@ -127,7 +128,7 @@ static void for_all(struct check *c, uint64_t count,
 
 /* No dent: the other facet's third vertex is not above this one.  Where it is
  * level, both must face the same way, or the surface folds back. */
-static bool is_dent(const struct check *c, const struct edge *a,
+static bool is_dent(const struct hull_check *c, const struct edge *a,
                     const struct edge *b) {
     uint32_t f[3], g[3];
     outward(c, a->facet / 4, f);
@@ -141,8 +142,8 @@ static bool is_dent(const struct check *c, const struct edge *a,
            0;
 }
 
-static void check_edge(struct check *c, uint32_t low, const struct edge *edge,
-                       size_t n) {
+static void check_edge(struct hull_check *c, uint32_t low,
+                       const struct edge *edge, size_t n) {
     uint32_t v[2] = {low, edge->high}, f[3], g[3];
     uint64_t tets[2] = {c->hull->facet[edge[0].facet / 4].tet,
                         c->hull->facet[edge[n > 1].facet / 4].tet};
@@ -184,7 +185,7 @@ static void sort_edges(struct edge *edge, size_t n) {
     }
 }
 
-static void check_vertex(struct check *c, size_t v) {
+static void check_vertex(struct hull_check *c, size_t v) {
     struct edge *edge = c->edge + c->end[v];
     size_t n = c->end[v + 1] - c->end[v];
     sort_edges(edge, n);
@@ -195,7 +196,7 @@ static void check_vertex(struct check *c, size_t v) {
     }
 }
 
-static void check_vertices(struct check *c, size_t first, size_t last) {
+static void check_vertices(struct hull_check *c, size_t first, size_t last) {
     uint64_t vertices = 0;
     for (size_t v = first; v < last; v++) {
         if (c->on[v] != 0) {
@@ -207,7 +208,7 @@ static void check_vertices(struct check *c, size_t first, size_t last) {
 }
 
 /* Counts, then fills: afterwards end[v] is where the edges of v begin. */
-static void list_edges(struct check *c) {
+static void list_edges(struct hull_check *c) {
     uint32_t *next = c->end + 1, sum = 0;
     for (int fill = 0; fill < 2; fill++) {
         for (size_t i = 0; i < c->hull->count; i++) {
@@ -233,13 +234,13 @@ static void list_edges(struct check *c) {
 }
 
 /* A closed surface of triangles with as many vertices as a sphere's. */
-static void check_euler(struct check *c) {
+static void check_euler(struct hull_check *c) {
     if (c->hull->count + 4 != 2 * c->hull->vertices) {
         fault(c, NULL, 0, NULL, 0, "its Euler characteristic is not 2");
     }
 }
 
-static int check_edges(struct check *c, struct host_error *error) {
+static int check_edges(struct hull_check *c, struct host_error *error) {
     size_t sites = (size_t)c->hull->sites->count, n = 3 * c->hull->count;
     c->end = host_map((sites + 1) * sizeof *c->end);
     c->on = host_map(sites);
@@ -266,7 +267,7 @@ static uint64_t mix(uint64_t z) {
 }
 
 /* A point about the middle of n vertices, a little off the symmetric place. */
-static void blend(const struct check *c, const uint32_t *v, int n,
+static void blend(const struct hull_check *c, const uint32_t *v, int n,
                   uint64_t seed, double p[3]) {
     double weight[4], sum = 0;
     for (int i = 0; i < n; i++) {
@@ -289,7 +290,7 @@ static void blend(const struct check *c, const uint32_t *v, int n,
 }
 
 /* A double point strictly inside some tetrahedron. */
-static bool find_inside(struct check *c) {
+static bool find_inside(struct hull_check *c) {
     uint64_t count = c->hull->tets->count;
     uint64_t tries = count < INSIDE_TRIES ? count : INSIDE_TRIES;
     for (uint64_t i = 0; i < tries; i++) {
@@ -314,13 +315,13 @@ static bool find_inside(struct check *c) {
     return false;
 }
 
-static void facet_fault(struct check *c, size_t facet, const char *what) {
+static void facet_fault(struct hull_check *c, size_t facet, const char *what) {
     uint32_t v[3];
     outward(c, facet, v);
     fault(c, &c->hull->facet[facet].tet, 1, v, 3, what);
 }
 
-static void check_facing(struct check *c, size_t first, size_t last) {
+static void check_facing(struct hull_check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         uint32_t v[3];
         outward(c, facet, v);
@@ -332,7 +333,7 @@ static void check_facing(struct check *c, size_t first, size_t last) {
 
 /* Whether the ray crosses a facet: 1, 0, or -1 where it meets its edge.  All
  * facets face away from its start. */
-static int crosses(const struct check *c, size_t facet) {
+static int crosses(const struct hull_check *c, size_t facet) {
     struct incode_tally tally = {0};
     uint32_t v[3];
     double p[3][3];
@@ -350,7 +351,7 @@ static int crosses(const struct check *c, size_t facet) {
     return lowest > 0 ? 1 : lowest == 0 ? -1 : 0;
 }
 
-static void count_crossed(struct check *c, size_t first, size_t last) {
+static void count_crossed(struct hull_check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         int crossed = crosses(c, facet);
         if (crossed < 0) {
@@ -366,7 +367,7 @@ static void count_crossed(struct check *c, size_t first, size_t last) {
  * lie above any facet.  So each sheet of the surface covers the boundary of one
  * convex body, and with all its extreme vertices; two sheets would have an
  * Euler characteristic beyond 2 for the vertices that they share. */
-static void check_thin_facet(struct check *c, size_t facet) {
+static void check_thin_facet(struct hull_check *c, size_t facet) {
     uint32_t v[3], w[3];
     outward(c, facet, v);
     for (size_t j = 0; j < c->hull->count; j++) {
@@ -380,13 +381,13 @@ static void check_thin_facet(struct check *c, size_t facet) {
     }
 }
 
-static void check_thin(struct check *c, size_t first, size_t last) {
+static void check_thin(struct hull_check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         check_thin_facet(c, facet);
     }
 }
 
-static void check_rays(struct check *c) {
+static void check_rays(struct hull_check *c) {
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         uint32_t v[3];
         size_t facet = (size_t)(mix(i + 77) % c->hull->count);
@@ -414,7 +415,7 @@ static bool is_exact_difference(double a, double b) {
 
 /* The lowest coordinate of each axis on which all points can be moved by it
  * exactly; else 0. */
-static void find_shift(struct check *c) {
+static void find_shift(struct hull_check *c) {
     const struct host_sites *sites = c->hull->sites;
     double lowest[3] = {INFINITY, INFINITY, INFINITY}, p[3];
     bool exact[3] = {true, true, true};
@@ -436,7 +437,7 @@ static void find_shift(struct check *c) {
 /* The points at the origin and as large as they may be, axis by axis: exact,
  * and no orientation changes, but a body of denormals, or one that is a few ulp
  * thick, gets an inside. */
-static void magnify(struct check *c) {
+static void magnify(struct hull_check *c) {
     const struct host_sites *sites = c->hull->sites;
     double most[3] = {0}, p[3];
     find_shift(c);
@@ -455,7 +456,7 @@ static void magnify(struct check *c) {
     c->scaled = true;
 }
 
-static void check_winding(struct check *c) {
+static void check_winding(struct hull_check *c) {
     bool inside = find_inside(c);
     if (!inside) {
         magnify(c);
@@ -474,7 +475,7 @@ static void check_winding(struct check *c) {
 int host_hull_check(struct host_hull *hull,
                     const struct host_hull_listener *listener,
                     struct host_error *error) {
-    struct check c = {.hull = hull, .listener = listener};
+    struct hull_check c = {.hull = hull, .listener = listener};
     hull->vertices = 0;
     if (hull->count == 0) {
         fault(&c, NULL, 0, NULL, 0, "there is no hull");

@@ -19,7 +19,7 @@
 
 #include "host/base/text.h"
 #include "transport/drivers/tcp_address.h"
-#include "host/base/clock.h"
+#include "host/base/error.h"
 
 /* NODE_PROBE has nodes send to each other: that is not to look. */
 static const char *const names[NODE_QUESTIONS + 1] = {

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "host/base/parse.h"
+#include "host/base/text.h"
 
 static void test_bytes(void **unused) {
     (void)unused;

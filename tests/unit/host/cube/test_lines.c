@@ -15,7 +15,7 @@
 
 #include <cmocka.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "host/cube/gpio.h"
 #include "host/cube/lines.h"
 

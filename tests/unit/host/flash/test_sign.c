@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "host/flash/sign.h"
-#include "host/nodes/cube_key.h"
+#include "host/nodes/cube_file.h"
 #include "transport/bytes.h"
 #include "transport/drivers/sign_sodium.h"
 #include "transport/frame.h"

@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-#include "host/nodes/cube_key.h"
+#include "host/nodes/cube_file.h"
 #include "transport/drivers/key_file.h"
 
 static char directory[] = "/tmp/incode-key.XXXXXX";

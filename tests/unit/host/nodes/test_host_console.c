@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "host/nodes/console.h"
+#include "host/nodes/port.h"
 #include "transport/frame.h"
 
 #define START "incode: mps2-an500: started, version 1, after power on\r\n"

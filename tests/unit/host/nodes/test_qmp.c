@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "host/base/clock.h"
-#include "host/nodes/qmp.h"
+#include "host/base/error.h"
+#include "host/nodes/emulator.h"
 #include "transport/drivers/unix_file.h"
 
 #define GREETING "{\"QMP\": {\"version\": {}, \"capabilities\": []}}\r\n"

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "host/nodes/trouble.h"
+#include "host/nodes/cluster.h"
 
 enum { EVERY_US = 1000 };
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "host/nodes/wires.h"
+#include "host/nodes/cluster.h"
 
 static void assert_joined(int a, int b, char mark) {
     char got = 0;

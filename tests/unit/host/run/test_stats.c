@@ -15,7 +15,7 @@
 
 #include "host/base/memory.h"
 #include "host/formats/output.h"
-#include "host/run/stats.h"
+#include "host/run/report.h"
 #include "host/service/strategies/strategies.h"
 
 static const char *const names[] = {"points",

@@ -1,6 +1,6 @@
 /* The check of a surface by itself, on facets that no boundary of tetrahedra
  * can be: open, or turned inside out. */
-#include "host/verify/hull.h"
+#include "host/verify/parts.h"
 #include "tests/unit/host/verify/check_world.h"
 
 struct heard {

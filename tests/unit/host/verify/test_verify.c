@@ -12,7 +12,7 @@
 
 #include <cmocka.h>
 
-#include "host/verify/verify.h"
+#include "host/verify/check.h"
 #include "host/mesh/gen.h"
 #include "tests/unit/reference.h"
 

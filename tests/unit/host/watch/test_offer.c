@@ -16,7 +16,7 @@
 
 #include <cmocka.h>
 
-#include "host/base/clock.h"
+#include "host/base/error.h"
 #include "host/watch/look.h"
 #include "host/watch/offer.h"
 #include "node/version.h"
