@@ -78,7 +78,7 @@ obj          := $(BUILD)/obj
 # of its header is seen from outside.
 library      := $(call files,incode host/library) transport/text.c $(patsubst %,host/%.c, \
 	base/error base/memory base/parallel base/text mesh/adjacency \
-	mesh/duplicates mesh/kd_build mesh/lift mesh/order mesh/sort mesh/spill \
+	mesh/duplicates mesh/kd_build mesh/lift mesh/order mesh/spill \
 	mesh/tetrahedra)
 core_objects := $(freestanding:%.c=$(obj)/%.o)
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
@@ -184,7 +184,7 @@ $(obj)/transport/%.o: transport/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
-$(obj)/host/sim/sim_seeds.o: host/sim/sim_seeds.c $(BUILD)/flags $(BUILD)/commit
+$(obj)/host/sim/sim.o: host/sim/sim.c $(BUILD)/flags $(BUILD)/commit
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(HOSTED) -DINCODE_COMMIT='"$(COMMIT)"' -MMD -MP -c $< -o $@

@@ -5,7 +5,7 @@
 #include "paper.h"
 #include "host/base/create.h"
 #include "host/base/progress.h"
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 
 int host_paper_print_begin(struct host_paper_print *print, const char *csv,

@@ -9,7 +9,7 @@
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
 #include "bench_links.h"
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/base/error.h"
 #include "incode/front/afl.h"
 #include "incode/pages/bricks.h"

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "host/service/host_cube.h"
+#include "host/service/parts.h"
 #include "visit_wiring.h"
 #include "host/service/onlookers.h"
 

@@ -7,7 +7,7 @@
 
 #include "host/base/progress.h"
 #include "host/base/text.h"
-#include "host/formats/claims.h"
+#include "host/formats/write.h"
 #include "host/formats/read.h"
 #include "picture.h"
 #include "host/base/options.h"

@@ -5,11 +5,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "claims.h"
+#include "write.h"
 #include "formats.h"
 #include "host/formats/output.h"
 #include "read.h"
-#include "write.h"
 
 /* Whether `out` leaves `in`, which is read, as it is. */
 static int check_claims(const char *in, const char *out,

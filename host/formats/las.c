@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "format.h"
-#include "numbers.h"
+#include "rows.h"
 
 #define COMPRESSED                                                             \
     "its points are compressed, which is not read; unpack them with laszip "   \

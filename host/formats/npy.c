@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "format.h"
-#include "numbers.h"
+#include "rows.h"
 
 struct npy {
     enum host_number type;

@@ -14,7 +14,7 @@
 
 #include "host/base/create.h"
 #include "host/base/progress.h"
-#include "target.h"
+#include "write.h"
 
 enum { BUFFER_BYTES = 1 << 20 };
 

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "format.h"
-#include "numbers.h"
+#include "rows.h"
 
 enum { BLOCKS_MAX = 65536 };
 

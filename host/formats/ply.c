@@ -6,7 +6,6 @@
 #include <strings.h>
 
 #include "format.h"
-#include "numbers.h"
 #include "rows.h"
 #include "scan.h"
 

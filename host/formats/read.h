@@ -1,17 +1,14 @@
 /* Points and tetrahedra from files, in the format that the extension says.
  *
  * Memory: what is read, and the file itself while it is read.  Work: one pass
- * over the file, 40 ns a number of text at most.
- *
- *     if (host_points_read("bunny.ply", &points, &error) == 0 &&
- *         host_tetrahedra_read("bunny.ele", &tets, NULL, &error) == 0)
- *         host_tetrahedra_sort(&tets);
- */
+ * over the file, 40 ns a number of text at most. */
 #ifndef HOST_READ_H
 #define HOST_READ_H
 
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
+#include "rows.h"
+#include "scan.h"
 
 /* Points in the order of the file, all finite and at least one (.gz through
  * zlib; "-" is standard input, in the first format
@@ -47,5 +44,42 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
  * points. */
 int host_rows_check(const char *path, const struct host_tetrahedra *tets,
                     const struct host_points *points, struct host_error *error);
+
+/* Numbers one after another, from text or from bytes alike. */
+
+struct host_stream {
+    const struct host_source *source;
+    bool text; /* then `scan` is read, else at..end */
+    bool big;
+    enum host_number type;
+    struct host_scan scan;
+    const uint8_t *at, *end;
+};
+
+/* The next number; HOST_INPUT where the stream is at its end. */
+int host_stream_next(struct host_stream *s, double *value,
+                     struct host_error *error);
+
+/* The next number, whole and not negative. */
+int host_stream_whole(struct host_stream *s, uint64_t *value,
+                      struct host_error *error);
+
+int host_stream_skip(struct host_stream *s, uint64_t count,
+                     struct host_error *error);
+
+/* Whether nothing is left. */
+bool host_stream_ended(struct host_stream *s);
+
+/* Appends points from three numbers each. */
+int host_stream_points(struct host_stream *s, uint64_t rows,
+                       struct host_points *points, struct host_error *error);
+
+/* VTK's cell lists: for each of `cells`, if its type is a tetrahedron, its
+ * four vertices plus `first`; any other cell of volume is an error.  With
+ * `offsets` NULL every cell in `connectivity` begins with its count. */
+int host_stream_cells(struct host_stream *connectivity,
+                      struct host_stream *offsets, struct host_stream *types,
+                      uint64_t cells, uint64_t first,
+                      struct host_tetrahedra *tets, struct host_error *error);
 
 #endif

@@ -2,7 +2,7 @@
  * most come several times.  A binary file may begin with "solid" as text does;
  * its number of facets accounts for every byte, which that of a text cannot. */
 #include "format.h"
-#include "numbers.h"
+#include "rows.h"
 #include "scan.h"
 
 enum {

@@ -7,10 +7,9 @@
 
 #include "format.h"
 #include "host/base/memory.h"
-#include "numbers.h"
 #include "rows.h"
 #include "scan.h"
-#include "stream.h"
+#include "read.h"
 
 enum { ROW = 256 }; /* points of a grid appended at once */
 

@@ -4,7 +4,7 @@
 #include <zlib.h>
 
 #include "host/base/memory.h"
-#include "numbers.h"
+#include "rows.h"
 
 /* A deflated byte holds at most 1,032 (zlib's own figure). */
 enum { INFLATION_MAX = 1032 };

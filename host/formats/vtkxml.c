@@ -7,10 +7,9 @@
 #include <strings.h>
 
 #include "format.h"
-#include "numbers.h"
 #include "rows.h"
 #include "scan.h"
-#include "stream.h"
+#include "read.h"
 #include "vtk_array.h"
 
 enum want { POINTS, CONNECTIVITY, OFFSETS, TYPES, WANTS };

@@ -3,21 +3,16 @@
  *
  * Memory: 1 MiB of buffer a file; for .neigh and .face also 8 bytes a
  * tetrahedron and 8 a point.  Work: one pass, about 100 ns a tetrahedron as
- * text.
- *
- *     host_tetrahedra_map(&tets, order.row);
- *     host_tetrahedra_sort(&tets);
- *     if (host_write("out.vtu", NULL, &points, &tets, &error) != 0)
- *         return error.code;
- *     return host_output_commit(&error);
- */
+ * text. */
 #ifndef HOST_WRITE_H
 #define HOST_WRITE_H
 
 #include <stdbool.h>
+#include <sys/stat.h>
 
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
+#include "host/base/error.h"
 
 enum { HOST_PATH_MAX = 4096 }; /* bytes of a file's name, by the kernel */
 
@@ -56,5 +51,47 @@ const char *host_write_file(const char *path, unsigned k, char *name,
  * host_write. */
 int host_write_probe(const char *path, const char *input,
                      struct host_error *error);
+
+/* Which files a command reads and which it will write, so that it writes over
+ * no file that it reads, and writes no file twice.  Two names are one file if
+ * they have the same device and inode, links followed.  For a file that does
+ * not exist yet, the directory and the last name are compared, links followed.
+ *
+ * Memory: a name a file.  Work: a stat a file, and a comparison with each. */
+
+struct host_claim;
+
+struct host_claims {
+    struct host_claim *claim;
+    unsigned count, capacity;
+};
+
+/* Notes a file that is read; "-" is standard input. */
+int host_claims_read(struct host_claims *claims, const char *path,
+                     struct host_error *error);
+
+/* Notes an output, which the command line gives as `option` and `path`, with
+ * all files that belong to it; "-" is standard output.  `input`: as of
+ * host_write.  HOST_USAGE where one of them is read, or written for another
+ * output. */
+int host_claims_write(struct host_claims *claims, const char *option,
+                      const char *path, const char *input,
+                      struct host_error *error);
+
+void host_claims_free(struct host_claims *claims);
+
+/* Where a name leads in the end, by the kernel's own word: links are followed
+ * by it alone, so that one which the system does not follow (another user's in
+ * a sticky directory, or on a mount without links) is not followed here.
+ *
+ * Memory: a name.  Work: a handful of system calls. */
+
+/* What `path` is in the end, links followed, also those that lead to where
+ * nothing is yet (there a file is made and removed at once).  To be freed; NULL
+ * with errno where the kernel does not follow it. */
+char *host_target(const char *path);
+
+/* Whether `name` is this very file, and no link to it. */
+bool host_is_file(const struct stat *file, const char *name);
 
 #endif

@@ -1,9 +1,12 @@
 #include "points.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "host/base/memory.h"
 #include "host/base/progress.h"
+#include "incode/triangulator.h"
+#include "order.h"
 
 enum { ROWS_SHOWN = 1 << 14 }; /* a clock a point would cost too much */
 
@@ -58,3 +61,16 @@ void host_points_free(struct host_points *points) {
     host_unmap(points->xyz, points->capacity * ROW_BYTES);
     *points = (struct host_points){0};
 }
+
+/* --- names ---------------------------------------------------------------- */
+
+const char *const host_partitions[] = {
+    [HOST_ADAPTIVE] = "adaptive", [HOST_UNIFORM] = "uniform", NULL};
+const char *const host_indexes[] = {
+    [INCODE_NAIVE] = "naive", [INCODE_GRID] = "grid", [INCODE_KD] = "kd", NULL};
+const char *const host_face_rules[] = {
+    [INCODE_FACE_OWN] = "own", [INCODE_FACE_PAPER] = "paper", NULL};
+const char *const host_builds[] = {[INCODE_BUILD_AUTO] = "auto",
+                                   [INCODE_BUILD_FACES] = "faces",
+                                   [INCODE_BUILD_POINTS] = "points",
+                                   NULL};

@@ -2,14 +2,7 @@
  * grows.
  *
  * Memory: 24 bytes a point, grown by half at a time without a second copy.
- * Work: appending is amortised O(1).
- *
- *     struct host_points points = {0};
- *     double xyz[3] = {0.0, 0.5, 1.0};
- *     if (host_points_append(&points, xyz, 1, &error) != 0)
- *         return error.code;
- *     host_points_free(&points);
- */
+ * Work: appending is amortised O(1). */
 #ifndef HOST_POINTS_H
 #define HOST_POINTS_H
 
@@ -36,5 +29,13 @@ int host_points_append(struct host_points *points, const double *xyz,
                        uint64_t rows, struct host_error *error);
 
 void host_points_free(struct host_points *points);
+
+/* The names of the choices that a run leaves to the user, by their values, as
+ * options, statistics and the simulator have them; a NULL behind the last. */
+
+extern const char *const host_partitions[]; /* enum host_partition */
+extern const char *const host_indexes[];    /* enum incode_index */
+extern const char *const host_face_rules[]; /* enum incode_face_rule */
+extern const char *const host_builds[];     /* enum incode_build */
 
 #endif

@@ -8,7 +8,7 @@
 #include "host/base/options.h"
 #include "host/base/text.h"
 #include "host/formats/formats.h"
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 #include "incode/paper/builder.h"
 

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "host/base/text.h"
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
 #include "host/formats/output.h"

@@ -5,7 +5,7 @@
 #include <unistd.h>
 
 #include "node/node.h"
-#include "host/mesh/open.h"
+#include "host/mesh/order.h"
 #include "host/nodes/remote.h"
 #include "transport/secure_wipe.h"
 

@@ -1,11 +1,138 @@
-#include "bring_up.h"
-
+#include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "failure_detector.h"
-#include "notices.h"
+#include "in_use.h"
 #include "onlookers.h"
+#include "parts.h"
+#include "host/base/progress.h"
+#include "transport/wiring.h"
+
+enum {
+    IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */
+    IN_USE_US_LAST = 9000000, /* whether it was told so again or not */
+    IN_USE_TOLD_US = 2000000, /* it is told so more often as long as it is so */
+    IN_USE_REST_US = 1000000
+};
+
+enum host_in_use_state host_in_use_look(struct host_in_use *in_use,
+                                        const struct host_machine *machine,
+                                        const struct link_peer *peer,
+                                        uint64_t now_us) {
+    if (peer->refusal != LINK_IN_USE) {
+        in_use->since_us = 0;
+        return HOST_FREE;
+    }
+    if (in_use->since_us == 0) {
+        in_use->since_us = now_us;
+    }
+    if (in_use->told != peer->in_use) {
+        in_use->told_us = now_us;
+        if (machine->rest != NULL) {
+            machine->rest(machine->context, IN_USE_REST_US);
+        }
+    }
+    in_use->told = peer->in_use;
+    uint64_t passed = now_us - in_use->since_us;
+    bool stays =
+        passed > IN_USE_US_LAST ||
+        (passed > IN_USE_US_MAX && now_us - in_use->told_us <= IN_USE_TOLD_US);
+    return stays ? HOST_STAYS : HOST_TAKEN;
+}
+
+int host_in_use_fail(const struct host_machine *machine, unsigned node,
+                     struct host_error *error) {
+    const struct host_onlookers *them = machine->onlookers;
+    const char *holder = them == NULL ? NULL : them->holder(them->context);
+    return holder == NULL
+               ? host_fail(error, HOST_CUBE,
+                           "node %u link %u: the cube is in use by another "
+                           "host; wait until its run is over, or end it",
+                           node, machine->dimension)
+               : host_fail(error, HOST_CUBE,
+                           "node %u link %u: the cube is in use by %s; wait "
+                           "until it has ended, or end it; look on meanwhile "
+                           "with: incode console %s",
+                           node, machine->dimension, holder,
+                           host_where(machine));
+}
+
+/* --- host cube ------------------------------------------------------------ */
+
+enum { WINDOW_DEFAULT = 32 };
+
+struct cube *host_cube_make(const struct host_machine *machine, unsigned window,
+                            void **memory, struct host_error *error) {
+    struct cube_config config;
+    memset(&config, 0, sizeof config);
+    config.self = CUBE_HOST;
+    config.dimension = (uint8_t)machine->dimension;
+    config.window = (uint16_t)(window == 0 ? WINDOW_DEFAULT : window);
+    if (config.window > LINK_WINDOW_MAX) {
+        config.window = LINK_WINDOW_MAX;
+    }
+    config.epoch = machine->epoch;
+    config.pipes[0] = machine->pipe;
+    config.pipes[1] = machine->spare;
+    config.spare_node = machine->spare_node;
+    config.host_ports = machine->host_ports;
+    for (unsigned i = 1; i < config.host_ports; i++) {
+        config.pipes[i] = machine->wires[i];
+    }
+    cube_for_serial(&config, machine->serial_baud);
+    size_t bytes = cube_arena_bytes(&config);
+    *memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    if (*memory == NULL) {
+        host_fail_memory(error, "the wire");
+        return NULL;
+    }
+    struct cube *cube = cube_init(*memory, bytes, &config);
+    if (cube == NULL) {
+        host_fail(error, HOST_BROKEN,
+                  "host: the cube of %u nodes does not come up; please report "
+                  "this",
+                  machine->nodes);
+    }
+    return cube;
+}
+
+/* --- notices -------------------------------------------------------------- */
+
+void host_notice_line(struct host_service *service, const char *line) {
+    struct host_service *s = service;
+    if (s->machine->told != NULL) {
+        s->machine->told(s->machine->context, line);
+        return;
+    }
+    host_note("%s", line);
+}
+
+static void notice(struct host_service *s, unsigned node, unsigned link,
+                   const char *format, va_list arguments) {
+    char line[HOST_NOTICE_BYTES];
+    int at = snprintf(line, sizeof line, "node %u link %u: ", node, link);
+    (void)vsnprintf(line + at, sizeof line - (size_t)at, format, arguments);
+    host_notice_line(s, line);
+}
+
+void host_notice(struct host_service *service, unsigned node,
+                 const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    notice(service, node, host_detector_link(service, node), format, arguments);
+    va_end(arguments);
+}
+
+void host_notice_of(struct host_service *service, unsigned node, unsigned link,
+                    const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    notice(service, node, link, format, arguments);
+    va_end(arguments);
+}
+
+/* --- bring up ------------------------------------------------------------- */
 
 enum {
     STARTED_HERE_US = 9000000, /* the machine's own nodes need no more */
@@ -225,4 +352,146 @@ void host_bring_up_done(struct host_service *service) {
     if (service->waiting[0] != '\0') {
         host_notice_line(service, "host: all nodes are there; the run begins");
     }
+}
+
+/* --- generations ---------------------------------------------------------- */
+
+enum {
+    FRUITLESS_MAX = 64,
+    /* Generations of other hosts that are answered: one is normal where a host
+     * was here before, a few come of nodes that were cut off meanwhile. */
+    OUTDONE_MAX = 4
+};
+
+/* Whether the host can speak by that node: by a wire, and on to another. */
+static bool speaks(const struct host_service *s, const struct cube_wiring *w,
+                   uint16_t gateway) {
+    unsigned dimension = s->machine->dimension;
+    bool on = dimension == 0;
+    for (unsigned d = 0; d < dimension; d++) {
+        on = on || !wiring_is_dead(w, w->dead_count, gateway, d, dimension);
+    }
+    return on &&
+           !wiring_is_dead(w, w->dead_count, gateway, dimension, dimension);
+}
+
+uint16_t host_generation_gateway(const struct host_service *service,
+                                 const struct cube_wiring *next) {
+    const struct host_service *s = service;
+    uint16_t other = next->gateway != 0 ? 0 : s->machine->spare_node;
+    return !speaks(s, next, next->gateway) && speaks(s, next, other)
+               ? other
+               : next->gateway;
+}
+
+/* The gateway must be there, and what was given up must not be on the way.
+ * What is dead only since is looked at later. */
+static int check_renewed(const struct host_service *s,
+                         struct host_error *error) {
+    const struct cube_wiring *w = cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension;
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        bool dead = wiring_is_dead(w, w->settled, i, dimension, dimension);
+        if (i == w->gateway ? dead : s->node[i].given_up && !dead) {
+            return host_detector_doubt(s, i, error) != 0
+                       ? error->code
+                       : host_fail(
+                             error, HOST_CUBE,
+                             "node %u link %u: lost, and the cube cannot go "
+                             "on without it; look after that node and its "
+                             "wires, and run again",
+                             i, host_detector_link(s, i));
+        }
+    }
+    return 0;
+}
+
+/* Nodes that come back to another host's generation, whatever is answered,
+ * would have the run begin for ever. */
+static int check_outdone(const struct host_service *s,
+                         struct host_error *error) {
+    unsigned gateway = cube_wiring(s->cube)->gateway;
+    return cube_statistics(s->cube)->outdone <= OUTDONE_MAX
+               ? 0
+               : host_fail(error, HOST_CUBE,
+                           "node %u link %u: tells of a generation of another "
+                           "host, and goes back to it when it is told a new "
+                           "one; restart the nodes, and run again",
+                           gateway, host_detector_link(s, gateway));
+}
+
+int host_generation_begin(struct host_service *service, uint64_t now_us,
+                          struct host_error *error) {
+    struct host_service *s = service;
+    host_detector_begin(s, now_us);
+    host_onlooking_again(&s->onlooking);
+    if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0) {
+        return error->code;
+    }
+    s->late = false;
+    if (s->started) {
+        s->audit.lost_work = true;
+        s->strategy->lose(&s->work);
+        host_spill_clear(&s->spill);
+        host_sending_begin(s);
+    }
+    return 0;
+}
+
+/* Boards that reset themselves would have the run begin for ever. */
+static int check_progress(struct host_service *s, struct host_error *error) {
+    s->fruitless =
+        s->ledger.committed == s->committed_before ? s->fruitless + 1 : 0;
+    s->committed_before = s->ledger.committed;
+    return s->fruitless <= FRUITLESS_MAX
+               ? 0
+               : host_fail(error, HOST_CUBE,
+                           "node %u link %u: %u losses in a row, and nothing "
+                           "done between them; look after that node and its "
+                           "wires, and run again",
+                           s->blamed, host_detector_link(s, s->blamed),
+                           s->fruitless);
+}
+
+int host_generation_renew(struct host_service *service, uint64_t now_us,
+                          struct host_error *error) {
+    struct host_service *s = service;
+    struct cube_wiring next = *cube_wiring(s->cube);
+    unsigned dimension = s->machine->dimension;
+    s->loss = false;
+    if (s->started && s->ledger.committed == s->ledger.bricks) {
+        /* All bricks are here: if the result is right, this loss costs nothing.
+         */
+        s->audit.lost_work = true;
+        s->late = true;
+        s->over = s->reporting;
+        return 0;
+    }
+    if (check_progress(s, error) != 0) {
+        return error->code;
+    }
+    if (s->searching || !host_missing_links_spare(s)) {
+        /* That a wire is absent shows later, and who is cut off is waited
+         * for. */
+        next.dead_count = next.settled;
+    }
+    if (!s->searching) {
+        next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
+    }
+    if (s->wire_lost) {
+        struct cube_dead dead = {next.gateway, (uint8_t)dimension};
+        (void)wiring_add_dead(&next, dead, dimension);
+        s->wire_lost = false;
+        s->wire_down_us = now_us;
+    }
+    for (unsigned i = 0; i < s->machine->nodes; i++) {
+        struct cube_dead dead = {(uint16_t)i, CUBE_WHOLE_NODE};
+        if (s->node[i].given_up) {
+            (void)wiring_add_dead(&next, dead, dimension);
+        }
+    }
+    next.gateway = host_generation_gateway(s, &next);
+    cube_renew(s->cube, &next);
+    s->generations++;
+    return host_generation_begin(s, now_us, error);
 }

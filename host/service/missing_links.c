@@ -1,9 +1,8 @@
-#include "missing_links.h"
+#include "parts.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#include "generations.h"
 #include "host/base/progress.h"
 #include "transport/wiring.h"
 

@@ -3,15 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bring_up.h"
-#include "failure_detector.h"
-#include "generations.h"
-#include "handlers.h"
+#include "parts.h"
 #include "host/base/progress.h"
-#include "host_cube.h"
-#include "missing_links.h"
-#include "paging.h"
-#include "sending.h"
 
 enum {
     IDLE_US_MAX = 20000,

@@ -1,7 +1,11 @@
 #include "sim.h"
 
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
@@ -9,6 +13,10 @@
 #include "host/service/strategies/strategies.h"
 #include "sim_draw.h"
 #include "sim_run.h"
+#include "host/base/options.h"
+#include "host/base/text.h"
+#include "host/service/machine.h"
+#include "host/base/parallel.h"
 
 enum {
     TIME_US_MAX = 1800000000, /* half an hour in virtual time, */
@@ -293,4 +301,275 @@ int host_sim_run(const struct host_sim_plan *plan,
     host_tetrahedra_free(&r->tets);
     free(r);
     return status != 0 ? status : error->code;
+}
+
+/* --- sim arguments -------------------------------------------------------- */
+
+enum { KEY_SEED = 256, KEY_SEEDS, KEY_NODES, KEY_SECONDS };
+
+struct parse_sim {
+    struct host_sim_options *options;
+    struct host_error *error;
+};
+
+static void add_range(struct parse_sim *p, uint64_t first, uint64_t last) {
+    struct host_sim_options *o = p->options;
+    if (o->ranges == HOST_SIM_RANGES_MAX) {
+        host_fail(p->error, HOST_USAGE,
+                  "--seed: more than %d of --seed and --seeds; give a range",
+                  HOST_SIM_RANGES_MAX);
+        return;
+    }
+    o->range[o->ranges].first = first;
+    o->range[o->ranges++].last = last;
+}
+
+/* A..B, both included. */
+static void parse_seeds(struct parse_sim *p, const char *value) {
+    uint64_t first_seed = 0, last_seed = 0;
+    char first[32] = "";
+    const char *dots = strstr(value, "..");
+    size_t length = dots == NULL ? sizeof first : (size_t)(dots - value);
+    if (length < sizeof first) {
+        memcpy(first, value, length);
+    }
+    if (dots == NULL ||
+        host_parse_number(first, 0, UINT64_MAX, &first_seed) != 0 ||
+        host_parse_number(dots + 2, first_seed, UINT64_MAX, &last_seed) != 0) {
+        host_fail(p->error, HOST_USAGE,
+                  "--seeds %s: not a range of seeds; give A..B, as in 1..1000",
+                  value);
+        return;
+    }
+    add_range(p, first_seed, last_seed);
+}
+
+static error_t parse_sim_option(int key, char *value,
+                                struct argp_state *state) {
+    struct parse_sim *p = state->input;
+    uint64_t n = 0;
+    switch (key) {
+    case ARGP_KEY_ARG:
+        host_fail(p->error, HOST_USAGE,
+                  "%s: sim takes options alone; see incode sim --help", value);
+        return 0;
+    case KEY_SEED:
+        if (host_option_number("seed", value, 0, UINT64_MAX, &n, p->error) ==
+            0) {
+            add_range(p, n, n);
+        }
+        return 0;
+    case KEY_SEEDS:
+        parse_seeds(p, value);
+        return 0;
+    case KEY_SECONDS:
+        (void)host_option_number("seconds", value, 1, 1000000,
+                                 &p->options->seconds_max, p->error);
+        return 0;
+    case KEY_NODES:
+        (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
+                               &p->options->nodes, p->error);
+        return 0;
+    default:
+        return ARGP_ERR_UNKNOWN;
+    }
+}
+
+int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
+                       struct host_error *error) {
+    static const struct argp_option options_of_sim[] = {
+        {"seed", KEY_SEED, "S", 0,
+         "Run seed S, which may be given more than once. Default: 1", 0},
+        {"seeds", KEY_SEEDS, "A..B", 0, "Run seeds A to B, and print totals",
+         0},
+        {"nodes", KEY_NODES, "N", 0,
+         "Nodes of the cube: 1, 2, 4 .. 1024. Default: the seed decides", 0},
+        {"seconds", KEY_SECONDS, "T", 0,
+         "Begin no seed after T seconds of processor time", 0},
+        {0}};
+    static const struct argp argp = {
+        options_of_sim,
+        parse_sim_option,
+        "",
+        "Runs a whole cube - host, nodes and links as they are - in one "
+        "process in virtual time.  The seed decides on points, cube, wires and "
+        "faults: "
+        "lost and damaged frames, stalls, closed wires, partitions, pauses, "
+        "crashes, idle nodes, small memories, a slow host, a node that lies.  "
+        "Then the faults "
+        "stop, and the "
+        "result must be the right one; of a node that lies, the run may also "
+        "give up if it names it.  Each seed prints what struck while "
+        "work was open; a failure prints the command that replays it.\v"
+        "Examples:\n"
+        "  incode sim --seed 17\n"
+        "  incode sim --seed 17 --seed 34\n"
+        "  incode sim --seeds 1..1000\n"
+        "  incode sim --seeds 1..20 --nodes 64\n\n"
+        "Exit status: 0 every result right, 1 something was left behind or the "
+        "program failed, 2 wrong usage, 4 a run did not end or a node failed, "
+        "5 a wrong result.",
+        NULL,
+        NULL,
+        NULL};
+    struct parse_sim parse = {options, error};
+    memset(options, 0, sizeof *options);
+    int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
+    if (status == 0 && options->ranges == 0) {
+        add_range(&parse, 1, 1);
+    }
+    return status;
+}
+
+/* --- sim seeds ------------------------------------------------------------ */
+
+#ifndef INCODE_COMMIT
+#define INCODE_COMMIT "unknown"
+#endif
+
+enum {
+    STUCK_S = 300
+}; /* processor time of a seed: a loop that never looks at
+      the clock */
+
+/* How the seed at work is replayed: for a handler of signals, too. */
+static char replay[160];
+
+static void note_replay(const struct host_sim_plan *plan) {
+    char nodes[32] = "";
+    if (plan->nodes_given != 0) {
+        snprintf(nodes, sizeof nodes, " --nodes %u", plan->nodes_given);
+    }
+    snprintf(replay, sizeof replay,
+             "  replay: git checkout %s && make && build/incode sim --seed "
+             "%llu%s\n",
+             INCODE_COMMIT, (unsigned long long)plan->seed, nodes);
+}
+
+static void on_crash(int number) {
+    static const char what[] = "\nincode: sim: crashed or stuck\n";
+    (void)!write(STDERR_FILENO, what, sizeof what - 1);
+    (void)!write(STDERR_FILENO, replay, strlen(replay));
+    (void)signal(number, SIG_DFL);
+    (void)raise(number);
+}
+
+static void watch_crashes(void) {
+    static const int numbers[] = {SIGSEGV, SIGBUS,  SIGILL,   SIGFPE,
+                                  SIGTRAP, SIGABRT, SIGVTALRM};
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+        (void)signal(numbers[i], on_crash);
+    }
+}
+
+/* Processor time for one more seed. */
+static void give_time(void) {
+    const struct itimerval time = {.it_value = {.tv_sec = STUCK_S}};
+    (void)setitimer(ITIMER_VIRTUAL, &time, NULL);
+}
+
+/* A shorter time says nothing of the rate. */
+static const double RATE_S_MIN = 1;
+
+struct totals {
+    uint64_t seeds, failed, steps, time_us, restarts;
+    uint64_t struck[HOST_SIM_FAULTS], seeds_struck[HOST_SIM_FAULTS];
+};
+
+static void print_struck(const uint64_t *struck) {
+    const char *comma = " ";
+    bool any = false;
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        if (struck[k] > 0) {
+            printf("%s%s %llu", comma, host_sim_kinds[k].name,
+                   (unsigned long long)struck[k]);
+            comma = ", ";
+            any = true;
+        }
+    }
+    if (!any) {
+        printf(" no fault");
+    }
+}
+
+static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
+                     struct host_error *first) {
+    struct host_sim_plan plan;
+    struct host_sim_outcome outcome;
+    struct host_error error = {0};
+    host_sim_plan_draw(&plan, seed, nodes);
+    note_replay(&plan);
+    give_time();
+    printf("seed %llu: ", (unsigned long long)seed);
+    host_sim_plan_print(stdout, &plan);
+    fflush(stdout);
+    int status = host_sim_run(&plan, &outcome, &error);
+    print_struck(outcome.struck);
+    printf("; %llu ms, %llu frames, trace %016llx%s\n",
+           (unsigned long long)outcome.time_us / 1000,
+           (unsigned long long)outcome.frames,
+           (unsigned long long)outcome.trace, status == 0 ? "" : ": FAILED");
+    totals->seeds++;
+    totals->steps += outcome.steps;
+    totals->time_us += outcome.time_us;
+    totals->restarts += outcome.restarts;
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        totals->struck[k] += outcome.struck[k];
+        totals->seeds_struck[k] += outcome.struck[k] > 0;
+    }
+    if (status != 0) {
+        totals->failed++;
+        printf("  seed %llu: %s\n%s", (unsigned long long)seed, error.text,
+               replay);
+        (void)host_fail(first, error.code, "sim: seed %llu: %s",
+                        (unsigned long long)seed, error.text);
+    }
+    fflush(stdout);
+}
+
+static void print_totals(const struct totals *t, double seconds) {
+    printf("%llu seed%s, %llu failed; %llu restart%s, %.0f s in virtual time, "
+           "%.1f in ours",
+           (unsigned long long)t->seeds, t->seeds == 1 ? "" : "s",
+           (unsigned long long)t->failed, (unsigned long long)t->restarts,
+           t->restarts == 1 ? "" : "s", 1e-6 * (double)t->time_us, seconds);
+    if (seconds >= RATE_S_MIN) {
+        printf(", %.0f seeds an hour", 3600 * (double)t->seeds / seconds);
+    }
+    printf("\n");
+    printf("%-12s %12s %8s  while work was open\n", "fault", "strikes",
+           "seeds");
+    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        printf("%-12s %12llu %8llu\n", host_sim_kinds[k].name,
+               (unsigned long long)t->struck[k],
+               (unsigned long long)t->seeds_struck[k]);
+    }
+}
+
+static double processor_s(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+int host_sim_seeds(const struct host_sim_options *options,
+                   struct host_error *error) {
+    struct totals totals = {0};
+    double start = processor_s(), seconds = 0;
+    bool late = false;
+    static struct host_call alone = {.threads = 1, .memory_max = UINT64_MAX};
+    host_call_enter(&alone);
+    watch_crashes();
+    for (unsigned i = 0; i < options->ranges && !late; i++) {
+        uint64_t seed = options->range[i].first;
+        uint64_t left = options->range[i].last - seed;
+        for (bool more = true; more && !late; more = left-- > 0) {
+            run_seed(seed++, options->nodes, &totals, error);
+            seconds = processor_s() - start;
+            late = options->seconds_max > 0 &&
+                   seconds > (double)options->seconds_max;
+        }
+    }
+    print_totals(&totals, seconds);
+    return error->code;
 }

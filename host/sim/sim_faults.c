@@ -1,4 +1,4 @@
-#include "sim_faults.h"
+#include "sim_plan.h"
 
 #include "sim_draw.h"
 #include "sim_run.h"

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 #include "sim_draw.h"
 

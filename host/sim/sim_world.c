@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim_boot.h"
 #include "sim_draw.h"
 
 enum {

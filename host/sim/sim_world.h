@@ -4,14 +4,7 @@
  * the world runs until then.  No clock of this machine takes part.
  *
  * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of
- * nodes, log n a step, besides the nodes' own.
- *
- *     if (host_world_open(&world, &options, &error) != 0)
- *         return error.code;
- *     struct host_machine machine = host_world_machine(&world);
- *     machine.idle(machine.context, 1000);
- *     host_world_close(&world);
- */
+ * nodes, log n a step, besides the nodes' own. */
 #ifndef HOST_SIM_WORLD_H
 #define HOST_SIM_WORLD_H
 
@@ -157,5 +150,17 @@ void host_world_give_up(struct host_world *world, unsigned node,
 
 /* NULL, or what a node left behind that was not its own. */
 const char *host_world_damage(const struct host_world *world);
+
+/* How a node of a simulated cube starts: told who it is, or, as on a bare
+ * board, asking its neighbours.
+ *
+ * Memory: the node's.  Work: that of node_start, or of a look at its wires. */
+
+/* What its memory holds before is chance. */
+void host_sim_boot(struct host_world *world, unsigned node);
+
+/* Asks, if it is time, and listens: one that has been told starts as who it
+ * is. */
+void host_sim_learn(struct host_world *world, unsigned node);
 
 #endif

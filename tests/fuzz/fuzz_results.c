@@ -5,7 +5,7 @@
 
 #include "host/formats/formats.h"
 #include "host/mesh/gen.h"
-#include "host/service/handlers.h"
+#include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
 #include "transport/drivers/sim.h"
 

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "host/mesh/gen.h"
-#include "host/mesh/open.h"
+#include "host/mesh/order.h"
 
 static uint64_t open_of(const double *xyz, uint64_t count) {
     struct host_order order = {0};

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "host/mesh/names.h"
+#include "host/mesh/points.h"
 #include "host/run/arguments.h"
 #include "host/service/strategies/strategies.h"
 

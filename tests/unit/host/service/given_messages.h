@@ -20,7 +20,7 @@
 
 #include <cmocka.h>
 
-#include "host/service/handlers.h"
+#include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
 #include "node/result.h"
 #include "transport/drivers/sim.h"

@@ -3,7 +3,7 @@
 #include "given_messages.h"
 
 #include "host/library/delaunay.h"
-#include "host/service/generations.h"
+#include "host/service/parts.h"
 
 enum { ALL = UINT16_MAX, NOBODY = UINT16_MAX, NO_TET = -1 };
 

@@ -10,8 +10,7 @@
 
 #include <cmocka.h>
 
-#include "host/service/doubts.h"
-#include "host/service/host_cube.h"
+#include "host/service/parts.h"
 
 enum {
     DIMENSION = 3,

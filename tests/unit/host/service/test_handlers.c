@@ -1,7 +1,7 @@
 /* The host believes no message: whatever a node sends, the host takes it as it
  * should be, or names the node and stops; it never writes where it must not. */
 #include "given_messages.h"
-#include "host/service/faults.h"
+#include "host/service/parts.h"
 
 static uint64_t state = 88172645463325252u;
 

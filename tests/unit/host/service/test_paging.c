@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "host/service/paging.h"
+#include "host/service/parts.h"
 
 /* Of 200,000 points on a sphere, two nodes of 4M. */
 enum { NODES = 2, PAGES = 3226, FRAMES = 1105 };

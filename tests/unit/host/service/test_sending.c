@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "host/service/sending.h"
+#include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
 #include "transport/drivers/sim.h"
 #include "small_order.h"
