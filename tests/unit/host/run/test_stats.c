@@ -202,13 +202,13 @@ static void test_documented(void **unused) {
     (void)unused;
     static struct host_run_result result;
     static char text[1 << 18];
-    FILE *file = fopen("README.md", "r");
+    FILE *file = fopen("host/README.md", "r");
     assert_non_null(file);
     assert_true(fread(text, 1, sizeof text - 1, file) > 0);
     (void)fclose(file);
-    char *table = strstr(text, "\n### Statistics\n");
+    char *table = strstr(text, "\n## Statistics\n");
     assert_non_null(table);
-    char *end = strstr(table + 1, "\n### ");
+    char *end = strstr(table + 1, "\n## ");
     assert_non_null(end);
     *end = '\0';
     fill(&result);
