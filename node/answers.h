@@ -4,20 +4,13 @@
  *
  * Memory: struct node_answers, a part of struct node; an answer is made on the
  * stack, CUBE_PAYLOAD_MAX bytes.  Work: constant a message; an answer costs
- * what the teller takes, and a step without any nothing.
- *
- *     if (node_answers_is_for(&message))
- *         node_answers_take(&answers, &message, now_us);
- *     moved += node_answers_send(&answers, &teller, now_us);
- *     if (node_answers_restart(&answers, now_us) != NODE_RESET_OVER)
- *         return -1;
- */
+ * what the teller takes, and a step without any nothing. */
 #ifndef NODE_ANSWERS_H
 #define NODE_ANSWERS_H
 
 #include "board.h"
-#include "counted.h"
-#include "questions.h"
+#include "setup.h"
+#include "message.h"
 
 enum {
     NODE_ASKED_MAX = 4, /* questions that wait; of more the last are dropped */
@@ -85,5 +78,12 @@ unsigned node_answers_links(const struct node_answers *answers,
  * Neighbours have, or had the time to get, what was on its way. */
 enum node_reset node_answers_restart(const struct node_answers *answers,
                                      uint64_t now_us);
+
+/* The cube as a node's identity and memory make it: the same for the node
+ * program and a board's loader, so that they take each other's place. */
+
+/* All but the pipes.  memory: of the node in all, arena and fixed. */
+struct cube_config node_configure(const struct node_identity *identity,
+                                  size_t memory);
 
 #endif

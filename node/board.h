@@ -19,7 +19,7 @@
 #include <stdint.h>
 
 #include "transport/cube.h"
-#include "transport/secure_seed.h"
+#include "transport/secure.h"
 
 /* Who the node is, as its board was told. */
 struct node_identity {

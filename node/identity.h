@@ -15,7 +15,7 @@
 #define NODE_IDENTITY_H
 
 #include "board.h"
-#include "transport/learn.h"
+#include "transport/gossip.h"
 
 /* Sets the epoch of this start: drawn at random where the source has random
  * bytes, else its number of this start, which never comes again either (after

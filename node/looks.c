@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "pace.h"
+#include "setup.h"
 
 enum {
     LOOK_US = 50000,

@@ -3,14 +3,12 @@
 #include <string.h>
 
 #include "answers.h"
-#include "arena.h"
-#include "configure.h"
+#include "setup.h"
 #include "incode/predicates/check.h"
 #include "looks.h"
 #include "node/roles/roles.h"
-#include "setup.h"
-#include "totals.h"
-#include "transport/wiring.h"
+#include "result.h"
+#include "transport/routes.h"
 
 enum { IDLE_MAX_US = 100000, FAREWELL_US = 500000 };
 

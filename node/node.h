@@ -17,7 +17,6 @@
 
 #include "board.h"
 #include "message.h"
-#include "questions.h"
 
 enum node_event {
     NODE_BUSY,   /* call again at once */

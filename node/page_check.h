@@ -25,8 +25,7 @@
 
 #include <stdbool.h>
 
-#include "counted.h"
-#include "fault.h"
+#include "setup.h"
 #include "message.h"
 
 /* HalfSipHash-2-4 of some words, then some bytes. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "incode/pages/bricks.h"
+#include "incode/predicates/check.h"
 
 enum { KIND_TETRAHEDRON, KIND_STAR, KIND_COMMIT, KIND_FINDER };
 enum { FINDER_FOLLOWS = 63 /* in a finder's head */ };
@@ -236,4 +237,91 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
         }
     }
     return NODE_RESULT_END;
+}
+
+/* --- outbox --------------------------------------------------------------- */
+
+void node_outbox_init(struct node_outbox *box, void *memory, uint32_t slots) {
+    box->slots = memory;
+    box->slot_count = slots;
+    box->first = 0;
+    box->used = 0;
+    box->used_max = 0;
+}
+
+uint8_t *node_outbox_open(struct node_outbox *box) {
+    INCODE_ASSERT(box->used < box->slot_count);
+    return box->slots[(box->first + box->used) % box->slot_count].data;
+}
+
+void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size) {
+    INCODE_ASSERT(box->used < box->slot_count);
+    INCODE_ASSERT(size <= CUBE_PAYLOAD_MAX);
+    struct node_outbox_slot *slot =
+        &box->slots[(box->first + box->used) % box->slot_count];
+    slot->type = type;
+    slot->size = (uint16_t)size;
+    box->used++;
+    if (box->used > box->used_max) {
+        box->used_max = box->used;
+    }
+}
+
+struct node_outbox_slot *node_outbox_first(const struct node_outbox *box) {
+    return box->used == 0 ? NULL : &box->slots[box->first];
+}
+
+void node_outbox_drop(struct node_outbox *box) {
+    INCODE_ASSERT(box->used > 0);
+    box->first = (box->first + 1) % box->slot_count;
+    box->used--;
+}
+
+/* --- totals --------------------------------------------------------------- */
+
+enum { WORDS = sizeof(struct incode_statistics) / sizeof(uint64_t) };
+
+static_assert(sizeof(struct incode_statistics) == WORDS * sizeof(uint64_t),
+              "statistics are counters of 64 bits");
+
+static uint64_t higher(uint64_t a, uint64_t b) {
+    return a > b ? a : b;
+}
+
+static uint32_t most(uint32_t a, uint32_t b) {
+    return a > b ? a : b;
+}
+
+static void add_statistics(struct incode_statistics *sum,
+                           const struct incode_statistics *more) {
+    uint64_t a[WORDS], b[WORDS];
+    uint64_t afl_max = higher(sum->afl_max, more->afl_max);
+    uint64_t high_water =
+        higher(sum->memory_high_water, more->memory_high_water);
+    memcpy(a, sum, sizeof a);
+    memcpy(b, more, sizeof b);
+    for (unsigned i = 0; i < WORDS; i++) {
+        a[i] += b[i];
+    }
+    memcpy(sum, a, sizeof a);
+    sum->afl_max = afl_max;
+    sum->memory_high_water = high_water;
+}
+
+void node_totals_add(struct node_finished_message *sum,
+                     const struct node_finished_message *more) {
+    sum->wall_us += more->wall_us;
+    sum->busy_us += more->busy_us;
+    sum->bytes_in += more->bytes_in;
+    sum->bytes_out += more->bytes_out;
+    sum->pages_held += more->pages_held;
+    sum->pages_forwarded += more->pages_forwarded;
+    sum->retransmitted += more->retransmitted;
+    sum->memory_high_water =
+        higher(sum->memory_high_water, more->memory_high_water);
+    sum->stack_bytes = most(sum->stack_bytes, more->stack_bytes);
+    sum->stack_high_water = most(sum->stack_high_water, more->stack_high_water);
+    sum->overruns += more->overruns;
+    sum->look_us_max = most(sum->look_us_max, more->look_us_max);
+    add_statistics(&sum->statistics, &more->statistics);
 }

@@ -14,20 +14,15 @@
  * there means that it is in the two bytes behind.
  *
  * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
- * read whatever its bytes are, without reading past its end.
- *
- *     node_result_begin(&writer, buffer, sizeof buffer - NODE_RESULT_SLACK, 1);
- *     if (node_result_finder(&writer, 5))
- *         written = node_result_star(&writer, vertex, apexes, count);
- *     node_result_open(&reader, buffer, writer.size, vertices, 1, nodes);
- *     while (node_result_read(&reader, rows, 64, &count) == NODE_RESULT_ROWS)
- *         tetrahedra += count;
- */
+ * read whatever its bytes are, without reading past its end. */
 #ifndef NODE_RESULT_H
 #define NODE_RESULT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include "message.h"
 
 enum {
     NODE_RESULT_TETRAHEDRON_MAX = 13, /* bytes of a record, at most */
@@ -86,5 +81,49 @@ void node_result_open(struct node_result_reader *reader, const uint8_t *data,
 enum node_result_event node_result_read(struct node_result_reader *reader,
                                         uint32_t (*rows)[4], size_t rows_max,
                                         size_t *count);
+
+/* Messages of a node that wait for credit or for room on their link: a ring of
+ * message buffers that are filled in place and leave in order.
+ *
+ * Memory: NODE_OUTBOX_BYTES(slots), from the node's arena.  Work: constant a
+ * call. */
+
+struct node_outbox_slot {
+    uint16_t size;
+    uint8_t type;
+    uint8_t reserved;
+    uint8_t data[CUBE_PAYLOAD_MAX + 4]; /* 4: slack of result.h's writer */
+};
+
+struct node_outbox {
+    struct node_outbox_slot *slots;
+    uint32_t slot_count, first, used; /* closed slots, in order from first */
+    uint32_t used_max;
+};
+
+#define NODE_OUTBOX_BYTES(slots) ((slots) * sizeof(struct node_outbox_slot))
+
+void node_outbox_init(struct node_outbox *box, void *memory, uint32_t slots);
+
+/* Slots that are neither closed nor waiting. */
+static inline uint32_t node_outbox_free(const struct node_outbox *box) {
+    return box->slot_count - box->used;
+}
+
+/* The buffer of the next message; there must be a free slot.  The same one
+ * until it is closed. */
+uint8_t *node_outbox_open(struct node_outbox *box);
+void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size);
+
+/* The oldest closed message, or NULL. */
+struct node_outbox_slot *node_outbox_first(const struct node_outbox *box);
+void node_outbox_drop(struct node_outbox *box);
+
+/* Sums of statistics: over the jobs, the roles and the starts of a node. */
+
+/* Counters add up; high waters are those of the higher.  `epoch` and `start`
+ * stay. */
+void node_totals_add(struct node_finished_message *sum,
+                     const struct node_finished_message *more);
 
 #endif

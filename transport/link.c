@@ -3,9 +3,7 @@
 #include <string.h>
 
 #include "check.h"
-#include "link_receive.h"
-#include "link_send.h"
-#include "link_session.h"
+#include "link_internal.h"
 
 /* --- memory -------------------------------------------------------------- */
 

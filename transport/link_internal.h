@@ -11,10 +11,7 @@
  * - receive: receive, in, datagrams.in ..., asked, heard;
  * - each: its statistics.
  *
- * Memory and work: see link.h.
- *
- *     free_slots = link_credit(link);
- */
+ * Memory and work: see link.h. */
 #ifndef TRANSPORT_LINK_INTERNAL_H
 #define TRANSPORT_LINK_INTERNAL_H
 
@@ -183,5 +180,137 @@ static inline unsigned link_slot_of(const struct link *link, unsigned offset) {
     return link_wrapped(link, (unsigned)link->receive.head +
                                   link->receive.ready + offset);
 }
+
+/* The receive window of a link: finds frames among the bytes of the pipe,
+ * decodes them to where they stay, and says what has happened.  What follows
+ * for the handshake and the send window is link.c's. */
+
+enum link_search {
+    LINK_NO_FRAME,  /* no whole one is left among the bytes at hand */
+    LINK_BAD_FRAME, /* passed over, and counted */
+    LINK_FOUND      /* its header is sound, its payload not decoded yet */
+};
+
+/* What a frame that was taken has brought for others. */
+enum link_event {
+    LINK_NOTHING,      /* no frame for them, or a bad one, which is counted */
+    LINK_GREETED,      /* a greeting, in payload */
+    LINK_ACKNOWLEDGED, /* an acknowledgement in its header, and in sack */
+    LINK_FAREWELL,     /* the same, and the peer leaves */
+    LINK_TOO_LONG      /* the same, of a message longer than agreed */
+};
+
+struct link_frame {
+    struct frame_reader reader;
+    struct frame_header header;
+    uint64_t sack;
+    uint8_t payload[LINK_DATAGRAM_MAX];
+};
+
+enum link_fill {
+    LINK_FILL_SOME, /* all bytes that were there */
+    LINK_FILL_MORE, /* all that there was room for; there may be more */
+    LINK_FILL_CLOSED
+};
+
+enum link_search link_find_frame(struct link *link, struct link_frame *frame);
+enum link_event link_take_frame(struct link *link, struct link_frame *frame);
+
+/* Reads from the pipe once. */
+enum link_fill link_fill(struct link *link);
+
+/* The pipe is closed: bytes that are no whole frame yet stay so. */
+void link_forget_bytes(struct link *link);
+
+/* For a new session: whole messages of the old one stay to be read, the rest
+ * goes; the first frame is to have that number. */
+void link_receive_reset(struct link *link, uint16_t first);
+
+/* The send window of a link: which frame goes next, what acknowledgements say
+ * of those that went, and the timer that sends again.  It calls neither the
+ * handshake nor what receives; of the receive window it reads what each frame
+ * reports, and notes that it was reported. */
+
+enum link_flush {
+    LINK_FLUSH_DONE,    /* the pipe has taken all that was staged */
+    LINK_FLUSH_STALLED, /* it takes no more for the present */
+    LINK_FLUSH_CLOSED   /* it is gone */
+};
+
+/* What a frame's header acknowledges; bit i of sack: frame acknowledge + 1 + i
+ * has arrived too. */
+void link_on_acknowledge(struct link *link, const struct frame_header *header,
+                         uint64_t sack);
+
+/* For a new peer, which knows nothing of what was sent to the old one and has
+ * that much credit. */
+void link_send_reset(struct link *link, uint8_t credit);
+
+/* What was on its way when the pipe broke is not coming. */
+void link_send_resume(struct link *link);
+
+/* Retransmission, as long as it is now. */
+uint32_t link_timeout_us(const struct link *link);
+
+/* Whether frames of data, or an acknowledgement alone, may go now. */
+bool link_may_send(const struct link *link);
+bool link_ack_due(const struct link *link);
+
+/* The oldest frame goes again when nothing was heard of it for long; a sender
+ * without credits asks, as the frame that brought them may be lost. */
+void link_run_timer(struct link *link);
+
+/* Whether one more frame of any kind can be staged. */
+bool link_staging_room(const struct link *link);
+
+/* Stages a greeting; or the most urgent of all other frames, false: there is
+ * nothing to say. */
+void link_stage_hello(struct link *link, const uint8_t hello[LINK_HELLO_SIZE]);
+bool link_stage_frame(struct link *link);
+
+/* The pipe is closed: what is staged does not go. */
+void link_forget_staged(struct link *link);
+
+/* Gives the pipe what is staged. */
+enum link_flush link_flush(struct link *link);
+
+/* The handshake of a link: who is at the other end, and whether what comes is
+ * of this session, another, or a new one.  It tells link.c what follows for the
+ * two windows, and touches neither. */
+
+/* What a frame, or a greeting, is to the session. */
+enum link_session {
+    LINK_FOREIGN,  /* of another one, or of none */
+    LINK_PRESENT,  /* of this one */
+    LINK_RESUMED,  /* of this one, which was down until now */
+    LINK_BEGUN,    /* of the first, which begins with it; the peer's credit is
+                      candidate.credit */
+    LINK_RESTARTED /* the same, and the peer was another start before: what was
+                      on its way to that one is lost */
+};
+
+/* By the session of a frame whose header is sound: it proves that its sender
+ * knows both epochs. */
+enum link_session link_accept_session(struct link *link, uint32_t session);
+
+/* A greeting; LINK_FOREIGN: it settles nothing yet.  Otherwise the peer waits
+ * for an acknowledgement. */
+enum link_session link_on_hello(struct link *link,
+                                const struct frame_header *header,
+                                const uint8_t hello[LINK_HELLO_SIZE]);
+
+/* Has a greeting sent soon, but no more often than greetings go. */
+void link_greet(struct link *link);
+
+bool link_hello_due(const struct link *link);
+
+/* The greeting that goes now. */
+void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE]);
+
+/* The peer sent a message longer than agreed. */
+void link_refuse_sizes(struct link *link);
+
+/* A farewell: it is answered where that is asked for. */
+void link_on_bye(struct link *link, const struct frame_header *header);
 
 #endif

@@ -14,20 +14,88 @@
  * shake hashes five short inputs, opens one empty record, and multiplies twice
  * on the curve, where it listens only for who knows the key; all else is linear
  * in the bytes given and taken, and between two good records no more than
- * SECURE_LOST_MAX bytes are opened or skipped in vain.
- *
- *     secure_shake_init(&shake, &self, &seed);
- *     while ((status = secure_shake(&shake, &pipe)) == 0)
- *         wait();
- *     if (status > 0)
- *         secure_records_start(&records, &shake, &pipe);
- *     config.pipe = secure_records_pipe(&records);
- */
+ * SECURE_LOST_MAX bytes are opened or skipped in vain. */
 #ifndef TRANSPORT_SECURE_H
 #define TRANSPORT_SECURE_H
 
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
 #include "link.h"
-#include "secure_seed.h"
+
+/* What the secure layer asks of a library that is known for its cryptography:
+ * keyed BLAKE2b-256 (RFC 7693), X25519 (RFC 7748) and ChaCha20-Poly1305
+ * (RFC 8439).  They are given, so that transport/ stays free of any system;
+ * drivers/secure_sodium.h has those of libsodium. */
+
+enum {
+    SECURE_KEY_BYTES = 32, /* of a key, a point and a secret of X25519 */
+    SECURE_NONCE_BYTES = 24,
+    SECURE_TAG_BYTES = 16,
+    SECURE_HEAD_BYTES = 8 /* of a record: size, its complement, number */
+};
+
+/* seal, open: `size` bytes in, size + SECURE_TAG_BYTES out, or the other way
+ * round; in and out may be the same.  The nonce is 4 zero bytes and the
+ * counter, little-endian; ad: the record's head. */
+struct secure_suite {
+    void (*hash)(uint8_t out[SECURE_KEY_BYTES],
+                 const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
+                 size_t size);
+    /* All zero where the point is of a small order. */
+    void (*x25519)(uint8_t out[SECURE_KEY_BYTES],
+                   const uint8_t secret[SECURE_KEY_BYTES],
+                   const uint8_t point[SECURE_KEY_BYTES]);
+    void (*seal)(uint8_t *out, const uint8_t *in, size_t size,
+                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
+                 const uint8_t key[SECURE_KEY_BYTES]);
+    bool (*open)(uint8_t *out, const uint8_t *in, size_t size,
+                 const uint8_t ad[SECURE_HEAD_BYTES], uint64_t counter,
+                 const uint8_t key[SECURE_KEY_BYTES]);
+};
+
+/* What makes a connection's opening unlike every other under a cube's key: a
+ * nonce, and the secret of its exchange.  They are drawn from a board's random
+ * bytes, or, where it has none, from what never comes again: the device, the
+ * number of its start, the number of the draw.  All of these are hashed under
+ * the key, so that a draw is new if any of them is.  PROTOCOL.md has the bytes.
+ *
+ * Without random bytes whoever knows the cube's key and the device can draw the
+ * same: a wire has forward secrecy if one of its ends at least has random
+ * bytes, or a device that nobody else knows.
+ *
+ * Memory: struct secure_source.  Work: two short hashes, and the board's. */
+
+enum { SECURE_DEVICE_BYTES = 32 };
+
+/* As a board fills it in: random, or device and boot, or all. */
+struct secure_source {
+    /* Fills in bytes that nobody can guess; false: it cannot.  NULL: the board
+     * has no generator. */
+    bool (*random)(void *context, uint8_t *bytes, size_t size);
+    void *context;
+    /* Unlike those of all other devices that ever have the cube's key: an
+     * address, a serial number; better a secret of its own. */
+    uint8_t device[SECURE_DEVICE_BYTES];
+    /* Number of this start of the device, kept where a reset and a loss of
+     * power leave it; raised before it is used; not 0, which says that there is
+     * none. */
+    uint64_t boot;
+    uint64_t draws; /* since that start: 0 at first, counted here */
+};
+
+struct secure_seed {
+    uint8_t nonce[SECURE_NONCE_BYTES]; /* all may know it */
+    uint8_t secret[SECURE_KEY_BYTES];
+};
+
+/* False: the source has neither random bytes at present nor a number of its
+ * start; *seed is all zero then, and not to be used. */
+bool secure_seed_draw(struct secure_source *source,
+                      const struct secure_suite *suite,
+                      const uint8_t key[SECURE_KEY_BYTES],
+                      struct secure_seed *seed);
 
 enum {
     SECURE_RECORD_MAX = 2048, /* bytes of the link in a record */

@@ -16,9 +16,8 @@
 #include "handover.h"
 #include "node/board.h"
 #include "node/identity.h"
-#include "node/loader/budget.h"
-#include "node/questions.h"
-#include "reason.h"
+#include "node/loader/slots.h"
+#include "node/message.h"
 #include "shell.h"
 
 struct bare_node {

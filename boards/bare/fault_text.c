@@ -2,7 +2,7 @@
 
 #include "bare.h"
 #include "console.h"
-#include "reason.h"
+#include "handover.h"
 #include "sections.h"
 
 void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits) {

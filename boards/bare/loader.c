@@ -9,7 +9,7 @@
 #include "as_node.h"
 #include "bare.h"
 #include "fault_text.h"
-#include "node/loader/look.h"
+#include "node/loader/incoming.h"
 #include "node/version.h"
 #include "sign_key.h"
 #include "transport/drivers/sign_sodium.h"

@@ -2,7 +2,6 @@
 #include "as_node.h"
 #include "bare.h"
 #include "fault_text.h"
-#include "node/loader/boots.h"
 #include "node/loader/slots.h"
 #include "node/node.h"
 

@@ -29,7 +29,7 @@
 #include "node/identity.h"
 #include "node/node.h"
 #include "options.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 #include "wire.h"
 
 enum { SANITIZED_STATIC = 8192 };

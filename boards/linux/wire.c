@@ -9,7 +9,7 @@
 
 #include "boards/process.h"
 #include "transport/drivers/secure_sodium.h"
-#include "transport/drivers/wait.h"
+#include "transport/drivers/unix_file.h"
 
 enum { LOOK_US = 500000 };
 

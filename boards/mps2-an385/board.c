@@ -1,6 +1,6 @@
 /* Arm's MPS2 as AN385: a Cortex-M3, five UARTs. */
 #include "boards/bare/bare.h"
-#include "node/loader/flash_ram.h"
+#include "node/loader/flash.h"
 
 /* The PSRAM, which stands for the flash chip that the board has not. */
 static const struct loader_flash flash = LOADER_RAM((void *)0x21000000);

@@ -11,7 +11,7 @@
 
 #include <stdint.h>
 
-#include "node/loader/flash_card.h"
+#include "node/loader/flash.h"
 
 #define RASPI3B_INTERRUPTS UINT32_C(0x3F00B200)
 #define RASPI3B_PM UINT32_C(0x3F100000)

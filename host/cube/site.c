@@ -12,7 +12,7 @@
 #include "host/base/text.h"
 #include "host/base/progress.h"
 #include "host/nodes/port.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 #include "transport/secure_wipe.h"
 
 enum { ASK_US = 100000, IN_BYTES = 4096, OUT_BYTES = 192 };

@@ -14,7 +14,7 @@
 #include "host/base/node_set.h"
 #include "host/service/in_use.h"
 #include "host/service/onlookers.h"
-#include "node/questions.h"
+#include "node/message.h"
 
 enum { HOST_VISIT_ANSWER_BYTES = CUBE_PAYLOAD_MAX };
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "visit.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 #define NO_ANSWER "no answer"
 

@@ -13,10 +13,10 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include "node/loader/messages.h"
+#include "node/loader/image.h"
 #include "transport/drivers/sign_sodium.h"
 #include "host/nodes/cube_file.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 #include "transport/secure_wipe.h"
 #include "host/base/options.h"
 #include "host/base/text.h"

@@ -11,7 +11,7 @@
 #define HOST_SPREAD_H
 
 #include "host/cube/visit.h"
-#include "node/loader/messages.h"
+#include "node/loader/image.h"
 
 enum { HOST_SPREAD_TEXT = 320, HOST_SPREAD_STARTS_MAX = 12 };
 

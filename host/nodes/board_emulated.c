@@ -11,9 +11,8 @@
 
 #include "emulator.h"
 #include "host/formats/source.h"
-#include "node/loader/flash_card.h"
-#include "node/loader/flash_ram.h"
-#include "node/loader/messages.h"
+#include "node/loader/flash.h"
+#include "node/loader/image.h"
 #include "node/loader/slots.h"
 #include "transport/drivers/sign_sodium.h"
 #include "port.h"

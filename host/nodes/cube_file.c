@@ -14,7 +14,7 @@
 
 #include "host/base/text.h"
 #include "host/base/progress.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 #include "transport/secure_wipe.h"
 #include "port.h"
 #include "host/base/create.h"

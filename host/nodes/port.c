@@ -15,7 +15,7 @@
 #include "node/board.h"
 #include "host/base/progress.h"
 #include "host/base/text.h"
-#include "transport/drivers/wait.h"
+#include "transport/drivers/unix_file.h"
 
 /* Ends with the reason in `report`, which a program that begins closes. */
 static _Noreturn void become(const struct host_child *child, pid_t host,

@@ -13,7 +13,7 @@
 
 #include "host/base/error.h"
 #include "transport/link.h"
-#include "transport/drivers/tcp_address.h"
+#include "transport/drivers/tcp.h"
 #include "transport/cube.h"
 #include "transport/drivers/serial_port.h"
 #include "transport/drivers/tcp_wire.h"

@@ -18,7 +18,7 @@
 #include "host/base/progress.h"
 #include "host/formats/output.h"
 #include "host/nodes/board_emulated.h"
-#include "transport/drivers/tcp_address.h"
+#include "transport/drivers/tcp.h"
 
 enum {
     KEY_BOARD = 256,

@@ -7,7 +7,7 @@
 #include "onlookers.h"
 #include "parts.h"
 #include "host/base/progress.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum {
     IN_USE_US_MAX = 5000000,  /* longer than a link keeps to a silent host, */

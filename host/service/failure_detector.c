@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "parts.h"
-#include "node/keepers.h"
+#include "node/setup.h"
 
 enum {
     CHECK_EVERY_US = 20000,

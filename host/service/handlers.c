@@ -4,7 +4,7 @@
 
 #include "parts.h"
 #include "host/service/strategies/strategies.h"
-#include "node/totals.h"
+#include "node/result.h"
 
 /* A message that no sound node sends: what is wrong with it, as printf. */
 __attribute__((format(printf, 3, 4))) static int

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "host/base/progress.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum {
     WAIT_US_MAX = 10000000,  /* for one more node; at most half the patience */

@@ -16,7 +16,7 @@
 
 #include "host/base/node_set.h"
 #include "machine.h"
-#include "node/questions.h"
+#include "node/message.h"
 
 /* The tag of their questions; who else asks takes another. */
 #define HOST_ONLOOKERS_TAG UINT32_MAX

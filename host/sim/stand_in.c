@@ -2,10 +2,9 @@
 
 #include <string.h>
 
-#include "node/arena.h"
-#include "node/counted.h"
+#include "node/setup.h"
 #include "transport/cube_internal.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 #include "sim_stand_ins.h"
 #include "sim_draw.h"
 

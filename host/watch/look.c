@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 #include "host/base/text.h"
-#include "transport/drivers/tcp_address.h"
+#include "transport/drivers/tcp.h"
 #include "host/base/error.h"
 
 /* NODE_PROBE has nodes send to each other: that is not to look. */

@@ -34,7 +34,7 @@
 
 #include "host/base/error.h"
 #include "host/base/node_set.h"
-#include "node/questions.h"
+#include "node/message.h"
 
 /* Who has a wire on this machine. */
 

@@ -5,6 +5,8 @@
 
 #include "transport/bytes.h"
 #include "transport/frame.h"
+#include "incoming.h"
+#include "slots.h"
 
 enum {
     AT_BYTES = 8,
@@ -107,4 +109,211 @@ const char *loader_fault_text(enum loader_fault fault) {
         [LOADER_WORN] = "the board's flash does not hold it",
         [LOADER_TOO_OFTEN] = "too many transfers, or false ones, have begun"};
     return (unsigned)fault < LOADER_FAULTS ? texts[fault] : "it is refused";
+}
+
+/* --- look ----------------------------------------------------------------- */
+
+void loader_look_begin(struct loader_look *look, struct loader_slots *slots,
+                       unsigned slot) {
+    look->slot = slot;
+    look->begun = false;
+    slots->known[slot] = false;
+}
+
+void loader_look_hash(struct loader_look *look,
+                      const struct loader_slots *slots,
+                      const uint8_t header[LOADER_HEADER_BYTES],
+                      const struct loader_image *image, unsigned slot) {
+    const struct sign_suite *suite = slots->rules->suite;
+    look->code = loader_slots_code(slots, slot);
+    look->bytes = image->bytes;
+    look->done = 0;
+    memcpy(look->digest, image->digest, sizeof look->digest);
+    suite->begin(look->hash);
+    suite->add(look->hash, header, LOADER_NAMED_BYTES);
+}
+
+static bool ends_well(struct loader_look *look,
+                      const struct loader_slots *slots) {
+    uint8_t digest[SIGN_DIGEST_BYTES];
+    slots->rules->suite->end(look->hash, digest);
+    return memcmp(digest, look->digest, sizeof digest) == 0;
+}
+
+static void read_header(const struct loader_slots *slots, unsigned slot,
+                        uint8_t header[LOADER_HEADER_BYTES]) {
+    const struct loader_flash *flash = slots->rules->flash;
+    flash->read(flash->context,
+                loader_slots_code(slots, slot) - LOADER_HEADER_BYTES, header,
+                LOADER_HEADER_BYTES);
+}
+
+bool loader_look_slice(struct loader_look *look,
+                       const struct loader_slots *slots, bool *good) {
+    const struct sign_suite *suite = slots->rules->suite;
+    const struct loader_flash *flash = slots->rules->flash;
+    uint32_t left = look->bytes - look->done;
+    uint8_t slice[LOADER_SLICE_BYTES];
+    if (left > 0) {
+        uint32_t size = left < sizeof slice ? left : sizeof slice;
+        flash->read(flash->context, look->code + look->done, slice, size);
+        suite->add(look->hash, slice, size);
+        look->done += size;
+        return true;
+    }
+    *good = ends_well(look, slots);
+    return false;
+}
+
+bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
+                      unsigned slot, const uint8_t *copy) {
+    const struct sign_suite *suite = slots->rules->suite;
+    uint8_t header[LOADER_HEADER_BYTES];
+    read_header(slots, slot, header);
+    loader_look_hash(look, slots, header, &slots->image[slot], slot);
+    while (look->done < look->bytes) {
+        uint32_t left = look->bytes - look->done;
+        uint32_t size = left < LOADER_SLICE_BYTES ? left : LOADER_SLICE_BYTES;
+        suite->add(look->hash, copy + look->done, size);
+        look->done += size;
+        loader_slots_alive(slots);
+    }
+    bool good = ends_well(look, slots);
+    slots->fault[slot] = good ? LOADER_GOOD : LOADER_WRONG_DIGEST;
+    return good;
+}
+
+/* The header, the rules and the signature. */
+static enum loader_fault begin(struct loader_look *look,
+                               struct loader_slots *slots) {
+    const struct loader_rules *rules = slots->rules;
+    struct loader_image *image = &slots->image[look->slot];
+    uint8_t header[LOADER_HEADER_BYTES];
+    read_header(slots, look->slot, header);
+    enum loader_fault fault = loader_slots_suits(slots, header, image);
+    if (fault == LOADER_GOOD) {
+        fault = loader_image_signed(header, rules->suite, rules->key);
+    }
+    if (fault == LOADER_GOOD) {
+        loader_look_hash(look, slots, header, image, look->slot);
+    }
+    return fault;
+}
+
+bool loader_look_step(struct loader_look *look, struct loader_slots *slots) {
+    enum loader_fault fault = LOADER_GOOD;
+    bool good = false;
+    if (!look->begun) {
+        fault = begin(look, slots);
+        look->begun = true;
+    } else if (!loader_look_slice(look, slots, &good)) {
+        fault = good ? LOADER_GOOD : LOADER_WRONG_DIGEST;
+        slots->known[look->slot] = true;
+    }
+    slots->known[look->slot] = slots->known[look->slot] || fault != LOADER_GOOD;
+    slots->fault[look->slot] = fault;
+    return !slots->known[look->slot];
+}
+
+/* --- layout --------------------------------------------------------------- */
+
+enum {
+    LARGE = 64, /* sectors, from which slots begin at */
+    LARGE_FIRST = 16,
+    SMALL_FIRST = 5,
+    SLOT_BYTES_MAX = 1 << 20,
+    PIECE = 64 /* bytes that are compared at a time */
+};
+
+static_assert(SLOT_BYTES_MAX / LOADER_BLOCK_BYTES < LOADER_BLOCKS_MAX,
+              "a slot's blocks fit a map");
+
+uint32_t loader_marks_in(const struct loader_flash *flash) {
+    return flash->page_bytes > LOADER_HEADER_BYTES ? flash->page_bytes
+                                                   : LOADER_HEADER_BYTES;
+}
+
+uint32_t loader_mark_apart(const struct loader_flash *flash) {
+    return loader_flash_apart(flash, LOADER_MARK_BYTES);
+}
+
+struct loader_layout loader_layout(const struct loader_flash *flash) {
+    struct loader_layout layout;
+    memset(&layout, 0, sizeof layout);
+    layout.first = flash->sectors >= LARGE ? LARGE_FIRST : SMALL_FIRST;
+    if (flash->sectors <= layout.first) {
+        return layout;
+    }
+    uint32_t most = SLOT_BYTES_MAX / flash->sector_bytes;
+    layout.sectors = (flash->sectors - layout.first) / LOADER_SLOTS;
+    layout.sectors = layout.sectors < most ? layout.sectors : most;
+    uint32_t blocks = layout.sectors * flash->sector_bytes / LOADER_BLOCK_BYTES;
+    uint32_t marks =
+        loader_marks_in(flash) + loader_mark_apart(flash) * (blocks + 1);
+    layout.journal = (marks + flash->sector_bytes - 1) / flash->sector_bytes;
+    if (layout.sectors > layout.journal) {
+        layout.bytes = (layout.sectors - layout.journal) * flash->sector_bytes;
+    }
+    return layout;
+}
+
+uint32_t loader_slot_at(const struct loader_layout *layout,
+                        const struct loader_flash *flash, unsigned slot) {
+    return (layout->first + slot * layout->sectors) * flash->sector_bytes;
+}
+
+uint32_t loader_journal_at(const struct loader_layout *layout,
+                           const struct loader_flash *flash, unsigned slot) {
+    return loader_slot_at(layout, flash, slot) +
+           (layout->sectors - layout->journal) * flash->sector_bytes;
+}
+
+bool loader_flash_put(const struct loader_flash *flash, uint32_t at,
+                      const void *bytes, uint32_t size) {
+    const uint8_t *in = bytes;
+    bool taken = true;
+    for (uint32_t done = 0; done < size;) {
+        uint32_t left = flash->page_bytes - (at + done) % flash->page_bytes;
+        uint32_t part = left < size - done ? left : size - done;
+        taken =
+            flash->program(flash->context, at + done, in + done, part) && taken;
+        done += part;
+    }
+    return taken && loader_flash_holds(flash, at, bytes, size);
+}
+
+/* bytes NULL: 0xff all; takes: bits that are set in the flash may differ. */
+static bool compare(const struct loader_flash *flash, uint32_t at,
+                    const uint8_t *bytes, uint32_t size, bool takes) {
+    uint8_t piece[PIECE];
+    for (uint32_t done = 0; done < size; done += PIECE) {
+        uint32_t part = size - done < PIECE ? size - done : PIECE;
+        flash->read(flash->context, at + done, piece, part);
+        for (uint32_t i = 0; i < part; i++) {
+            uint8_t wanted = bytes == NULL ? 0xff : bytes[done + i];
+            if ((takes ? piece[i] & wanted : piece[i]) != wanted) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+bool loader_flash_holds(const struct loader_flash *flash, uint32_t at,
+                        const void *bytes, uint32_t size) {
+    return compare(flash, at, bytes, size, false);
+}
+
+bool loader_flash_takes(const struct loader_flash *flash, uint32_t at,
+                        const void *bytes, uint32_t size) {
+    return compare(flash, at, bytes, size, true);
+}
+
+bool loader_flash_blank(const struct loader_flash *flash, uint32_t at,
+                        uint32_t size) {
+    return compare(flash, at, NULL, size, false);
+}
+
+bool loader_flash_clear(const struct loader_flash *flash, uint32_t at) {
+    return flash->erase(flash->context, at / flash->sector_bytes);
 }

@@ -15,18 +15,12 @@
  * | 96 | 32 | public key of its signer; zeros: it is not signed |
  * | 128 | 64 | Ed25519 signature of bytes 0 .. 127 |
  * | 192 | 60 | zeros, or it is no header: no signature covers them |
- * | 252 | 4 | CRC-32C of bytes 0 .. 251 |
- *
- * Memory: the struct.  Work: a pass over the header.
- *
- *     struct loader_image image;
- *     if (loader_image_unpack(&image, bytes) != LOADER_GOOD)
- *         return -1; // no header of an image
- */
+ * | 252 | 4 | CRC-32C of bytes 0 .. 251 | */
 #ifndef NODE_LOADER_IMAGE_H
 #define NODE_LOADER_IMAGE_H
 
 #include "transport/sign_suite.h"
+#include "node/message.h"
 
 enum {
     LOADER_HEADER_BYTES = 256,
@@ -76,5 +70,96 @@ enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
 
 /* "it is signed with another key", for a message; NULL: LOADER_GOOD. */
 const char *loader_fault_text(enum loader_fault fault);
+
+/* What the host and boards' loaders say to each other to bring an image to
+ * boards, all at once: BEGIN and the BLOCKs go to all nodes along the cube's
+ * tree; who does not want them passes them over.  A loader that is busy with
+ * its flash leaves what comes unread, which holds up the links behind it, and
+ * so the host.  Then each is asked what it lacks, and those blocks go again.
+ * Whatever is repeated changes nothing.
+ *
+ * Memory: none.  Work: none.  Layouts as in node/message.h. */
+
+enum {
+    LOADER_BLOCK_BYTES = 1536, /* of an image, the last may have fewer; a whole
+                                  number of a flash's pages */
+    LOADER_BLOCKS_MAX = 2048,  /* of an image */
+    LOADER_IMAGE_MAX = LOADER_BLOCKS_MAX * LOADER_BLOCK_BYTES, /* its bytes */
+    LOADER_MAP_BYTES = LOADER_BLOCKS_MAX / 8
+};
+
+/* To all: an image is to come.  Block 0 begins with the header, which comes
+ * here already: a board that it is for, and that does not have it, makes a slot
+ * ready, or goes on with one in which parts of the same image are. */
+struct loader_begin_message {
+    uint32_t transfer; /* of this visit of the host: any number but 0 */
+    uint32_t bytes;    /* of the image, its header included */
+    uint8_t nodes[CUBE_NODES_MAX / 8]; /* who is meant: node i in bit i % 8 of
+                                          byte i / 8 */
+    uint8_t header[LOADER_HEADER_BYTES];
+};
+
+/* To all, or to one.  The bytes follow. */
+struct loader_block_message {
+    uint32_t transfer;
+    uint32_t block; /* its number, from 0 */
+    uint32_t crc;   /* CRC-32C of its bytes */
+};
+
+/* To all, or to one: NODE_IMAGE_STATE is wanted.  It also comes unasked, once
+ * all blocks are there, or verified, or the image is refused. */
+struct loader_ask_message {
+    uint32_t transfer;
+};
+
+enum loader_order {
+    LOADER_VERIFY = 1, /* what has come whole: digest and signature */
+    LOADER_BOOT,       /* restart, and start the newest good image */
+    LOADER_NAME        /* takes `serial` for its number, if it has none; only
+                          within a transfer whose signature was verified */
+};
+
+/* To one board, or to all boards in that transfer. */
+struct loader_do_message {
+    uint32_t transfer; /* 0: whatever it is in */
+    uint32_t what;     /* enum loader_order */
+    uint8_t serial[NODE_SERIAL_BYTES];
+};
+
+enum loader_phase {
+    LOADER_WAITS = 1, /* in no transfer */
+    LOADER_THERE,     /* the image is the one that it has already */
+    LOADER_TAKES,     /* blocks */
+    LOADER_WHOLE,     /* all blocks are in the flash */
+    LOADER_VERIFIED,  /* the next start will be of this image */
+    LOADER_REFUSES    /* `fault` says why */
+};
+
+struct loader_state_message {
+    uint32_t transfer;
+    uint32_t phase;                /* enum loader_phase */
+    uint32_t fault;                /* enum loader_fault */
+    uint32_t blocks, held;         /* of the image, and that it has */
+    uint32_t erased, programmed;   /* sectors and pages, since its start */
+    uint32_t reserved;             /* 0 */
+    uint8_t map[LOADER_MAP_BYTES]; /* block i: bit i % 8 of byte i / 8 */
+};
+
+/* So much of it goes: of the map what says something, as answers of many come
+ * over one wire. */
+static inline uint32_t
+loader_state_bytes(const struct loader_state_message *state) {
+    uint32_t map = state->phase == LOADER_TAKES ? (state->blocks + 7) / 8 : 0;
+    return (uint32_t)sizeof *state - LOADER_MAP_BYTES + map;
+}
+
+static_assert(sizeof(struct loader_begin_message) ==
+                  8 + CUBE_NODES_MAX / 8 + LOADER_HEADER_BYTES,
+              "begin layout");
+static_assert(sizeof(struct loader_block_message) + LOADER_BLOCK_BYTES <=
+                  CUBE_PAYLOAD_MAX,
+              "a block fits a message");
+static_assert(sizeof(struct loader_state_message) == 32 + LOADER_MAP_BYTES,
+              "state layout");
 
 #endif

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "layout.h"
+#include "slots.h"
 #include "transport/bytes.h"
 #include "transport/frame.h"
 

@@ -14,19 +14,45 @@
  * verified, is limited (budget.h).
  *
  * Memory: struct loader_incoming.  Work: a step erases a sector, programs a
- * block, looks at 4 blocks, hashes a slice, or proves a signature.
- *
- *     loader_incoming_begin(&incoming, header, image_bytes);
- *     while (loader_incoming_busy(&incoming))
- *         loader_incoming_step(&incoming);
- *     if (incoming.phase == LOADER_TAKES)
- *         loader_incoming_block(&incoming, 0, block, LOADER_BLOCK_BYTES, crc);
- */
+ * block, looks at 4 blocks, hashes a slice, or proves a signature. */
 #ifndef NODE_LOADER_INCOMING_H
 #define NODE_LOADER_INCOMING_H
 
-#include "look.h"
-#include "messages.h"
+#include <stdalign.h>
+
+#include "slots.h"
+#include "image.h"
+
+/* A look at a slot, slice by slice: whether its image may be started. */
+
+struct loader_look {
+    alignas(64) uint8_t hash[SIGN_HASH_BYTES];
+    unsigned slot;
+    uint32_t code, bytes, done; /* of the code: where it is in the flash */
+    uint8_t digest[SIGN_DIGEST_BYTES]; /* that it should have */
+    bool begun;
+};
+
+void loader_look_begin(struct loader_look *look, struct loader_slots *slots,
+                       unsigned slot);
+
+/* False: it is over, and slots->fault of the slot says how. */
+bool loader_look_step(struct loader_look *look, struct loader_slots *slots);
+
+/* The parts of it, for an image whose header is not in the slot yet: of the
+ * header's LOADER_NAMED_BYTES, then slice by slice; false: *good tells. */
+void loader_look_hash(struct loader_look *look,
+                      const struct loader_slots *slots,
+                      const uint8_t header[LOADER_HEADER_BYTES],
+                      const struct loader_image *image, unsigned slot);
+bool loader_look_slice(struct loader_look *look,
+                       const struct loader_slots *slots, bool *good);
+
+/* Whether a copy of a good slot's code, in memory where it is to run, is what
+ * was signed, whatever the flash gives by now; else the slot is good no more.
+ */
+bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
+                      unsigned slot, const uint8_t *copy);
 
 /* What is under way. */
 enum loader_work {

@@ -5,13 +5,11 @@
 #include "incode/predicates/check.h"
 #include "incoming.h"
 #include "node/answers.h"
-#include "node/arena.h"
-#include "node/configure.h"
-#include "node/fault.h"
+#include "node/setup.h"
 #include "node/looks.h"
 #include "node/version.h"
 #include "transport/text.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum { IDLE_MAX_US = 100000 };
 

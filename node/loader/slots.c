@@ -1,13 +1,12 @@
 #include "slots.h"
 
+#include <stddef.h>
 #include <string.h>
 
-#include "boots.h"
-#include "layout.h"
-#include "look.h"
-#include "records.h"
+#include "incoming.h"
 #include "transport/bytes.h"
 #include "transport/frame.h"
+#include "incode/predicates/check.h"
 
 enum {
     STATE_MARK = 0x31415453,  /* "STA1" */
@@ -287,4 +286,198 @@ bool loader_slots_name(const struct loader_flash *flash,
     bytes_put32(record + 4 + LOADER_SERIAL_BYTES,
                 frame_crc32c(0, record, 4 + LOADER_SERIAL_BYTES));
     return loader_flash_put(flash, at, record, sizeof record);
+}
+
+/* --- budget --------------------------------------------------------------- */
+
+enum { MAGIC = 0x31474442 /* "BDG1" */ };
+
+static const struct {
+    uint32_t at_once, period_s;
+} limits[LOADER_EXPENSES] = {[LOADER_STARTS] = {1000, 60},
+                             [LOADER_TRANSFERS] = {100, 4 * 3600},
+                             [LOADER_FALSE] = {6, 10}};
+
+static uint32_t sum(const struct loader_budget *budget) {
+    return frame_crc32c(0, budget, offsetof(struct loader_budget, crc));
+}
+
+void loader_budget_open(struct loader_budget *budget) {
+    if (budget->magic != MAGIC || budget->crc != sum(budget)) {
+        *budget = (struct loader_budget){.magic = MAGIC};
+    }
+    budget->passed_s = 0;
+    budget->crc = sum(budget);
+}
+
+void loader_budget_pass(struct loader_budget *budget, uint64_t now_us) {
+    uint32_t now_s = (uint32_t)(now_us / 1000000);
+    uint32_t passed_s = now_s - budget->passed_s;
+    if (passed_s == 0) {
+        return;
+    }
+    budget->passed_s = now_s;
+    for (unsigned i = 0; i < LOADER_EXPENSES; i++) {
+        uint32_t *debt_s = &budget->debt_s[i];
+        *debt_s -= passed_s < *debt_s ? passed_s : *debt_s;
+    }
+    budget->crc = sum(budget);
+}
+
+bool loader_budget_has(const struct loader_budget *budget,
+                       enum loader_expense what) {
+    return budget->debt_s[what] <=
+           (limits[what].at_once - 1) * limits[what].period_s;
+}
+
+bool loader_budget_take(struct loader_budget *budget,
+                        enum loader_expense what) {
+    if (!loader_budget_has(budget, what)) {
+        return false;
+    }
+    budget->debt_s[what] += limits[what].period_s;
+    budget->crc = sum(budget);
+    return true;
+}
+
+/* --- records -------------------------------------------------------------- */
+
+enum {
+    SECTORS = 2,
+    AT_BODY = 8,
+    TRIES = 4 /* records, where some cannot be written */
+};
+
+/* What a sector holds. */
+struct sector {
+    uint32_t largest; /* 0: no record */
+    uint32_t at;      /* bytes to that one */
+    uint32_t torn;    /* records behind that one which are none */
+    uint32_t end;     /* bytes up to the first that was never written */
+};
+
+/* Of a record whose body is there. */
+static void seal(const struct loader_records *records, uint8_t *record,
+                 uint32_t number) {
+    uint32_t size = records->bytes - 4;
+    bytes_put32(record, records->mark);
+    bytes_put32(record + 4, number);
+    bytes_put32(record + size, frame_crc32c(0, record, size));
+}
+
+/* 0: it is none. */
+static uint32_t number_of(const struct loader_records *records,
+                          const uint8_t *record) {
+    uint8_t whole[LOADER_RECORD_MAX];
+    memcpy(whole, record, records->bytes);
+    seal(records, whole, bytes_get32(record + 4));
+    return memcmp(record, whole, records->bytes) == 0 ? bytes_get32(record + 4)
+                                                      : 0;
+}
+
+static bool erased(const uint8_t *record, uint32_t bytes) {
+    for (uint32_t i = 0; i < bytes; i++) {
+        if (record[i] != 0xff) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static uint32_t begin_of(const struct loader_records *records,
+                         unsigned sector) {
+    return (records->first + sector) * records->flash->sector_bytes;
+}
+
+static struct sector look(const struct loader_records *records,
+                          unsigned sector) {
+    const struct loader_flash *flash = records->flash;
+    struct sector found = {0, 0, 0, 0};
+    uint8_t record[LOADER_RECORD_MAX];
+    uint32_t apart = loader_flash_apart(flash, records->bytes);
+    for (uint32_t at = 0; at < flash->sector_bytes; at += apart) {
+        flash->read(flash->context, begin_of(records, sector) + at, record,
+                    records->bytes);
+        if (erased(record, records->bytes)) {
+            continue;
+        }
+        uint32_t number = number_of(records, record);
+        found.end = at + apart;
+        found.torn++;
+        if (number > found.largest) {
+            found.largest = number;
+            found.at = at;
+            found.torn = 0;
+        }
+    }
+    return found;
+}
+
+uint32_t loader_records_newest(const struct loader_records *records,
+                               void *body) {
+    struct sector found[SECTORS] = {look(records, 0), look(records, 1)};
+    const struct loader_flash *flash = records->flash;
+    unsigned last = found[1].largest > found[0].largest;
+    if (found[last].largest > 0) {
+        flash->read(flash->context,
+                    begin_of(records, last) + found[last].at + AT_BODY, body,
+                    records->bytes - LOADER_RECORD_OWN);
+    }
+    return found[last].largest;
+}
+
+/* Whether the flash holds it afterwards. */
+static bool put(const struct loader_records *records, uint32_t at,
+                const void *body, uint32_t number) {
+    const struct loader_flash *flash = records->flash;
+    uint8_t record[LOADER_RECORD_MAX], read[LOADER_RECORD_MAX];
+    memcpy(record + AT_BODY, body, records->bytes - LOADER_RECORD_OWN);
+    seal(records, record, number);
+    bool taken = flash->program(flash->context, at, record, records->bytes);
+    flash->read(flash->context, at, read, records->bytes);
+    return taken && memcmp(record, read, records->bytes) == 0;
+}
+
+/* The sector that was not the last to be written is erased before it is, so
+ * that what an interrupted erasure has left there does not matter. */
+bool loader_records_append(const struct loader_records *records,
+                           const void *body, uint32_t *number) {
+    const struct loader_flash *flash = records->flash;
+    INCODE_ASSERT(records->bytes <= LOADER_RECORD_MAX &&
+                  flash->page_bytes % records->bytes == 0);
+    struct sector found[SECTORS] = {look(records, 0), look(records, 1)};
+    unsigned last = found[1].largest > found[0].largest;
+    uint32_t next = found[last].largest + found[last].torn;
+    uint32_t end = found[last].end;
+    if (found[last].largest == 0) { /* the first of all */
+        last = 1;
+        next = 0;
+        end = flash->sector_bytes;
+    }
+    for (unsigned i = 0; i < TRIES; i++) {
+        if (end == flash->sector_bytes) {
+            last = 1 - last;
+            end = 0;
+            if (!flash->erase(flash->context, records->first + last)) {
+                return false;
+            }
+        }
+        next++;
+        if (put(records, begin_of(records, last) + end, body, next)) {
+            *number = next;
+            return true;
+        }
+        end += loader_flash_apart(flash, records->bytes);
+    }
+    return false;
+}
+
+/* --- boots ---------------------------------------------------------------- */
+
+enum { MARK = 0x31544f42 /* "BOT1" */ };
+
+bool loader_boots_next(const struct loader_flash *flash, uint32_t *boot) {
+    static const uint8_t body[LOADER_BOOT_BYTES - LOADER_RECORD_OWN];
+    const struct loader_records records = {flash, 0, MARK, LOADER_BOOT_BYTES};
+    return loader_records_append(&records, body, boot);
 }

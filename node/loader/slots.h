@@ -12,19 +12,129 @@
  *
  * Memory: struct loader_slots; a hash of SIGN_HASH_BYTES on the stack.
  * Work: loader_slots_choose reads the image that it chooses once for its
- * digest, and proves its signature; the others program one record.
- *
- *     unsigned slot = loader_slots_start(&slots, &rules, ended_badly, &boot);
- *     if (slot < LOADER_SLOTS && loader_slots_try(&slots))
- *         flash->read(flash->context, loader_slots_code(&slots, slot),
- *                     to, slots.image[slot].bytes); // loader_look_copy
- */
+ * digest, and proves its signature; the others program one record. */
 #ifndef NODE_LOADER_SLOTS_H
 #define NODE_LOADER_SLOTS_H
 
-#include "budget.h"
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "flash.h"
 #include "image.h"
+
+/* Limits on what messages can order that wears a board's flash or keeps its
+ * loader busy: a number of times at once, then one in each period, whatever
+ * orders it.  The counts are in memory that outlasts a restart.  Only a loss of
+ * power resets them, and no message can cause that.
+ *
+ * |            | at once | then one in | what it bounds |
+ * |------------|---------|-------------|----------------|
+ * | starts     |   1,000 | 60 s        | records in boots.h's two sectors |
+ * | transfers  |     100 | 4 h         | erasures of a slot: 3 of each sector a
+ * |            |         |             | transfer |
+ * | false      |       6 | 10 s        | proofs of signatures that were false |
+ *
+ * So a flash that bears 100,000 erasures of a sector lasts for 96 years of
+ * starts at the limit, as a sector of 4 KB holds 256 records, and for 15 years
+ * of transfers at the limit. */
+
+enum loader_expense {
+    LOADER_STARTS,
+    LOADER_TRANSFERS, /* for which a slot is made ready */
+    LOADER_FALSE,     /* headers whose signature was false */
+    LOADER_EXPENSES
+};
+
+struct loader_budget {
+    uint32_t magic;
+    uint32_t debt_s[LOADER_EXPENSES]; /* until the full number is free again */
+    uint32_t passed_s; /* since this start, already subtracted from the debts */
+    uint32_t crc;
+};
+
+/* At a start of any program: goes on with the counts of the start before.
+ * Memory without valid counts begins with none. */
+void loader_budget_open(struct loader_budget *budget);
+
+/* now_us: since the start.  To be called at least once a second: time that is
+ * not counted frees nothing. */
+void loader_budget_pass(struct loader_budget *budget, uint64_t now_us);
+
+/* Whether `what` may be done now; _take also counts it as done. */
+bool loader_budget_has(const struct loader_budget *budget,
+                       enum loader_expense what);
+bool loader_budget_take(struct loader_budget *budget, enum loader_expense what);
+
+/* Records of one size in two sectors of a flash, one behind the other, in
+ * turns, each with a number larger than all before: the newest one counts.  One
+ * that was not written whole, as power was lost, is passed over, and its number
+ * too, as it may be read as whole one day. */
+
+enum {
+    LOADER_RECORD_OWN = 12, /* bytes of a record that are not its body */
+    LOADER_RECORD_MAX = 32
+};
+
+struct loader_records {
+    const struct loader_flash *flash;
+    uint32_t first; /* of its two sectors */
+    uint32_t mark;  /* with which a record of this kind begins */
+    uint32_t bytes; /* of a record, at most LOADER_RECORD_MAX; it divides a
+                       page */
+};
+
+/* The body of the newest, and its number; 0: there is none. */
+uint32_t loader_records_newest(const struct loader_records *records,
+                               void *body);
+
+/* *number: of this one, 1 or more.  False: it could not be written. */
+bool loader_records_append(const struct loader_records *records,
+                           const void *body, uint32_t *number);
+
+/* Where things are in a board's flash, whatever its sectors and pages: see
+ * slots.h. */
+
+enum {
+    LOADER_STATE_SECTOR = 2, /* and the next */
+    LOADER_SERIAL_SECTOR = 4,
+    LOADER_MARK_BYTES = 4 /* of a block, in a journal */
+};
+
+struct loader_layout {
+    uint32_t first;   /* sector of slot 0 */
+    uint32_t sectors; /* of a slot, its journal included */
+    uint32_t journal; /* sectors of that */
+    uint32_t bytes;   /* of an image at most, its header included; 0: the flash
+                         is too small for two slots */
+};
+
+struct loader_layout loader_layout(const struct loader_flash *flash);
+
+/* Bytes from the flash's beginning to a slot, and to its journal. */
+uint32_t loader_slot_at(const struct loader_layout *layout,
+                        const struct loader_flash *flash, unsigned slot);
+uint32_t loader_journal_at(const struct loader_layout *layout,
+                           const struct loader_flash *flash, unsigned slot);
+
+/* From the journal's beginning to the first mark, and from one to the next. */
+uint32_t loader_marks_in(const struct loader_flash *flash);
+uint32_t loader_mark_apart(const struct loader_flash *flash);
+
+/* Programs bytes page by page.  False: the flash does not hold them then. */
+bool loader_flash_put(const struct loader_flash *flash, uint32_t at,
+                      const void *bytes, uint32_t size);
+
+/* Whether the flash holds these bytes; whether it would hold them without an
+ * erasure; and whether it holds 0xff alone. */
+bool loader_flash_holds(const struct loader_flash *flash, uint32_t at,
+                        const void *bytes, uint32_t size);
+bool loader_flash_takes(const struct loader_flash *flash, uint32_t at,
+                        const void *bytes, uint32_t size);
+bool loader_flash_blank(const struct loader_flash *flash, uint32_t at,
+                        uint32_t size);
+
+/* The sector in which these bytes begin. */
+bool loader_flash_clear(const struct loader_flash *flash, uint32_t at);
 
 enum {
     LOADER_SLOTS = 2, /* and for none */
@@ -137,5 +247,18 @@ bool loader_slots_serial(const struct loader_flash *flash,
                          uint8_t serial[LOADER_SERIAL_BYTES]);
 bool loader_slots_name(const struct loader_flash *flash,
                        const uint8_t serial[LOADER_SERIAL_BYTES]);
+
+/* The number of a board's start, which never comes again: records in the first
+ * two sectors of its flash, one behind the other, in turns.  A record that was
+ * not written whole, as power was lost, is passed over, and its number too.
+ *
+ * Memory: the flash's.  Work: reads both sectors, programs one record; once a
+ * sector is full, erases the other. */
+
+enum { LOADER_BOOT_BYTES = 16 /* of a record: it divides a page */ };
+
+/* 1 at the first start, and larger than ever before at each: recorded before it
+ * is told.  False: it could not be. */
+bool loader_boots_next(const struct loader_flash *flash, uint32_t *boot);
 
 #endif

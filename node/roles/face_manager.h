@@ -15,10 +15,10 @@
 #ifndef NODE_FACE_MANAGER_H
 #define NODE_FACE_MANAGER_H
 
-#include "carrier.h"
+#include "lists.h"
 #include "incode/paper/manager.h"
-#include "jobs.h"
-#include "node/pace.h"
+#include "triangulation.h"
+#include "node/setup.h"
 #include "outlet.h"
 
 struct node_face_manager {

@@ -4,7 +4,7 @@
 
 #include "incode/pages/sound.h"
 #include "incode/predicates/check.h"
-#include "node/keepers.h"
+#include "node/setup.h"
 #include "node/page_check.h"
 
 struct frame {

@@ -6,20 +6,35 @@
  * place for the answers to each list that is out, which is kept before the list
  * leaves, so that whatever comes is read.  Where memory has fewer places than
  * builders may have lists, fewer lists are out.  Work: a look at the builders a
- * list, else constant.
- *
- *     node_lists_init(&lists, memory, 8, NODE_LIST, 2, &counted, &fault);
- *     node_lists_add(&lists, builder);
- *     struct node_carrier carrier = node_lists_carrier(&lists);
- */
+ * list, else constant. */
 #ifndef NODE_LISTS_H
 #define NODE_LISTS_H
 
-#include "carrier.h"
-#include "node/counted.h"
-#include "node/fault.h"
+#include <stdbool.h>
+#include <stddef.h>
+
+#include "node/setup.h"
 #include "node/message.h"
-#include "node/outbox.h"
+#include "node/result.h"
+
+/* What carries lists of faces from a face manager to tetrahedron builders, and
+ * answers back: messages from node to node (lists.h), or a tuple space.  Each
+ * end sees the same: a manager sends struct incode_list and is sent struct
+ * incode_answers, a builder the other way round, as many bytes of them as are
+ * in use (incode/paper/list.h). */
+
+struct node_carrier {
+    void *context;
+    /* Whether it takes something to send now.  It must have room for what is
+     * sent back before it does. */
+    bool (*has_room)(void *context);
+    /* Sends, where it has room. */
+    void (*send)(void *context, const void *data, size_t size);
+    /* What was sent to this end and waits, one of them: the same until it is
+     * dropped; NULL: nothing. */
+    const void *(*first)(void *context, size_t *size);
+    void (*drop)(void *context);
+};
 
 struct node_lists {
     struct node_counted *counted;

@@ -1,9 +1,9 @@
-#include "loans.h"
+#include "lending.h"
 
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/arena.h"
+#include "node/setup.h"
 
 /* ---- sets of nodes ---- */
 

@@ -13,9 +13,7 @@
 #define NODE_OUTLET_H
 
 #include "incode/front/job.h"
-#include "node/counted.h"
-#include "node/fault.h"
-#include "node/outbox.h"
+#include "node/setup.h"
 #include "node/result.h"
 
 struct node_outlet {

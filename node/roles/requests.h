@@ -17,8 +17,7 @@
 
 #include "incode/pages/pager.h"
 #include "lending.h"
-#include "node/counted.h"
-#include "node/fault.h"
+#include "node/setup.h"
 #include "node/message.h"
 #include "node/page_check.h"
 

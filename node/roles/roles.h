@@ -19,11 +19,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "node/arena.h"
-#include "node/counted.h"
-#include "node/fault.h"
+#include "node/setup.h"
 #include "node/message.h"
-#include "node/pace.h"
 
 struct node_role {
     /* As statistics name it. */

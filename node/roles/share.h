@@ -19,9 +19,8 @@
 #ifndef NODE_SHARE_H
 #define NODE_SHARE_H
 
-#include "carrier.h"
-#include "node/counted.h"
-#include "node/fault.h"
+#include "lists.h"
+#include "node/setup.h"
 #include "node/message.h"
 #include "transport/tuples/tuples.h"
 

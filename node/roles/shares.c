@@ -1,10 +1,10 @@
-#include "shares.h"
+#include "lending.h"
 
 #include <string.h>
 
 #include "incode/pages/bricks.h"
 #include "incode/predicates/check.h"
-#include "node/arena.h"
+#include "node/setup.h"
 
 enum { OTHERS_MAX = 3 /* owners of the other vertices of a tetrahedron */ };
 

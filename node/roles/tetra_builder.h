@@ -14,9 +14,9 @@
 #ifndef NODE_TETRA_BUILDER_H
 #define NODE_TETRA_BUILDER_H
 
-#include "carrier.h"
+#include "lists.h"
 #include "incode/paper/builder.h"
-#include "node/pace.h"
+#include "node/setup.h"
 #include "requests.h"
 
 struct node_tetra_builder {

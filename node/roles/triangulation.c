@@ -3,8 +3,81 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/arena.h"
-#include "node/keepers.h"
+#include "node/setup.h"
+#include "worker.h"
+
+void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,
+                    struct node_fault *fault) {
+    memset(jobs, 0, sizeof *jobs);
+    jobs->bricks = bricks;
+    jobs->fault = fault;
+}
+
+/* Its bricks are the setup's, its box is one of numbers, if it has points. */
+static bool job_is_sound(const struct node_jobs *jobs,
+                         const struct node_job_message *job) {
+    const struct incode_job *j = &job->job;
+    if (j->first > j->last || j->last > jobs->bricks) {
+        node_fault_set(jobs->fault, "invalid job: bricks #..#", j->first,
+                       j->last);
+        return false;
+    }
+    if (job->epoch == 0) {
+        node_fault_set(jobs->fault, "invalid job: epoch 0", 0, 0);
+        return false;
+    }
+    if (job->reserved != 0) {
+        node_fault_set(jobs->fault, "invalid job: what is reserved is #",
+                       job->reserved, 0);
+        return false;
+    }
+    for (int d = 0; d < 3 && j->first < j->last; d++) {
+        if (!__builtin_isfinite(j->lo[d]) || !__builtin_isfinite(j->hi[d]) ||
+            j->lo[d] > j->hi[d]) {
+            node_fault_set(jobs->fault,
+                           "invalid job: the box of bricks #..# is empty or "
+                           "infinite",
+                           j->first, j->last);
+            return false;
+        }
+    }
+    return true;
+}
+
+bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
+                    uint64_t now_us, struct incode_job *job) {
+    struct node_job_message given;
+    if (message->size != sizeof given) {
+        node_fault_set(jobs->fault, "job in # bytes, expected #", message->size,
+                       sizeof given);
+        return false;
+    }
+    memcpy(&given, message->data, sizeof given);
+    if (jobs->working) {
+        node_fault_set(jobs->fault, "job # before job # is done", given.epoch,
+                       jobs->epoch);
+        return false;
+    }
+    if (!job_is_sound(jobs, &given)) {
+        return false;
+    }
+    jobs->epoch = given.epoch;
+    jobs->working = true;
+    jobs->start_us = now_us;
+    *job = given.job;
+    return true;
+}
+
+void node_jobs_end(struct node_jobs *jobs, uint64_t now_us) {
+    jobs->wall_us += now_us - jobs->start_us;
+    jobs->working = false;
+}
+
+uint64_t node_jobs_wall_us(const struct node_jobs *jobs, uint64_t now_us) {
+    return jobs->wall_us + (jobs->working ? now_us - jobs->start_us : 0);
+}
+
+/* --- triangulation -------------------------------------------------------- */
 
 enum { HOLD_US = NODE_PACE_US }; /* that messages wait for others, at most */
 
@@ -212,3 +285,106 @@ void node_triangulation_map(const struct node_triangulation *t,
     }
     map->pages = (uint32_t)m->frame_count;
 }
+
+/* --- worker --------------------------------------------------------------- */
+
+struct worker {
+    struct node_fault *fault;
+    struct node_triangulation triangulation;
+};
+
+static size_t worker_arena_min(size_t memory,
+                               const struct node_setup_message *setup) {
+    return node_aligned(sizeof(struct worker)) +
+           node_triangulation_min(memory, setup);
+}
+
+static bool worker_start(void *self, size_t bytes,
+                         const struct node_setup_message *setup,
+                         struct node_counted *counted,
+                         struct node_fault *fault) {
+    struct worker *w = self;
+    const struct incode_front_peers none = {NULL, NULL, NULL};
+    if (bytes < sizeof *w) {
+        node_fault_set(fault, "the node's memory does not hold its role", 0, 0);
+        return false;
+    }
+    memset(w, 0, sizeof *w);
+    w->fault = fault;
+    return node_triangulation_start(&w->triangulation, self, bytes,
+                                    node_aligned(sizeof *w), setup, &none, NULL,
+                                    counted, fault);
+}
+
+static void worker_message(void *self, const struct cube_message *message,
+                           uint64_t now_us) {
+    struct worker *w = self;
+    if (!node_triangulation_message(&w->triangulation, message, now_us)) {
+        node_fault_set(w->fault, "message of type # for a worker",
+                       message->type, 0);
+    }
+}
+
+static unsigned worker_work(void *self, struct node_pace *pace) {
+    struct worker *w = self;
+    return node_triangulation_work(&w->triangulation, pace);
+}
+
+static unsigned worker_send(void *self) {
+    struct worker *w = self;
+    return node_triangulation_send(&w->triangulation);
+}
+
+static uint32_t worker_awaited(const void *self) {
+    const struct worker *w = self;
+    return incode_triangulator_awaited(w->triangulation.triangulator);
+}
+
+static uint32_t worker_held(const void *self) {
+    const struct worker *w = self;
+    return node_triangulation_held(&w->triangulation);
+}
+
+static uint32_t worker_done(const void *self) {
+    const struct worker *w = self;
+    return node_triangulation_done(&w->triangulation);
+}
+
+static void worker_end(void *self, uint64_t now_us) {
+    struct worker *w = self;
+    node_triangulation_end(&w->triangulation, now_us);
+}
+
+static void worker_totals(const void *self,
+                          struct node_finished_message *totals,
+                          uint64_t now_us) {
+    const struct worker *w = self;
+    node_triangulation_totals(&w->triangulation, totals, now_us);
+}
+
+static void worker_map(const void *self, struct node_map *map) {
+    const struct worker *w = self;
+    node_triangulation_map(&w->triangulation, map, 0);
+}
+
+static void worker_gauge(const void *self, struct incode_gauge *gauge) {
+    const struct worker *w = self;
+    incode_triangulator_gauge(w->triangulation.triangulator, gauge);
+}
+
+const struct node_role node_worker_role = {
+    .name = "worker",
+    .tables = {NODE_TRIANGULATION_NAMES},
+    .arena_min = worker_arena_min,
+    .start = worker_start,
+    .message = worker_message,
+    .work = worker_work,
+    .send = worker_send,
+    .done = worker_done,
+    .end = worker_end,
+    .awaited = worker_awaited,
+    .held = worker_held,
+    .totals = worker_totals,
+    .gauge = worker_gauge,
+    .map = worker_map,
+};

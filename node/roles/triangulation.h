@@ -1,22 +1,41 @@
 /* What roles with a triangulator have in common: its job, its pages, what it
- * gives away, and the time that it has.
- *
- * Memory: the struct, and of the role's arena the outlet, then the
- * triangulator.  Work: `work` closes at most NODE_STEPS stars, fewer where the
- * time does not suffice, and `send` sends what the link takes.
- *
- *     if (!node_triangulation_message(&t, &message, now_us))
- *         node_fault_set(&fault, "message of type #", message.type, 0);
- *     moved = node_triangulation_work(&t, &pace);
- *     moved += node_triangulation_send(&t);   // and so in every step
- */
+ * gives away, and the time that it has. */
 #ifndef NODE_TRIANGULATION_H
 #define NODE_TRIANGULATION_H
 
-#include "jobs.h"
-#include "node/pace.h"
+#include <stdbool.h>
+
+#include "node/setup.h"
+#include "node/message.h"
 #include "outlet.h"
 #include "requests.h"
+
+/* The jobs of a role, one at a time: the ranges of bricks that the host gives
+ * it, and how long they took. */
+
+struct node_jobs {
+    struct node_fault *fault;
+    uint32_t bricks;   /* of all jobs, as in the setup */
+    uint32_t epoch;    /* of the job */
+    bool working;      /* a job is open */
+    uint64_t start_us; /* of the job */
+    uint64_t wall_us;  /* of the jobs before */
+};
+
+/* No job. */
+void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,
+                    struct node_fault *fault);
+
+/* NODE_JOB: true with *job, which is open from now on; false: it is not sound,
+ * or not the time for it, which is a fault. */
+bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
+                    uint64_t now_us, struct incode_job *job);
+
+/* The open job is over. */
+void node_jobs_end(struct node_jobs *jobs, uint64_t now_us);
+
+/* Time of all jobs so far. */
+uint64_t node_jobs_wall_us(const struct node_jobs *jobs, uint64_t now_us);
 
 enum { NODE_TRIANGULATION_TABLES = 5 };
 

@@ -30,8 +30,7 @@
 
 #include <stdbool.h>
 
-#include "node/counted.h"
-#include "node/fault.h"
+#include "node/setup.h"
 #include "node/message.h"
 
 enum { NODE_WAVES_UNCHANGED = 1000, NODE_WAVES_UNCHANGED_US = 60000000 };

@@ -2,10 +2,10 @@
  * a board's start-up code.  Each letter that comes over the console is an order
  * (tests/boards/trial). */
 #include "boards/bare/bare.h"
-#include "node/loader/boots.h"
+#include "node/loader/slots.h"
 #include "boards/bare/console.h"
 #include "boards/bare/fault_text.h"
-#include "boards/bare/reason.h"
+#include "boards/bare/handover.h"
 #include "boards/bare/sections.h"
 #include "boards/bare/stack.h"
 

@@ -3,7 +3,7 @@
  * nothing. */
 #include <stdlib.h>
 
-#include "transport/learn.h"
+#include "transport/gossip.h"
 #include "transport/routes.h"
 
 static struct routes_altered table[2048];

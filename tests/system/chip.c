@@ -14,11 +14,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "node/loader/flash_card.h"
-#include "node/loader/flash_ram.h"
-#include "node/loader/layout.h"
-#include "node/loader/messages.h"
+#include "node/loader/flash.h"
 #include "node/loader/slots.h"
+#include "node/loader/image.h"
 #include "transport/drivers/sign_sodium.h"
 
 enum { CHIP = 16 << 20, IMAGE_MAX = 1 << 20 };

@@ -4,17 +4,12 @@
  * Memory: struct tcp_pipe here, and in the kernel TCP_BUFFER_BYTES asked for
  * each way at each end (the kernel doubles that for its own books, and
  * tcp_buffers tells what it gave).  Work: one system call a function, but for
- * tcp_pair.
- *
- *     if (tcp_pair(fds) != 0)
- *         return -1;
- *     tcp_pipe_init(&pipe, fds[0]);
- *     config.pipe = tcp_link_pipe(&pipe);
- */
+ * tcp_pair. */
 #ifndef TRANSPORT_DRIVERS_TCP_H
 #define TRANSPORT_DRIVERS_TCP_H
 
 #include <stdbool.h>
+#include <sys/socket.h>
 
 #include "transport/link.h"
 
@@ -48,5 +43,32 @@ short tcp_events(const struct tcp_pipe *pipe);
 /* What poll(2) has found: where nothing has come, the next call to receive need
  * not ask the system again. */
 void tcp_heard(struct tcp_pipe *pipe, short revents);
+
+/* Where a wire between processes meets: an address and port of TCP, or the path
+ * of a socket on the same machine.
+ *
+ * Memory: struct tcp_address.  Work: one pass over the text. */
+
+enum { TCP_PATH_MAX = 107 }; /* bytes of a path, as the kernel has it */
+
+struct tcp_address {
+    union {
+        struct sockaddr any;
+        struct sockaddr_storage storage;
+    } to;
+    socklen_t size;
+};
+
+/* "127.0.0.1:7000", "[::1]:7000": numbers alone, no names.  0, or -1. */
+int tcp_address_parse(struct tcp_address *address, const char *text);
+
+/* 0, or -1: empty, or longer than TCP_PATH_MAX. */
+int tcp_address_set_path(struct tcp_address *address, const char *path);
+
+/* NULL: it has none. */
+const char *tcp_address_path(const struct tcp_address *address);
+
+/* All addresses of a machine: 0.0.0.0 or ::. */
+bool tcp_address_is_any(const struct tcp_address *address);
 
 #endif

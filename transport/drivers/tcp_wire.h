@@ -37,7 +37,6 @@
 
 #include "transport/secure.h"
 #include "tcp.h"
-#include "tcp_address.h"
 
 enum {
     TCP_CANDIDATES_MAX = 16,

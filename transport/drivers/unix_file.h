@@ -4,18 +4,14 @@
  * root.
  *
  * Memory: none.  Work: a few system calls.  unix_file_remove may be called in a
- * signal's handler.
- *
- *     tcp_address_set_path(&address, "/run/cube/01");
- *     if (unix_file_bind(fd, &address) != 0)
- *         return -1;
- *     bool ours = unix_file_peer_is_ours(connected);
- *     unix_file_remove(&address);
- */
+ * signal's handler. */
 #ifndef TRANSPORT_DRIVERS_UNIX_FILE_H
 #define TRANSPORT_DRIVERS_UNIX_FILE_H
 
-#include "tcp_address.h"
+#include <poll.h>
+#include <stdint.h>
+
+#include "tcp.h"
 
 /* Binds a socket to its path, with rights for this user alone (mode 0600).  A
  * socket that nobody listens on any more is replaced.  0, or -1 and errno:
@@ -32,5 +28,13 @@ bool unix_file_peer_is_ours(int fd);
 
 /* Removes the file, if it is a socket that nobody listens on. */
 void unix_file_remove(const struct tcp_address *address);
+
+/* Waiting for files that are ready. */
+
+/* Sleeps until a file is ready, or wait_us are over.  For the first awake_us it
+ * stays awake, and gives way to whoever has work: where a processor is free,
+ * what comes soon need not wait to be woken for. */
+void wait_files(struct pollfd *fds, nfds_t count, uint64_t wait_us,
+                uint64_t awake_us);
 
 #endif

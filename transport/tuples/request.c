@@ -1,7 +1,7 @@
 /* A place's side: requests of all places, what is held for them, and the line
  * of those that wait, in the order in which they came.  No request in the line
  * matches a tuple that nobody holds. */
-#include "internal.h"
+#include "space.h"
 
 #include <string.h>
 

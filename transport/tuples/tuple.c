@@ -1,4 +1,4 @@
-#include "tuple.h"
+#include "tuples.h"
 
 #include <assert.h>
 #include <string.h>

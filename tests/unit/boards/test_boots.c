@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "node/loader/boots.h"
-#include "node/loader/flash_ram.h"
+#include "node/loader/slots.h"
+#include "node/loader/flash.h"
 
 enum { SECTORS = 4, BYTES = LOADER_RAM_SECTOR * SECTORS };
 

@@ -9,7 +9,7 @@
 #include "boards/bare/bare.h"
 #include "boards/bare/console.h"
 #include "boards/bare/fault_text.h"
-#include "boards/bare/reason.h"
+#include "boards/bare/handover.h"
 #include "boards/bare/stack.h"
 #include "transport/frame.h"
 #include "transport/link.h"

@@ -7,7 +7,6 @@
 #include <cmocka.h>
 
 #include "boards/bare/handover.h"
-#include "boards/bare/reason.h"
 
 static void test_handover_is_taken_once(void **state) {
     struct bare_handover given = {.boot = 7, .slot = 1, .number = 3}, taken;

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "node/questions.h"
+#include "node/message.h"
 #include "node_talk.h"
 
 enum { ALL = 16 };

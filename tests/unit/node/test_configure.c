@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "node/configure.h"
+#include "node/answers.h"
 
 static void test_windows(void **unused) {
     (void)unused;

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "node/fault.h"
+#include "node/setup.h"
 #include "node/message.h"
 
 /* A text that is too long is cut, and the first fault stays. */

@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "host/mesh/gen.h"
-#include "node/roles/loans.h"
+#include "node/roles/lending.h"
 #include "tests/unit/incode/several.h"
 
 enum { SENT_MAX = 64, NODES = 8, LENDER = 0, HELPER = 1 };

@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #include "node/message.h"
-#include "node/outbox.h"
+#include "node/result.h"
 
 static void test_layouts(void **unused) {
     (void)unused;

@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "node/arena.h"
+#include "node/setup.h"
 #include "node/roles/outlet.h"
 
 enum { MEMORY = 1 << 20, SLOTS = MEMORY / 65536 };

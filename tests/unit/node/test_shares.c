@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "incode/pages/bricks.h"
-#include "node/roles/shares.h"
+#include "node/roles/lending.h"
 
 enum { NODES_MAX = 128 };
 

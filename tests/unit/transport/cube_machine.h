@@ -23,7 +23,7 @@
 
 #include "host/sim/sim_cube.h"
 #include "transport/cube.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum { NODES_MAX = 32, ENDS_MAX = NODES_MAX + 1, TYPES = 4 };
 

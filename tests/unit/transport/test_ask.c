@@ -3,7 +3,7 @@
  */
 #include "link_pair.h"
 
-#include "transport/learn.h"
+#include "transport/gossip.h"
 
 /* End 1 asks, as one that has only just begun. */
 static void ask(struct pair *p) {

@@ -3,7 +3,7 @@
 #include "cube_machine.h"
 
 #include "transport/frame.h"
-#include "transport/learn.h"
+#include "transport/gossip.h"
 
 /* Only the host knows what it is. */
 static void forget(struct machine *m, struct learner *learners) {

@@ -1,7 +1,7 @@
 /* Seeds never come twice, with or without random bytes, and where neither these
  * nor a number of the start are there, none is given. */
 #include "secure_world.h"
-#include "transport/secure_seed.h"
+#include "transport/secure.h"
 
 static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key";
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum { DIMENSION = 4, NODES = 16 };
 

@@ -22,7 +22,7 @@
 
 #include "host/flash/spread.h"
 #include "host/sim/sim_cube.h"
-#include "node/loader/boots.h"
+#include "node/loader/slots.h"
 #include "node/loader/loader.h"
 #include "node/node.h"
 #include "tests/unit/node/loader/loader_chip.h"

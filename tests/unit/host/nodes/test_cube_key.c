@@ -15,7 +15,7 @@
 #include <cmocka.h>
 
 #include "host/nodes/cube_file.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 
 static char directory[] = "/tmp/incode-key.XXXXXX";
 static char path[64];

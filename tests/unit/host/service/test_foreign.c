@@ -13,7 +13,7 @@
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 #include "host/sim/sim_cube.h"
-#include "transport/wiring.h"
+#include "transport/routes.h"
 
 enum { HOST = 1, SECONDS = 20 };
 

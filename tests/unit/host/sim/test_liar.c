@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "host/sim/liar.h"
-#include "node/counted.h"
+#include "node/setup.h"
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
 

@@ -18,7 +18,7 @@
 #include <cmocka.h>
 
 #include "node/loader/incoming.h"
-#include "node/loader/layout.h"
+#include "node/loader/slots.h"
 #include "transport/frame.h"
 
 enum { CHIP_BYTES = 512 * 1024, CHIP_IMAGE_MAX = 256 * 1024 };

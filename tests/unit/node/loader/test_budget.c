@@ -2,7 +2,7 @@
  * fast as a board obeys: restarts, images that were signed once and are brought
  * with false code, false signatures. */
 #include "loader_chip.h"
-#include "node/loader/boots.h"
+#include "node/loader/slots.h"
 
 enum {
     IMAGE = 5 * LOADER_BLOCK_BYTES + 700,

@@ -9,9 +9,8 @@
 
 #include <cmocka.h>
 
-#include "node/loader/boots.h"
-#include "node/loader/flash_card.h"
 #include "node/loader/slots.h"
+#include "node/loader/flash.h"
 #include "transport/bytes.h"
 
 enum {

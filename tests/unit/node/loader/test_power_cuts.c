@@ -1,7 +1,7 @@
 /* Power is lost at every operation of the flash in the life of an image, words
  * torn: the board starts what is whole, keeps what it has, and gets on. */
 #include "loader_chip.h"
-#include "node/loader/boots.h"
+#include "node/loader/slots.h"
 
 enum { IMAGE = 4 * LOADER_BLOCK_BYTES + 1000, TEARS = 16 };
 

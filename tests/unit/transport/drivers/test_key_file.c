@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "tests/unit/transport/own_stack.h"
-#include "transport/drivers/key_file.h"
+#include "transport/drivers/secure_sodium.h"
 
 static const char digits[] =
     "000102030405060708090a0b0c0d0e0f101112131415161718191a1b1c1d1e1f\n";

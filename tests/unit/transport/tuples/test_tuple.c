@@ -9,7 +9,7 @@
 #include <cmocka.h>
 
 #include "transport/drivers/sim.h"
-#include "transport/tuples/tuple.h"
+#include "transport/tuples/tuples.h"
 
 static uint64_t random_state = 5;
 

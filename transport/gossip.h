@@ -8,15 +8,9 @@
  * without `send` is not asked.
  *
  * Memory: struct learner, LEARN_BYTES a link.  Work: learner_poll reads at most
- * LEARN_BYTES a link; learner_ask sends at most 21 bytes a link.
- *
- *     learner_init(&learner, pipes, links);
- *     while (!learner_poll(&learner, &learned))
- *         wait();
- *     config.self = learned.self, config.dimension = learned.dimension;
- */
-#ifndef TRANSPORT_LEARN_H
-#define TRANSPORT_LEARN_H
+ * LEARN_BYTES a link; learner_ask sends at most 21 bytes a link. */
+#ifndef TRANSPORT_GOSSIP_H
+#define TRANSPORT_GOSSIP_H
 
 #include "cube.h"
 

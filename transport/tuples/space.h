@@ -1,17 +1,63 @@
+/* A place's tuples: records one behind the other in the order in which they
+ * came, so that what is found first is the oldest, and what is free is in one
+ * piece.  A record may be held for a request: nobody else gets it until that is
+ * decided.
+ *
+ * Memory: the caller's bytes; a record is named by its offset, until one before
+ * it is dropped.  Work: a pass over the records; dropping one moves those
+ * behind it. */
+#ifndef TRANSPORT_TUPLES_SPACE_H
+#define TRANSPORT_TUPLES_SPACE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "tuples.h"
+
+#define TUPLES_NOWHERE UINT32_MAX
+#define TUPLES_UNHELD UINT32_MAX
+
+struct tuples_record {
+    uint32_t age;
+    uint32_t holder; /* a request, or TUPLES_UNHELD */
+    uint32_t size;   /* of the bytes that follow, and are filled up to 4 */
+};
+
+struct tuples_store {
+    uint8_t *bytes; /* aligned to 4 */
+    uint32_t room, used, count;
+};
+
+/* Bytes of a store that such a tuple takes. */
+uint32_t tuples_store_needed(size_t size);
+
+/* Adds one for which there is room; its offset. */
+uint32_t tuples_store_add(struct tuples_store *store, uint32_t age,
+                          const uint8_t *tuple, size_t size);
+
+struct tuples_record *tuples_store_at(const struct tuples_store *store,
+                                      uint32_t at);
+const uint8_t *tuples_store_tuple(const struct tuples_store *store,
+                                  uint32_t at);
+
+/* The first that matches and that nobody holds. */
+uint32_t tuples_store_find(const struct tuples_store *store,
+                           const uint8_t *pattern);
+
+/* Whether one that matches is held for somebody. */
+bool tuples_store_is_held(const struct tuples_store *store,
+                          const uint8_t *pattern);
+
+/* That which a request holds. */
+uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row);
+
+void tuples_store_drop(struct tuples_store *store, uint32_t at);
+
 /* What the files of the tuple space share: a message's header, an operation
  * of this place (operation.c), a request of any (request.c), and the store.
  *
- * Memory: see tuples.h.  Work: stated at each function.
- *
- *     struct tuples_header header = {.kind = TUPLES_ASK, .serial = 1};
- *     tuples_operation_take(space, source, &header, data, size);
- *     tuples_request_take(space, source, &header, data, size);
- */
-#ifndef TRANSPORT_TUPLES_INTERNAL_H
-#define TRANSPORT_TUPLES_INTERNAL_H
-
-#include "store.h"
-#include "tuples.h"
+ * Memory: see tuples.h.  Work: stated at each function. */
 
 /* TUPLES.md says what each means. */
 enum tuples_kind {
