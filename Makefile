@@ -255,8 +255,8 @@ planted_programs := $(addprefix $(BUILD)/tests/incode-,twice lost-batch answer \
 planted: $(planted_programs)
 $(BUILD)/tests/incode-twice: planted = incode/triangulator.c -DINCODE_PLANT_TWICE
 $(BUILD)/tests/incode-twice: incode/triangulator.c
-$(BUILD)/tests/incode-kept: planted = incode/front/star.c -DINCODE_PLANT_KEPT
-$(BUILD)/tests/incode-kept: incode/front/star.c
+$(BUILD)/tests/incode-kept: planted = incode/front/order.c -DINCODE_PLANT_KEPT
+$(BUILD)/tests/incode-kept: incode/front/order.c
 $(BUILD)/tests/incode-lost-batch: planted = \
 	host/service/handlers.c -DINCODE_PLANT_LOST_BATCH
 $(BUILD)/tests/incode-lost-batch: host/service/handlers.c

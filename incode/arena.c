@@ -1,4 +1,4 @@
-#include "arena.h"
+#include "state.h"
 
 #include <string.h>
 

@@ -1,17 +1,10 @@
 /* What a triangulator is made of: a maker that finds apexes, a front that wants
- * them, and an insertion that does without.
- *
- * Memory: the struct, at the start of the arena.  Work: none.
- *
- *     struct incode_triangulator *t = arena;
- *     t->front.room_faces = t->front.afl.capacity - 500;   // it spills soon
- */
+ * them, and an insertion that does without. */
 #ifndef INCODE_STATE_H
 #define INCODE_STATE_H
 
 #include "incode/front/front.h"
 #include "incode/apex/maker.h"
-#include "incode/insertion/handover.h"
 #include "incode/insertion/insertion.h"
 #include "triangulator.h"
 
@@ -46,5 +39,37 @@ struct incode_triangulator {
     uint32_t units;    /* of work that a step may do, as it goes on */
     uint64_t spent;    /* units */
 };
+
+/* How a triangulator's arena is divided: the triangulator itself, a bit a
+ * brick, the maker's share, and the front's or an insertion's.
+ *
+ * Memory: the arena.  Work: constant, but for tables that are cleared. */
+
+static inline size_t incode_arena_aligned(size_t bytes) {
+    return (bytes + 63) & ~(size_t)63;
+}
+
+/* Bytes of the bits that say which bricks are committed point by point; 0: they
+ * would take more than a part in 64.  Where the owner is the lowest vertex, of
+ * the maps of an exchange. */
+size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes);
+
+/* The shares face by face; false: it is too small. */
+bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
+                         const struct incode_setup *setup, size_t bytes);
+
+/* The share of a maker alone: what its horizon leaves, frames take. */
+struct incode_maker_share incode_arena_maker(size_t bytes);
+
+/* Bytes of the arena for an insertion. */
+size_t incode_arena_room(const struct incode_triangulator *t);
+
+/* Divides the arena for a job point by point, which is begun, or face by face;
+ * false: pages are on their way, whose frames stay. */
+bool incode_arena_turn(struct incode_triangulator *t, bool points);
+
+/* The most bytes that were in use, before or after the arena was divided anew.
+ * A division that no job has worked in does not count. */
+size_t incode_arena_high_water(const struct incode_triangulator *t);
 
 #endif

@@ -3,11 +3,10 @@
 #include <assert.h>
 #include <string.h>
 
-#include "arena.h"
-#include "incode/front/exchange.h"
-#include "incode/pages/sound.h"
-#include "incode/predicates/check.h"
 #include "state.h"
+#include "incode/front/exchange.h"
+#include "incode/pages/pages.h"
+#include "incode/predicates/check.h"
 
 static_assert((int)INCODE_HINT_NONE == INCODE_LOCAL_NONE, "hints are indices");
 static_assert((int)INCODE_TASKS < INCODE_SEARCHES,

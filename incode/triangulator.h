@@ -24,7 +24,6 @@
 #include <stdint.h>
 
 #include "incode/front/job.h"
-#include "incode/front/owner.h"
 #include "incode/pages/pager.h"
 #include "incode/pages/pages.h"
 #include "incode/predicates/predicates.h"

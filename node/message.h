@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "incode/front/loan.h"
+#include "incode/front/exchange.h"
 #include "incode/paper/list.h"
 #include "incode/triangulator.h"
 #include "transport/cube.h"

@@ -7,7 +7,7 @@
 #include "duplicates.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
-#include "incode/pages/cells.h"
+#include "incode/pages/pager.h"
 #include "incode/predicates/predicates.h"
 #include "kd_build.h"
 #include "lift.h"

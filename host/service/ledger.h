@@ -27,7 +27,7 @@
 
 #include "host/mesh/tetrahedra.h"
 #include "host/mesh/order.h"
-#include "incode/front/owner.h"
+#include "incode/front/job.h"
 
 struct host_job {
     uint32_t epoch; /* 0: the node has no job */

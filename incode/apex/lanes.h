@@ -1,15 +1,14 @@
-/* A vector of numbers in twice the precision, as in double_double.h.
- *
- * Memory: none.  Work: constant.
- *
- *     struct incode_lanes r = incode_lanes_difference(x, y, scale);
- *     value = incode_lanes_plus(value, incode_lanes_times(factor, r));
- */
+/* A vector of numbers in twice the precision, as in double_double.h. */
 #ifndef INCODE_LANES_H
 #define INCODE_LANES_H
 
+#include <stdalign.h>
+#include <stdbool.h>
+#include <stdint.h>
+
 #include "incode/predicates/double_double.h"
 #include "incode/predicates/simd.h"
+#include "incode/predicates/predicates.h"
 
 struct incode_lanes {
     incode_vd hi, lo;
@@ -89,5 +88,40 @@ INCODE_INLINE struct incode_lanes incode_lanes_difference(incode_vd a, double b,
     r.lo *= incode_vd_all(scale);
     return r;
 }
+
+/* The double-double stage of MakeTetra: candidates that double precision cannot
+ * tell apart, ranked in twice the precision by their places in the face's
+ * pencil of spheres, all at once.  Where the points are exact and spheres
+ * shared, as in a grid, that does not tell either, and the predicates must.
+ *
+ * Memory: the struct; 2 KB of stack.  Work: some 250 operations, and 150 a
+ * vector of candidates. */
+
+enum {
+    INCODE_CLOSE_MAX = 16,
+    INCODE_CLOSE_NONE = 0xffff,
+    INCODE_CLOSE_UNITS = 72 /* of work (incode/predicates/pause.h) */
+};
+
+struct incode_close_candidates {
+    alignas(64) double p[3][INCODE_CLOSE_MAX]; /* absolute coordinates */
+    uint32_t count;
+};
+
+/* False: there is no room. */
+bool incode_close_add(struct incode_close_candidates *f, const double p[3]);
+
+/* False: products of the face's edges, relative, have so few digits that its
+ * ties are likely to be true ones, which the predicates settle sooner. */
+bool incode_close_may_tell(const double b[3], const double c[3]);
+
+/* Index of the candidate that is strictly first in Delaunay distance from the
+ * face (v, b, c), of those strictly beyond it; INCODE_CLOSE_NONE where that is
+ * not certain.  scale: a power of two by which the face is of size 1 about.
+ * Distinct points. */
+uint32_t incode_close_first(struct incode_close_candidates *f,
+                            const double v[3], const double b[3],
+                            const double c[3], double scale,
+                            struct incode_tally *tally);
 
 #endif

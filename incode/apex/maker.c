@@ -3,7 +3,7 @@
 #include <assert.h>
 #include <string.h>
 
-#include "incode/pages/sound.h"
+#include "incode/pages/pages.h"
 #include "incode/predicates/check.h"
 
 enum { LOOKAHEAD_MAX = 48 /* bricks */ };

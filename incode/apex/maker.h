@@ -25,9 +25,8 @@
 #ifndef INCODE_MAKER_H
 #define INCODE_MAKER_H
 
-#include "cell_search.h"
-#include "local_points.h"
 #include "query.h"
+#include "horizon.h"
 
 enum {
     INCODE_SEARCHES = 17, /* suspended at a time */

@@ -1,7 +1,12 @@
 #include "sphere.h"
 
+#include <stdalign.h>
 #include <stddef.h>
 #include <string.h>
+
+#include "search.h"
+#include "horizon.h"
+#include "incode/predicates/simd.h"
 
 /* What underflows in a determinant is lost to all points, however far. */
 #define LOST 1e-290
@@ -127,4 +132,492 @@ void incode_sphere_refine(struct incode_sphere *s, const double v[3],
     }
     s->det = fine.det.hi;
     s->pdet = refined(s->det, s->pdet);
+}
+
+/* --- empty spheres -------------------------------------------------------- */
+
+/* Relative error of a sum of some numbers of twice the precision. */
+#define FINE 1e-29
+
+static struct incode_dd ratio(struct incode_dd a, struct incode_dd b) {
+    struct incode_dd q = {a.hi / b.hi, 0}, r;
+    double rest = incode_dd_minus(a, incode_dd_times(q, b)).hi / b.hi;
+    r.hi = incode_fast_two_sum(q.hi, rest, &r.lo);
+    return r;
+}
+
+/* False: too little is known of it. */
+static bool circum_of(struct incode_circum *c, const double *const p[4],
+                      double scale) {
+    struct incode_near_degenerate degenerate;
+    degenerate.known = degenerate.regular = false;
+    degenerate.count = 0;
+    incode_near_degenerate_sphere(&degenerate, p, scale);
+    struct incode_dd det = degenerate.sphere.det;
+    /* The spread bounds the errors of det and of m. */
+    if (!(det.hi > 1e9 * degenerate.spread) || !(det.hi > INCODE_SPHERE_LEAST))
+        return false;
+    memcpy(c->p, p[0], sizeof c->p);
+    c->scale = scale;
+    for (int k = 0; k < 3; k++)
+        c->twice[k] = ratio(degenerate.sphere.m[k], det);
+    double size = incode_dd_max_norm(c->twice);
+    c->error = 2 * degenerate.spread * (1 + size) / det.hi + FINE * size;
+    double longest = 0, r[3];
+    for (int i = 1; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            r[k] = (p[i][k] - p[0][k]) * scale;
+        double square = incode_dot(r, r);
+        longest = square > longest ? square : longest;
+    }
+    c->thickness = det.hi / longest / scale;
+    return c->error < 1e300;
+}
+
+/* Nearly the same sphere, as far as doubles can tell. */
+static bool is_same(const struct incode_circum *a,
+                    const struct incode_circum *b) {
+    double gap[3], size = incode_dd_max_norm(a->twice) / a->scale;
+    for (int k = 0; k < 3; k++)
+        gap[k] = a->p[k] * 2 + a->twice[k].hi / a->scale - b->p[k] * 2 -
+                 b->twice[k].hi / b->scale;
+    return incode_max_norm(gap) < 1e-3 * size;
+}
+
+void incode_empty_spheres_add(struct incode_empty_spheres *e,
+                              const double *const p[4], double scale) {
+    struct incode_circum c;
+    if (!circum_of(&c, p, scale))
+        return;
+    for (uint32_t i = 0; i < e->count; i++) {
+        if (!is_same(&c, &e->sphere[i]))
+            continue;
+        if (c.thickness > e->sphere[i].thickness)
+            e->sphere[i] = c;
+        return;
+    }
+    e->sphere[e->next] = c;
+    e->next = (e->next + 1) % INCODE_EMPTY_SPHERES;
+    if (e->count < INCODE_EMPTY_SPHERES)
+        e->count++;
+}
+
+/* With d = v - p of the empty sphere, M and N twice the centres: the power of r
+ * less that in the empty sphere is (N - M - 2 d) . r - (|d|^2 - N . d). */
+static bool bound_of(struct incode_radical_bound *c,
+                     const struct incode_circum *b,
+                     const struct incode_circum *empty) {
+    struct incode_dd_vector d = incode_dd_relative(b->p, empty->p, b->scale);
+    struct incode_dd there[3], negative[3];
+    double share = b->scale / empty->scale, size = 0;
+    double far = 2 * incode_dd_max_norm(d.d) + incode_dd_max_norm(b->twice);
+    for (int k = 0; k < 3; k++) {
+        there[k].hi = empty->twice[k].hi * share;
+        there[k].lo = empty->twice[k].lo * share;
+        struct incode_dd twice = {2 * d.d[k].hi, 2 * d.d[k].lo};
+        struct incode_dd g =
+            incode_dd_minus(incode_dd_minus(there[k], twice), b->twice[k]);
+        c->g[k] = g.hi;
+        size += __builtin_fabs(g.hi);
+        negative[k] = incode_dd_minus(d.d[k], there[k]);
+    }
+    far += incode_dd_max_norm(there);
+    double error = empty->error * share;
+    c->slack = error + b->error + FINE * far + 1e-15 * size;
+    /* |d|^2 - N . d = d . (d - N) */
+    c->level = incode_dd_dot(d.d, negative).hi * (1 + 1e-15) +
+               (3 * error + FINE * far) * far;
+    /* What overflows is not a number, and stays so. */
+    c->level = c->level < 0 ? 0 : c->level;
+    c->set = c->level < 1e300 && c->slack < 1e300;
+    return c->set;
+}
+
+void incode_radical_bound_set(struct incode_radical_bound *c,
+                              const struct incode_empty_spheres *e,
+                              const double *const p[4], double scale,
+                              const double n[3]) {
+    struct incode_circum best;
+    double most = 0;
+    c->set = false;
+    if (e->count == 0 || !circum_of(&best, p, scale))
+        return;
+    for (uint32_t i = 0; i < e->count; i++) {
+        struct incode_radical_bound here;
+        if (!bound_of(&here, &best, &e->sphere[i]))
+            continue;
+        double steep = incode_dot(here.g, n) / (here.level + 1e-200);
+        if (steep > most) {
+            *c = here;
+            most = steep;
+        }
+    }
+}
+
+/* --- half space ----------------------------------------------------------- */
+
+/* The bounds below hold in double precision with this much to spare. */
+#define SPARE 1e-9
+/* Twice the precision, relative to its terms. */
+#define HALF_SPACE_FINE 1e-29
+/* Below this, what is left of a length or a product tells nothing. */
+#define VANISHED 1e-250
+
+static double length_of(const double a[3]) {
+    return __builtin_sqrt(incode_dot(a, a));
+}
+
+struct incode_dd incode_half_space_height(const struct incode_half_space *s,
+                                          const double x[3]) {
+    struct incode_dd_vector r = incode_dd_relative(x, s->p, s->scale), n;
+    for (int k = 0; k < 3; k++)
+        n.d[k] = (struct incode_dd){s->n[k], 0};
+    return incode_dd_dot(n.d, r.d);
+}
+
+enum { SLOPES = 1000000 }; /* one in so many is a direction of its own */
+
+/* Sine of the angle between two directions; more than 1 if it is not acute. */
+static double sine(const double a[3], const double b[3]) {
+    double c[3], lengths = length_of(a) * length_of(b);
+    incode_cross(c, a, b);
+    return incode_dot(a, b) > 0 && lengths > 0 ? length_of(c) / lengths : 2;
+}
+
+bool incode_half_space_faces(const struct incode_half_space *half_space,
+                             const double n[3]) {
+    return sine(half_space->n, n) * SLOPES < 1;
+}
+
+/* How far above v, in the half-space's direction, a point can be; not a number
+ * if that overflows. */
+static double depth_of(const struct incode_half_space *half_space,
+                       const double pv[3], double scale) {
+    struct incode_dd height = incode_half_space_height(half_space, pv);
+    struct incode_dd top = {half_space->most[0], half_space->most[1]};
+    double ratio = scale / half_space->scale, far = 0;
+    for (int k = 0; k < 3; k++)
+        far += __builtin_fabs((pv[k] - half_space->p[k]) * half_space->scale);
+    double depth = incode_dd_minus(top, height).hi * ratio /
+                       length_of(half_space->n) * (1 + SPARE) +
+                   HALF_SPACE_FINE * far * ratio;
+    return depth < 0 ? 0 : depth;
+}
+
+/* Of an ill-conditioned or very large sphere through v with its centre outside
+ * the half-space: a point x inside, h above v in the half-space's direction and
+ * y along it, has
+ *
+ *     h^2 + y^2 <= 2 (h, y) . centre,  h <= depth,
+ *
+ * so y lies in a disc around the centre's foot, and |h| is next to nothing. */
+static struct incode_ball ball_under(const struct incode_half_space *half_space,
+                                     const struct incode_fine *sphere,
+                                     const double pv[3], double scale) {
+    struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
+    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
+    if (!incode_half_space_faces(half_space, m))
+        return ball;
+    const double *n = half_space->n;
+    const struct incode_dd direction[3] = {{n[0], 0}, {n[1], 0}, {n[2], 0}};
+    struct incode_dd_vector tilt =
+        incode_dd_vector_product(sphere->m, direction);
+    const double across[3] = {tilt.d[0].hi, tilt.d[1].hi, tilt.d[2].hi};
+    double foot[3], half = 0.5 / sphere->det.hi;
+    incode_cross(foot, n, across);
+    for (int k = 0; k < 3; k++)
+        ball.centre[k] = foot[k] * half / incode_dot(n, n);
+    double radius = length_of(m) * half * (1 + SPARE);
+    double depth = depth_of(half_space, pv, scale);
+    double off = length_of(ball.centre), doubt = off * SPARE;
+    doubt += radius * HALF_SPACE_FINE * 1e9;
+    off += doubt;
+    double disc = __builtin_sqrt(off * off + 2 * radius * depth);
+    /* The foot's own error, of 2e-9 of the sphere's face, is within 1e-6. */
+    ball.radius = disc * (1 + 1e-6) + depth + 2 * doubt;
+    return ball;
+}
+
+void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale) {
+    double lengths = 1, longest = 1, r[3];
+    incode_sphere_fine(&degenerate->sphere, p[0], p[1], p[2], p[3], scale);
+    for (int i = 1; i < 4; i++) {
+        for (int k = 0; k < 3; k++)
+            r[k] = (p[i][k] - p[0][k]) * scale;
+        double length = length_of(r);
+        lengths *= length;
+        longest = length > longest ? length : longest;
+    }
+    degenerate->lengths = lengths;
+    degenerate->spread = lengths > VANISHED
+                             ? HALF_SPACE_FINE * 1e2 * lengths * longest
+                             : __builtin_inf();
+}
+
+/* The least ball that is known to hold what comes before p[3]. */
+static struct incode_ball ball_of(struct incode_near_degenerate *degenerate,
+                                  const double *const p[4], double scale) {
+    double r[3];
+    struct incode_ball ball = {{0, 0, 0}, __builtin_inf()};
+    for (int k = 0; k < 3; k++)
+        r[k] = (p[3][k] - p[0][k]) * scale;
+    double far = length_of(r);
+    degenerate->spread = 0;
+    /* What comes before a place of zero or less in the pencil lies in the ball
+     * over the face's circle. */
+    if (degenerate->regular && far > VANISHED) {
+        double circle = length_of(degenerate->c0) * (1 + 1e-8);
+        double above = far * far - 2 * incode_dot(degenerate->c0, r) +
+                       1e-8 * far * (far + 2 * circle);
+        if (above <= 0) {
+            memcpy(ball.centre, degenerate->c0, sizeof ball.centre);
+            ball.radius = circle * (1 + 1e-8);
+            return ball;
+        }
+    }
+    const struct incode_fine *sphere = &degenerate->sphere;
+    incode_near_degenerate_sphere(degenerate, p, scale);
+    /* What is left of det and m after cancellation must be right to SPARE. */
+    double far_off = HALF_SPACE_FINE * 1e9 * degenerate->lengths;
+    double m[3] = {sphere->m[0].hi, sphere->m[1].hi, sphere->m[2].hi};
+    if (!(sphere->det.hi > far_off) ||
+        !(sphere->det.hi > INCODE_SPHERE_LEAST) ||
+        !(incode_max_norm(m) > far_off * far))
+        return ball;
+    for (uint32_t i = 0; i < degenerate->count; i++) {
+        struct incode_ball here =
+            ball_under(&degenerate->half_spaces[i], sphere, p[0], scale);
+        ball = here.radius < ball.radius ? here : ball;
+    }
+    return ball;
+}
+
+void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale) {
+    struct incode_ball ball = ball_of(degenerate, p, scale);
+    degenerate->ball =
+        ball.radius < degenerate->ball.radius ? ball : degenerate->ball;
+}
+
+bool incode_near_degenerate_outside(
+    const struct incode_near_degenerate *degenerate, const double pv[3],
+    const double p[3], double scale) {
+    if (degenerate->spread == 0)
+        return false;
+    struct incode_dd_vector r = incode_dd_relative(p, pv, scale);
+    struct incode_dd square = incode_dd_dot(r.d, r.d);
+    struct incode_dd value =
+        incode_dd_minus(incode_dd_dot(degenerate->sphere.m, r.d),
+                        incode_dd_times(degenerate->sphere.det, square));
+    double far = __builtin_sqrt(square.hi);
+    return value.hi <
+           -degenerate->spread * (far + square.hi) - INCODE_SPHERE_TINY;
+}
+
+/* --- centre --------------------------------------------------------------- */
+
+/* The points around a vertex, brought to hand, and the bricks around its own.
+ */
+
+enum {
+    HORIZON_UNITS =
+        16, /* of incode/predicates/pause.h: a look over its boxes */
+    NEAR_WANTED = 96,
+    COPY_TRIES = 64
+};
+
+static double longest_side(const double lo[3], const double hi[3]) {
+    double extent = 0;
+    for (int d = 0; d < 3; d++)
+        extent = hi[d] - lo[d] > extent ? hi[d] - lo[d] : extent;
+    return extent;
+}
+
+/* Half-width of the box of local points: the extent of the leaf, times what has
+ * lately given the wanted number of points around a vertex. */
+static double first_radius(const struct incode_maker *m, const double lo[3],
+                           const double hi[3]) {
+    double extent = longest_side(lo, hi);
+    if (!(extent > 0)) {
+        for (int d = 0; d < 3; d++) {
+            double e = m->hi[d] * 0x1p-10 - m->lo[d] * 0x1p-10;
+            extent = e > extent ? e : extent;
+        }
+    }
+    double radius = extent * m->spread;
+    radius = radius > 0x1p-1070 ? radius : 0x1p-1070; /* it must grow by 4s */
+    return radius < 0x1p1000 ? radius : 0x1p1000;
+}
+
+static void learn_spread(struct incode_maker *m, uint32_t points) {
+    if (points > NEAR_WANTED * 9 / 8)
+        m->spread *= 0.98;
+    else if (points < NEAR_WANTED * 7 / 8)
+        m->spread *= 1.02;
+    m->spread = m->spread < 0.25 ? 0.25 : m->spread > 16 ? 16 : m->spread;
+}
+
+/* Brings the points around the leaf of a vertex to hand. */
+static enum incode_outcome copy_around_leaf(struct incode_maker *m,
+                                            struct incode_search *s, uint32_t v,
+                                            const struct incode_frame *f) {
+    struct incode_local_points *local = &m->local;
+    uint32_t leaf = v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
+    alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
+        leaf_hi[3][INCODE_BRICK_LEAVES];
+    double lo[3], hi[3];
+    incode_frame_leaf_boxes(f, leaf_lo, leaf_hi);
+    for (int d = 0; d < 3; d++) {
+        lo[d] = leaf_lo[d][leaf];
+        hi[d] = leaf_hi[d][leaf];
+    }
+    double radius = first_radius(m, lo, hi);
+    for (int tries = 0;; tries++) {
+        incode_maker_breathe(m, HORIZON_UNITS);
+        enum incode_local_outcome r =
+            incode_local_around(local, &m->walker, &m->horizon,
+                                v / INCODE_LEAF_POINTS, lo, hi, radius);
+        s->page = local->query.missing;
+        if (r == INCODE_LOCAL_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_LOCAL_READY || tries == COPY_TRIES)
+            return INCODE_ANSWERED;
+        radius *= 0.75;
+        m->spread *= 0.9;
+    }
+}
+
+enum { HORIZON_TRIES = 12 };
+
+/* Lists the bricks around that of a vertex: more of them where there are few,
+ * none where there are too many whatever the box. */
+static enum incode_outcome list_bricks(struct incode_maker *m,
+                                       struct incode_search *s, uint32_t brick,
+                                       const struct incode_frame *f) {
+    struct incode_horizon *h = &m->horizon;
+    double lo[3], hi[3];
+    bool full = false;
+    (void)incode_frame_box(f, lo, hi);
+    double extent = longest_side(lo, hi);
+    for (int tries = 0; tries < HORIZON_TRIES; tries++) {
+        double radius = extent * m->reach, around_lo[3], around_hi[3];
+        bool all = true;
+        for (int d = 0; d < 3; d++) {
+            around_lo[d] = lo[d] - radius;
+            around_hi[d] = hi[d] + radius;
+            all = all && around_lo[d] <= m->lo[d] && around_hi[d] >= m->hi[d];
+        }
+        enum incode_horizon_made r = incode_horizon_make(
+            h, &m->walker, brick, around_lo, around_hi, &s->page);
+        if (r == INCODE_HORIZON_WAIT)
+            return INCODE_WAIT;
+        if (r == INCODE_HORIZON_MADE &&
+            (full || all || h->count >= incode_horizon_near(h) / 3))
+            break;
+        full = full || r == INCODE_HORIZON_FULL;
+        m->reach *= full ? 0.75 : 1.25;
+        m->reach = m->reach < 0x1p-10  ? 0x1p-10
+                   : m->reach > 0x1p10 ? 0x1p10
+                                       : m->reach;
+    }
+    for (int d = 0; d < 3; d++) {
+        if (h->box_lo[d] <= m->lo[d])
+            h->box_lo[d] = -__builtin_inf();
+        if (h->box_hi[d] >= m->hi[d])
+            h->box_hi[d] = __builtin_inf();
+    }
+    return INCODE_ANSWERED;
+}
+
+enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
+                                        uint32_t v) {
+    struct incode_search *s = &m->search[search];
+    struct incode_local_points *local = &m->local;
+    uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;
+    const struct incode_frame *f = incode_pager_get(&m->pager, brick);
+    s->page = brick;
+    if (f == NULL)
+        return INCODE_WAIT;
+    if (slot >= f->count) {
+        m->fault = INCODE_NO_VERTEX;
+        return INCODE_WAIT;
+    }
+    if (m->horizon.centre != brick &&
+        list_bricks(m, s, brick, f) == INCODE_WAIT)
+        return INCODE_WAIT;
+    if (local->leaf != v / INCODE_LEAF_POINTS &&
+        copy_around_leaf(m, s, v, f) == INCODE_WAIT)
+        return INCODE_WAIT;
+    const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
+                         f->page.brick.z[slot]};
+    bool again = local->vertex == v; /* after a wait: nothing new to learn */
+    incode_local_centre(local, v, p, local->radius, m->lo, m->hi);
+    if (!again)
+        learn_spread(m, local->near);
+    return INCODE_ANSWERED;
+}
+
+/* --- copies --------------------------------------------------------------- */
+
+/* The points of a horizon's bricks, copied in its units. */
+
+void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
+                         const struct incode_frame *frame) {
+    const struct incode_brick *b = &frame->page.brick;
+    const double *const axis[3] = {b->x, b->y, b->z};
+    uint32_t copy = h->next;
+    incode_vd scale = incode_vd_all(h->scale);
+    for (int d = 0; d < 3; d++) {
+        /* Scaled first: a difference of large numbers could overflow. */
+        incode_vd origin = incode_vd_all(h->origin[d] * h->scale);
+        for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES)
+            incode_vd_store_float(h->point[copy][d] + i,
+                                  incode_vd_load(axis[d] + i) * scale - origin);
+    }
+    uint8_t *old = &h->copy[h->owner[copy]];
+    if (*old == copy)
+        *old = INCODE_NO_COPY;
+    h->owner[copy] = (uint16_t)index;
+    h->copy[index] = (uint8_t)copy;
+    h->next = (copy + 1) % h->room;
+}
+
+static uint64_t points_beyond(const float (*point)[INCODE_BRICK_POINTS],
+                              const struct incode_horizon_cap *cap, float far) {
+    incode_vf most = incode_vf_all(cap->level + far * cap->slack);
+    uint64_t out = 0;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
+        incode_vf value = incode_vf_all(0);
+        for (int k = 0; k < 3; k++)
+            value = incode_vf_fma(
+                incode_vf_all(cap->g[k]),
+                incode_vf_load(point[k] + i) - incode_vf_all(cap->v[k]), value);
+        out |= (uint64_t)incode_vm_bits(incode_vf_less(most, value)) << i;
+    }
+    return out;
+}
+
+uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
+                               const struct incode_horizon_cap *cap) {
+    const float(*point)[INCODE_BRICK_POINTS] = h->point[h->copy[index]];
+    float far = h->far[index] + cap->near;
+    /* A half-space says nothing of points that are beyond all bounds. */
+    if (cap->d == 0 && far >= INCODE_ANYWHERE)
+        return UINT64_MAX;
+    incode_vf d = incode_vf_all(cap->d);
+    incode_vf most =
+        incode_vf_all((cap->d * far + cap->m_sum) * far * INCODE_HORIZON_DOUBT);
+    uint64_t out = 0;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VF_LANES) {
+        incode_vf value = incode_vf_all(0);
+        for (int k = 0; k < 3; k++) {
+            incode_vf y =
+                incode_vf_load(point[k] + i) - incode_vf_all(cap->v[k]);
+            value = incode_vf_fma(
+                incode_vf_fma(d, y, -incode_vf_all(cap->m[k])), y, value);
+        }
+        out |= (uint64_t)incode_vm_bits(incode_vf_less(most, value)) << i;
+    }
+    return ~out & ~(cap->bounded ? points_beyond(point, cap, far) : 0);
 }

@@ -4,18 +4,12 @@
  * the terms from the maximum norms (Higham, Accuracy and Stability, chapter 3).
  *
  *   plane:  n . p > 0                  p lies on the unknown side
- *   sphere: m . p - det |p|^2 > 0      p lies inside
- *
- * Memory: the struct.  Work: constant.
- *
- *     incode_sphere_plane(&s, b, c);
- *     incode_sphere_apex(&s, b, c, a);
- *     outside = incode_sphere_value(&s, p) < -incode_sphere_error(&s, p);
- */
+ *   sphere: m . p - det |p|^2 > 0      p lies inside */
 #ifndef INCODE_SPHERE_H
 #define INCODE_SPHERE_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "incode/predicates/double_double.h"
 
@@ -158,5 +152,112 @@ static inline double incode_plane_error(const struct incode_sphere *s,
     return INCODE_SPHERE_EPS * incode_absolute_dot(s->pn, p) +
            INCODE_SPHERE_TINY;
 }
+
+/* Empty spheres met before, and what they tell of a search among points that
+ * lie on one sphere up to rounding: all of them are in doubt about a
+ * candidate's sphere, and boxes say nothing.  But no point is inside the sphere
+ * of a tetrahedron; so a point that beats the candidate lies, in power, nearer
+ * to the candidate's sphere than to any of these, which is a half-space
+ * (Aurenhammer, SIAM J. Comput. 16, 1987).  Near the face, it leaves a sliver
+ * of the set.
+ *
+ * Memory: struct incode_empty_spheres, about 1 KB.  Work: constant. */
+
+enum {
+    INCODE_EMPTY_SPHERES = 8,
+    INCODE_RADICAL_UNITS = 150 /* of work (incode/predicates/pause.h) */
+};
+
+/* The sphere of four points. */
+struct incode_circum {
+    double p[3], scale;        /* relative: (x - p) * scale, p the first */
+    struct incode_dd twice[3]; /* the centre, doubled, relative */
+    double error;              /* of each of these */
+    double thickness;          /* of the tetrahedron */
+};
+
+struct incode_empty_spheres {
+    struct incode_circum sphere[INCODE_EMPTY_SPHERES];
+    uint32_t count, next;
+};
+
+/* Adds the sphere of a Delaunay tetrahedron; of several that are nearly the
+ * same, that of the thickest is kept.  scale: a power of two by which it is of
+ * size 1 about. */
+void incode_empty_spheres_add(struct incode_empty_spheres *e,
+                              const double *const p[4], double scale);
+
+/* g . r > level + slack (|x| + |y| + |z|): r = (x, y, z), relative and scaled,
+ * is outside. */
+struct incode_radical_bound {
+    bool set;
+    double g[3], level, slack;
+};
+
+/* What is known to lie outside the sphere of four points, the first of which r
+ * is relative to; n: the direction in which it matters. */
+void incode_radical_bound_set(struct incode_radical_bound *c,
+                              const struct incode_empty_spheres *e,
+                              const double *const p[4], double scale,
+                              const double n[3]);
+
+/* Half-spaces that hold every point, and what they tell of a face that lies in
+ * the hull's side up to rounding.  Points coplanar up to rounding are all in
+ * doubt about such a face, and a sphere through it says nothing of where its
+ * apex can be; but no point rises above the half-space, so the points that beat
+ * the best so far lie in a ball (incode_near_degenerate_lessen). */
+
+/* n . ((x - p) scale) <= most for every point x. */
+struct incode_half_space {
+    double n[3], p[3], scale;
+    double most[2]; /* high and low part */
+};
+
+/* Relative to v and scaled. */
+struct incode_ball {
+    double centre[3], radius;
+};
+
+/* A face among points coplanar up to rounding. */
+struct incode_near_degenerate {
+    bool known;
+    bool regular; /* the face is not thin, and c0 is set */
+    double c0[3]; /* centre of its circle, relative to v and scaled, right to
+                     1e-9 */
+    struct incode_ball ball;   /* the least so far; infinite at first */
+    struct incode_fine sphere; /* through the last point asked */
+    double spread;  /* its error over that of |r| + |r|^2; 0: it is not set */
+    double lengths; /* product of those of its three edges at v */
+    const struct incode_half_space *half_spaces;
+    uint32_t count;
+};
+
+/* Whether a half-space faces as a direction does. */
+bool incode_half_space_faces(const struct incode_half_space *half_space,
+                             const double n[3]);
+
+enum { INCODE_LESSEN_UNITS = 64 }; /* of work (incode/predicates/pause.h) */
+
+/* Lessens degenerate->ball: no point outside it comes before p[3] in Delaunay
+ * distance from the face (p[0], p[1], p[2]).  Nothing changes where neither the
+ * face's circle nor a half-space tells, and what holds for one point holds for
+ * all that come before it. */
+void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale);
+
+/* Sets the sphere alone. */
+void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
+                                   const double *const p[4], double scale);
+
+/* Whether a point is certainly outside the sphere of the last one asked: the
+ * predicates would say so at several times the cost. */
+bool incode_near_degenerate_outside(
+    const struct incode_near_degenerate *degenerate, const double pv[3],
+    const double p[3], double scale);
+
+/* n . ((x - p) scale) */
+struct incode_dd
+incode_half_space_height(const struct incode_half_space *half_space,
+                         const double x[3]);
 
 #endif

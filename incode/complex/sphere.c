@@ -1,6 +1,5 @@
-#include "sphere.h"
-
 #include "cavity.h"
+
 #include "incode/predicates/simd.h"
 
 enum { BATCH = INCODE_SPHERE_BATCH };

@@ -42,7 +42,6 @@
 #include "afl.h"
 #include "incode/pages/bricks.h"
 #include "job.h"
-#include "owner.h"
 
 enum {
     INCODE_STAR_FACES = 256, /* open faces at one vertex held at hand */

@@ -1,6 +1,5 @@
-#include "loan.h"
-
 #include "exchange.h"
+
 #include "incode/predicates/check.h"
 
 enum { LOOK_BRICKS = 64 /* to be lent from, at most */ };

@@ -14,9 +14,11 @@
  * So a point that was in no sphere at an own point never will be.  Before that,
  * and where these points do not fit, they are only shown to the cells, and
  * those that hold none are final. */
+#include <stdalign.h>
 #include <string.h>
 
-#include "stages.h"
+#include "insertion.h"
+#include "incode/predicates/check.h"
 
 enum {
     JUDGED = 1024,  /* cells a step */
@@ -346,4 +348,268 @@ enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n) {
     n->closed = n->closing && (n->shown || n->final == cells_left(n));
     incode_insertion_begin_list(n);
     return INCODE_INSERTION_WORKED;
+}
+
+/* --- look ----------------------------------------------------------------- */
+
+enum {
+    PAGES = INCODE_LEVELS_MAX + 16, /* a call */
+    ADD_UNITS = 16                  /* of work: twice the precision, perhaps */
+};
+
+void incode_look_init(struct incode_look *look, struct incode_maker *maker,
+                      const uint64_t *passed, uint64_t *wanted) {
+    double extent = 0;
+    for (int d = 0; d < 3; d++) {
+        double half = maker->hi[d] * 0.5 - maker->lo[d] * 0.5;
+        extent = half > extent ? half : extent;
+    }
+    look->scale = incode_scale_for(extent);
+    look->maker = maker;
+    look->passed = passed;
+    look->wanted = wanted;
+}
+
+void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
+                       uint32_t last) {
+    look->every = every;
+    look->pass_first = first;
+    look->pass_last = last;
+    look->at = 0;
+    look->count = 0;
+    look->reached = 0;
+}
+
+void incode_look_add(struct incode_look *look, const struct incode_complex *x,
+                     uint32_t cell) {
+    struct incode_region r;
+    const struct incode_cell *c = incode_complex_cell(x, cell);
+    INCODE_ASSERT(!incode_look_is_full(look));
+    incode_maker_breathe(look->maker, ADD_UNITS);
+    if (!incode_region_set_sharp(&r, x, c, look->scale) &&
+        !incode_region_set(&r, x, c))
+        incode_region_set_all(&r);
+    incode_regions_set(&look->regions, look->count, &r);
+    look->cell[look->count++] = cell;
+}
+
+static bool is_set(const uint64_t *bits, uint32_t i) {
+    return (bits[i / 64] >> i % 64 & 1) != 0;
+}
+
+static uint32_t count_of(uint64_t cells) {
+    return (uint32_t)__builtin_popcountll(cells);
+}
+
+/* Those of some cells that may reach a child. */
+static uint64_t meeting(const struct incode_look *look,
+                        const struct incode_boxes *boxes, unsigned child,
+                        const double lo[3], const double hi[3],
+                        uint64_t cells) {
+    struct incode_lifted l;
+    incode_maker_breathe(look->maker, 2 + count_of(cells) / 2);
+    uint64_t met = incode_regions_meeting(&look->regions, cells, lo, hi);
+    if (met == 0 || !incode_boxes_lifted(boxes, child, &l))
+        return met;
+    incode_maker_breathe(look->maker, count_of(met));
+    return incode_regions_meeting_lifted(&look->regions, met, boxes, &l);
+}
+
+/* Whether bricks [first, end) need no look. */
+static bool is_passed(const struct incode_look *look, uint32_t first,
+                      uint32_t end) {
+    if (end <= look->at ||
+        (first >= look->pass_first && end <= look->pass_last))
+        return true;
+    return end - first == 1 && (is_set(look->passed, first) ||
+                                (look->every && is_set(look->wanted, first)));
+}
+
+/* Looks at what is below page `index` of a level of boxes, whose children have
+ * `span` bricks each. */
+static enum incode_look_result look_below(struct incode_look *look,
+                                          uint32_t level, uint32_t index,
+                                          uint64_t span, uint64_t cells) {
+    const struct incode_tree *tree = &look->maker->tree;
+    const struct incode_frame *f =
+        incode_pager_get(&look->maker->pager, tree->base[level] + index);
+    if (f == NULL)
+        return INCODE_LOOK_WAITING;
+    if (look->pages-- == 0)
+        return INCODE_LOOK_MORE;
+    alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
+    const struct incode_boxes boxes = f->page.boxes;
+    uint32_t first = index * INCODE_FANOUT;
+    uint32_t count = tree->count[level - 1] - first;
+    count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
+    incode_maker_breathe(look->maker, 4);
+    incode_boxes_axes(&boxes, lo, hi);
+    for (uint32_t i = 0; i < count; i++) {
+        uint64_t end = (first + i + 1) * span;
+        end = end < tree->bricks ? end : tree->bricks;
+        if (is_passed(look, (uint32_t)((first + i) * span), (uint32_t)end))
+            continue;
+        const double from[3] = {lo[0][i], lo[1][i], lo[2][i]};
+        const double to[3] = {hi[0][i], hi[1][i], hi[2][i]};
+        cells &= look->every ? ~UINT64_C(0) : ~look->reached;
+        uint64_t met = meeting(look, &boxes, i, from, to, cells);
+        if (met != 0 && level > 1) {
+            enum incode_look_result r = look_below(look, level - 1, first + i,
+                                                   span / INCODE_FANOUT, met);
+            if (r != INCODE_LOOK_DONE)
+                return r;
+        }
+        if (met != 0 && level == 1) {
+            look->wanted[(first + i) / 64] |= UINT64_C(1) << (first + i) % 64;
+            look->reached |= met;
+        }
+        look->at = (uint32_t)end;
+    }
+    return INCODE_LOOK_DONE;
+}
+
+enum incode_look_result incode_look_go(struct incode_look *look) {
+    const struct incode_tree *tree = &look->maker->tree;
+    uint64_t span = 1;
+    if (tree->levels < 2 || look->count == 0)
+        return INCODE_LOOK_DONE;
+    look->pages = PAGES;
+    for (uint32_t level = 2; level < tree->levels; level++)
+        span *= INCODE_FANOUT;
+    return look_below(look, tree->levels - 1, 0, span,
+                      ~UINT64_C(0) >> (INCODE_LOOK_CELLS - look->count));
+}
+
+/* --- handover ------------------------------------------------------------- */
+
+enum {
+    CELLS = 256,          /* a step */
+    HANDOVER_AT_ONCE = 16 /* points or cells, in a breath */
+};
+
+/* A vertex's `cell`, which is not needed any more. */
+enum { NOT_REACHED = 0, HANDOVER_REACHED = 1 };
+
+static void handover_breathe_at(const struct incode_handover *h, uint32_t i) {
+    if (i % HANDOVER_AT_ONCE == 0)
+        incode_maker_breathe(h->n->maker, HANDOVER_AT_ONCE / 4);
+}
+
+void incode_handover_begin(struct incode_handover *h,
+                           struct incode_insertion *n) {
+    struct incode_complex *x = &n->complex;
+    memset(h, 0, sizeof *h);
+    h->n = n;
+    h->cell = INCODE_COMPLEX_CELLS_FIRST;
+    h->vertex = 1;
+    h->brick = n->own_first;
+    for (uint32_t v = 0; v < x->points; v++) {
+        handover_breathe_at(h, v);
+        if (incode_complex_is_vertex(x, v))
+            x->point[v].cell = NOT_REACHED;
+    }
+}
+
+/* Sends what waits; false: there is no room for it. */
+static bool send(struct incode_handover *h) {
+    const struct incode_front_outside *outside = &h->n->outside;
+    if (h->count > 0 && !outside->spill(outside->context, h->faces, h->count))
+        return false;
+    h->count = 0;
+    return true;
+}
+
+/* The open face opposite vertex k of a cell, seen so that the cell is on its
+ * unknown side. */
+static void open_face(struct incode_handover *h, struct incode_front *front,
+                      const struct incode_cell *c, unsigned k) {
+    static const uint8_t BEFORE[4][3] = {
+        {3, 2, 1}, {2, 3, 0}, {1, 0, 3}, {0, 1, 2}};
+    struct incode_complex_point *point = h->n->complex.point;
+    uint32_t f[3];
+    const double *p[3];
+    unsigned turn;
+    for (unsigned i = 0; i < 3; i++) {
+        uint16_t v = c->v[BEFORE[k][i]];
+        point[v].cell = HANDOVER_REACHED;
+        f[i] = point[v].id;
+        p[i] = point[v].p;
+    }
+    if (!incode_front_key(front, f, p, &turn))
+        return;
+    h->faces[h->count++] =
+        (struct incode_face){{f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]}};
+}
+
+static enum incode_insertion_step send_faces(struct incode_handover *h,
+                                             struct incode_front *front) {
+    const struct incode_complex *x = &h->n->complex;
+    for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
+        const struct incode_cell *c = incode_complex_cell(x, h->cell);
+        handover_breathe_at(h, h->cell);
+        if (incode_cell_is_free(c))
+            continue;
+        if (h->count + 4 > INCODE_BRICK_POINTS && !send(h))
+            return INCODE_INSERTION_WAITING;
+        for (unsigned k = 0; k < 4; k++)
+            if (c->n[k].cell == INCODE_COMPLEX_GONE)
+                open_face(h, front, c, k);
+    }
+    return INCODE_INSERTION_WORKED;
+}
+
+/* The points of own bricks to come that a released tetrahedron has. */
+static enum incode_insertion_step send_ahead(struct incode_handover *h) {
+    const struct incode_complex *x = &h->n->complex;
+    for (unsigned i = 0; i < CELLS && h->vertex < x->points; i++, h->vertex++) {
+        const struct incode_complex_point *v = &x->point[h->vertex];
+        uint32_t brick = v->id / INCODE_BRICK_POINTS;
+        if (v->cell != HANDOVER_REACHED || brick < h->n->from ||
+            brick >= h->n->own_last)
+            continue;
+        if (h->count == INCODE_BRICK_POINTS && !send(h))
+            return INCODE_INSERTION_WAITING;
+        h->faces[h->count++] =
+            (struct incode_face){{v->id, INCODE_NONE, INCODE_NONE}};
+    }
+    return INCODE_INSERTION_WORKED;
+}
+
+/* The points of a brick that a released tetrahedron has: those that have no
+ * cell any more, or an open face. */
+static enum incode_insertion_step send_reached(struct incode_handover *h) {
+    const struct incode_complex *x = &h->n->complex;
+    uint32_t brick = h->brick;
+    uint32_t points = incode_maker_count(h->n->maker, brick);
+    if (points == 0)
+        return INCODE_INSERTION_WAITING;
+    if (!send(h))
+        return INCODE_INSERTION_WAITING;
+    uint64_t reached = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - points);
+    for (uint32_t v = 1; v < x->points; v++) {
+        handover_breathe_at(h, v);
+        if (x->point[v].cell == NOT_REACHED &&
+            x->point[v].id / INCODE_BRICK_POINTS == brick)
+            reached &= ~(UINT64_C(1) << x->point[v].id % INCODE_BRICK_POINTS);
+    }
+    for (; reached != 0; reached &= reached - 1)
+        h->faces[h->count++] = (struct incode_face){
+            {brick * INCODE_BRICK_POINTS + (uint32_t)__builtin_ctzll(reached),
+             INCODE_NONE, INCODE_NONE}};
+    h->brick++;
+    return INCODE_INSERTION_WORKED;
+}
+
+enum incode_insertion_step incode_handover_step(struct incode_handover *h,
+                                                struct incode_front *front) {
+    const struct incode_insertion *n = h->n;
+    if (h->cell < n->complex.cells)
+        return send_faces(h, front);
+    if (h->vertex < n->complex.points)
+        return send_ahead(h);
+    while (h->brick < n->from && incode_insertion_has_committed(n, h->brick))
+        h->brick++;
+    if (h->brick < n->from)
+        return send_reached(h);
+    return send(h) ? INCODE_INSERTION_FINISHED : INCODE_INSERTION_WAITING;
 }

@@ -13,21 +13,164 @@
  * Memory: struct incode_insertion, about 2 KB, and a block given by its owner:
  * 34 KB, two bits a brick, the complex the rest.  Work: a step takes a brick
  * in, or inserts or emits some, or looks at some cells; releasing looks at each
- * once.  It listens to the maker's walker.
- *
- *     incode_insertion_init(&n, &maker, &outside);
- *     incode_insertion_start(&n, bits, memory, bytes, first, last);
- *     while ((step = incode_insertion_step(&n)) == INCODE_INSERTION_WORKED)
- *         continue;
- */
+ * once.  It listens to the maker's walker. */
 #ifndef INCODE_INSERTION_H
 #define INCODE_INSERTION_H
 
+#include <stdalign.h>
+
 #include "incode/complex/complex.h"
-#include "incode/front/job.h"
+#include "incode/pages/pages.h"
 #include "incode/apex/maker.h"
-#include "look.h"
-#include "rest.h"
+#include "incode/front/job.h"
+#include "incode/front/front.h"
+
+/* The sphere of a cell, or the half-space beyond the facet of an infinite one,
+ * to tell it from boxes of points: what is told apart holds none of them, up to
+ * every rounding; what is not may.
+ *
+ * Memory: struct incode_region, 112 bytes.  Work: constant. */
+
+/* |p - o|^2 - X (p - o) < 0, or X (p - o) > 0, but for the errors of X. */
+struct incode_region {
+    double o[3], x[3], error[3];
+    double centre[3], square; /* of a ball that holds the sphere */
+    bool infinite;
+};
+
+/* As the cell keeps it; false: nothing is known. */
+bool incode_region_set(struct incode_region *r, const struct incode_complex *x,
+                       const struct incode_cell *c);
+
+/* The same from its points, with bounds of the errors of each component; false:
+ * nothing is known.  scale: 2^k, of relative coordinates. */
+bool incode_region_set_sharp(struct incode_region *r,
+                             const struct incode_complex *x,
+                             const struct incode_cell *c, double scale);
+
+/* All of space. */
+void incode_region_set_all(struct incode_region *r);
+
+/* Whether a box reaches to or beyond a facet's plane. */
+bool incode_region_is_behind(const struct incode_region *r, const double lo[3],
+                             const double hi[3]);
+
+/* Some regions, side by side. */
+enum { INCODE_REGIONS = 64 };
+
+struct incode_regions {
+    alignas(64) double o[3][INCODE_REGIONS];
+    alignas(64) double x[3][INCODE_REGIONS];
+    alignas(64) double error[3][INCODE_REGIONS];
+    alignas(64) double centre[3][INCODE_REGIONS];
+    alignas(64) double square[INCODE_REGIONS];
+    alignas(64) double round[INCODE_REGIONS]; /* 1: a sphere, 0: half a space */
+    uint64_t infinite;                        /* a bit each */
+};
+
+void incode_regions_set(struct incode_regions *regions, unsigned i,
+                        const struct incode_region *r);
+
+/* Those of some regions, a bit each, that may hold a point of a box along the
+ * axes. */
+uint64_t incode_regions_meeting(const struct incode_regions *regions,
+                                uint64_t some, const double lo[3],
+                                const double hi[3]);
+
+/* The same of a lifted box of a page. */
+uint64_t incode_regions_meeting_lifted(const struct incode_regions *regions,
+                                       uint64_t some,
+                                       const struct incode_boxes *boxes,
+                                       const struct incode_lifted *lifted);
+
+/* A close look at cells: which bricks to come may hold a point of their
+ * spheres, as far as all boxes tell, the lifted ones, too.
+ *
+ * Some cells at a time go down the tree together, so that a page is wanted once
+ * for all of them, and each box is unpacked once.
+ *
+ * Memory: struct incode_look, about 8 KB, and bits of its owner's; stack for
+ * the levels of boxes.  Work: some pages a call, 32 boxes of each for each of
+ * the spheres that meet it. */
+
+enum { INCODE_LOOK_CELLS = INCODE_REGIONS };
+
+enum incode_look_result {
+    INCODE_LOOK_DONE,
+    INCODE_LOOK_MORE,   /* call again */
+    INCODE_LOOK_WAITING /* for a page, which is asked for */
+};
+
+struct incode_look {
+    struct incode_maker *maker;
+    double scale; /* 2^k, of relative coordinates */
+    /* A bit a brick: not to be looked at; reached, now or before. */
+    const uint64_t *passed;
+    uint64_t *wanted;
+    bool every; /* all bricks that a cell reaches, not one */
+    uint32_t pass_first, pass_last; /* bricks that are passed, too */
+    uint32_t at;                    /* bricks before it have been looked at */
+    uint32_t pages;                 /* left in this call */
+    uint32_t count;
+    uint64_t reached; /* a bit a cell */
+    uint32_t cell[INCODE_LOOK_CELLS];
+    struct incode_regions regions;
+};
+
+void incode_look_init(struct incode_look *look, struct incode_maker *maker,
+                      const uint64_t *passed, uint64_t *wanted);
+
+/* No cells yet; bricks [first, last) are passed.  every: all bricks that a cell
+ * may reach become wanted, but which cells do is not told; else one of them,
+ * for each cell that does. */
+void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
+                       uint32_t last);
+
+static inline bool incode_look_is_full(const struct incode_look *look) {
+    return look->count == INCODE_LOOK_CELLS;
+}
+
+void incode_look_add(struct incode_look *look, const struct incode_complex *x,
+                     uint32_t cell);
+
+/* Looks at some pages. */
+enum incode_look_result incode_look_go(struct incode_look *look);
+
+/* Whether cell i of those added may reach a brick. */
+static inline bool incode_look_has_reached(const struct incode_look *look,
+                                           uint32_t i) {
+    return (look->reached >> i & 1) != 0;
+}
+
+/* The points that have not been inserted yet, as far as the highest boxes tell:
+ * whether one may lie in the sphere of a cell, which is final otherwise.
+ *
+ * They are the bricks before one and those from another on: some 30 boxes of
+ * each level for each of the two.  What these do not tell, look.h does.
+ *
+ * Memory: struct incode_rest, about 21 KB.  Work: incode_rest_reaches looks at
+ * these boxes. */
+
+enum { INCODE_REST_MAX = (INCODE_LEVELS_MAX - 1) * 2 * INCODE_FANOUT };
+
+struct incode_rest {
+    /* Absolute coordinates; filled up to a multiple of 8 with boxes that
+     * nothing reaches. */
+    alignas(64) double lo[3][INCODE_REST_MAX];
+    alignas(64) double hi[3][INCODE_REST_MAX];
+    uint32_t count;
+};
+
+/* All bricks before one and from another on, before < from; false: a page is
+ * missing. */
+bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
+                     uint32_t before, uint32_t from);
+
+/* Whether a point of the rest may lie in the sphere of a cell, or beyond its
+ * facet or in its plane, as far as the rest's boxes tell. */
+bool incode_rest_reaches(const struct incode_rest *rest,
+                         const struct incode_complex *x,
+                         const struct incode_cell *c);
 
 enum {
     INCODE_INSERTION_EMITTED = 128,    /* tetrahedra at a time */
@@ -146,5 +289,86 @@ incode_insertion_has_committed(const struct incode_insertion *n,
 }
 
 enum incode_insertion_step incode_insertion_step(struct incode_insertion *n);
+
+/* The stages of an insertion, for the files of this room alone: insertion.c
+ * takes points in, finality.c says which cells are final, emission.c emits and
+ * releases them.
+ *
+ * Memory: the insertion's.  Work: a bounded part of the stage a call. */
+
+enum {
+    INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */
+    INCODE_INSERTION_STEPS = 64, /* a call, at most */
+    INCODE_INSERTION_UNITS = 4,  /* of work, a point */
+    INCODE_INSERTION_CELLS = 16  /* looked at as a unit of work */
+};
+
+/* Begins to take the bricks [from, to) in. */
+void incode_insertion_take_in(struct incode_insertion *n);
+
+enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_look(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n);
+
+/* Begins to emit the cells that are proved. */
+void incode_insertion_begin_list(struct incode_insertion *n);
+
+enum incode_insertion_step incode_insertion_list(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_release(struct incode_insertion *n);
+enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n);
+
+static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i) {
+    bits[i / 64] |= UINT64_C(1) << i % 64;
+}
+
+/* A point has become a vertex before its turn, or is another's. */
+static inline void incode_insertion_note(const struct incode_insertion *n,
+                                         uint32_t id) {
+    if (n->inserted != NULL)
+        n->inserted[id / INCODE_BRICK_POINTS] |= UINT64_C(1)
+                                                 << id % INCODE_BRICK_POINTS;
+}
+
+/* Whether it has, as far as that is known. */
+static inline bool incode_insertion_has_noted(const struct incode_insertion *n,
+                                              uint32_t id) {
+    return n->inserted != NULL &&
+           (n->inserted[id / INCODE_BRICK_POINTS] >> id % INCODE_BRICK_POINTS &
+            1) != 0;
+}
+
+/* Whether the own bricks are all there are. */
+static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
+    return n->own_last - n->own_first == n->maker->tree.bricks;
+}
+
+/* What an insertion leaves to the front when it does not fit any more: the
+ * faces between released tetrahedra and what is not final, which are open, and
+ * which vertices have been reached.  All goes out as spilled toggles, so that
+ * the front begins with nothing in memory and has each brick's brought back in
+ * its turn.
+ *
+ * Memory: struct incode_handover.  Work: a step looks at some cells, or at the
+ * points once for a brick. */
+
+struct incode_handover {
+    struct incode_insertion *n;
+    uint32_t cell;   /* at work: facets of cells first, */
+    uint32_t vertex; /* then vertices ahead of their turn, */
+    uint32_t brick;  /* then points of bricks */
+    struct incode_face faces[INCODE_BRICK_POINTS];
+    uint32_t count;
+};
+
+void incode_handover_begin(struct incode_handover *h,
+                           struct incode_insertion *n);
+
+/* front: idle, with the rule and the bricks of the job, which is its next one.
+ * INCODE_INSERTION_FINISHED: all has gone out. */
+enum incode_insertion_step incode_handover_step(struct incode_handover *h,
+                                                struct incode_front *front);
 
 #endif

@@ -8,14 +8,9 @@
  * group of frames in 32, and of some groups as a rule; for a box of points,
  * these.
  *
- *     struct incode_frame *f = incode_pager_get(&pager, page);
- *     if (f != NULL)
- *         x = f->page.brick.x[slot];   // f stays until one is not there
- *
  * A frame stays as it is until a page is asked for that is not there.  So one
  * may be held across a walk, which returns at the first such page; not across
- * one that looks ahead, which passes them over.
- */
+ * one that looks ahead, which passes them over. */
 #ifndef INCODE_PAGER_H
 #define INCODE_PAGER_H
 
@@ -141,5 +136,40 @@ uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page);
 /* Makes one page that the shuffle keeps back ready, by chance one call in four
  * or, if `now`, at once; false: none was. */
 bool incode_pager_release(struct incode_pager *pager, bool now);
+
+/* The uniform grid of the paper, index `grid`: cells over the tight box of all
+ * points, and the two lists that say which points lie in each, in pages of
+ * 384 words: first[cell], and the vertex numbers sorted by cell.
+ *
+ * Memory: struct incode_grid.  Work: constant; a word may need a page. */
+
+/* The grid: so many cells in x, y and z over the box [lo, hi]. */
+struct incode_grid {
+    struct incode_pager *pager;
+    const struct incode_tree *tree;
+    const double *lo, *hi;
+    const uint32_t *cells;
+};
+
+/* Cell of coordinate p along one side [lo, hi] of the uniform grid:
+ * floor((p - lo) / (hi - lo) * cells), clamped to [0, cells).  It never falls
+ * as p grows, and no finite input overflows it. */
+uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p);
+
+/* Cell of a point: (iz * cells[1] + iy) * cells[0] + ix. */
+uint32_t incode_cell_of(const double lo[3], const double hi[3],
+                        const uint32_t cells[3], const double p[3]);
+
+/* Along dimension d, a coordinate that no point of the cells from `cell` on
+ * lies below. */
+double incode_cells_lowest(const struct incode_grid *g, int d, uint32_t cell);
+
+/* The same from above, for the cells up to `cell`. */
+double incode_cells_highest(const struct incode_grid *g, int d, uint32_t cell);
+
+/* Word i of the list whose pages begin at `base`; false: page *missing is.
+ * Beyond the end of a list, where who made it erred, it is 0. */
+bool incode_cells_word(const struct incode_grid *g, uint32_t base, uint32_t i,
+                       uint32_t *word, uint32_t *missing);
 
 #endif

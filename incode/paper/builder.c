@@ -3,7 +3,7 @@
 #include <assert.h>
 #include <string.h>
 
-#include "incode/arena.h"
+#include "incode/state.h"
 #include "incode/predicates/check.h"
 
 static_assert((int)INCODE_LISTS_MAX <= INCODE_SEARCHES, "a search for each");

@@ -1,4 +1,4 @@
-#include "fixed.h"
+#include "exact.h"
 
 #include <string.h>
 

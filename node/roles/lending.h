@@ -20,8 +20,7 @@
 #include "node/message.h"
 #include "incode/triangulator.h"
 #include "node/page_check.h"
-#include "incode/borrower.h"
-#include "incode/lender.h"
+#include "incode/lending.h"
 
 /* Tetrahedra on their way to other nodes, for an exchange: small batches, each
  * for one node, that leave as soon as the link has room.

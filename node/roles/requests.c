@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "incode/pages/sound.h"
+#include "incode/pages/pages.h"
 #include "incode/predicates/check.h"
 #include "node/setup.h"
 

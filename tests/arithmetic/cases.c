@@ -4,8 +4,6 @@
 
 #include "draw.h"
 #include "incode/predicates/exact.h"
-#include "incode/predicates/fixed.h"
-#include "incode/predicates/pair.h"
 #include "incode/predicates/predicates.h"
 #include "single.h"
 #include "steps.h"

@@ -1,6 +1,6 @@
 #include "single.h"
 
-#include "incode/predicates/two_product.h"
+#include "incode/predicates/double_double.h"
 
 static void doubles(struct record *r, double a, double b) {
     record_double(r, "a", a);

@@ -13,8 +13,7 @@
 #ifndef TESTS_UNIT_SEVERAL_H
 #define TESTS_UNIT_SEVERAL_H
 
-#include "incode/borrower.h"
-#include "incode/lender.h"
+#include "incode/lending.h"
 #include "solo.h"
 
 enum {

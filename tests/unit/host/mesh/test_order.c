@@ -12,7 +12,7 @@
 
 #include "host/mesh/duplicates.h"
 #include "host/mesh/order.h"
-#include "incode/pages/cells.h"
+#include "incode/pages/pager.h"
 
 static uint64_t state = 7;
 

@@ -8,12 +8,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "incode/apex/empty_spheres.h"
-#include "incode/apex/close_candidates.h"
-#include "incode/apex/local_points.h"
+#include "incode/apex/sphere.h"
+#include "incode/apex/lanes.h"
+#include "incode/apex/horizon.h"
 #include "incode/predicates/predicates.h"
 #include "incode/apex/query.h"
-#include "incode/apex/half_space.h"
 
 /* The shortcuts of the search against the predicates: what they rule out must
  * be ruled out exactly. */

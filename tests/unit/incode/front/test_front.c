@@ -12,7 +12,7 @@
 
 #include "host/mesh/gen.h"
 #include "incode/front/front.h"
-#include "incode/front/owner.h"
+#include "incode/front/job.h"
 #include "tests/unit/incode/oracle.h"
 #include "tests/unit/reference.h"
 

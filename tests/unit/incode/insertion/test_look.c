@@ -5,7 +5,7 @@
  * nor which cells are looked at together changes anything. */
 #include "points_scene.h"
 
-#include "incode/insertion/look.h"
+#include "incode/insertion/insertion.h"
 
 enum { MANY = 70000, BRICKS_MAX = 2048, WORDS = BRICKS_MAX / 64 };
 

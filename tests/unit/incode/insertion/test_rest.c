@@ -3,7 +3,7 @@
  * middle for the rest, at any scale; and of the others some. */
 #include "points_scene.h"
 
-#include "incode/insertion/rest.h"
+#include "incode/insertion/insertion.h"
 
 enum { MANY = 70000, VOLUME = 6 };
 

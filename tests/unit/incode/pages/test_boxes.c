@@ -11,8 +11,7 @@
 
 #include <cmocka.h>
 
-#include "incode/pages/boxes.h"
-#include "incode/pages/sound.h"
+#include "incode/pages/pages.h"
 
 static uint64_t state = 1;
 

@@ -12,10 +12,8 @@
 #include <zlib.h>
 
 #include "incode/predicates/exact.h"
-#include "incode/predicates/fixed.h"
-#include "incode/predicates/pair.h"
 #include "incode/predicates/predicates.h"
-#include "incode/predicates/two_product.h"
+#include "incode/predicates/double_double.h"
 #include "tests/unit/emulated.h"
 #include "exact_reference.h"
 #include "hard_points.h"

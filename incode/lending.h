@@ -1,3 +1,24 @@
+/* A triangulator that lends stars (front/loan.h), and uses what was found
+ * there between its own steps. */
+#ifndef INCODE_LENDING_H
+#define INCODE_LENDING_H
+
+#include "incode/front/exchange.h"
+#include "triangulator.h"
+
+/* As incode_front_lend_run. */
+bool incode_triangulator_lend(struct incode_triangulator *t,
+                              struct incode_loan *loan);
+
+/* Uses what was found from *used on, sound, about so many units, 1 at least.
+ * INCODE_WORKED: call again; INCODE_WAITING: there is no room for it before its
+ * own steps have made some; INCODE_FINISHED: all of it is used, the loan is
+ * over; INCODE_BROKEN. */
+enum incode_step incode_triangulator_use(struct incode_triangulator *t,
+                                         const struct incode_loan *loan,
+                                         const struct incode_found *found,
+                                         uint32_t *used, uint32_t units);
+
 /* Who closes stars for another: takes a run that a front has lent
  * (front/loan.h), and finds tetrahedra beside its faces by the maker of its own
  * triangulator, whose front it leaves alone.  It keeps the faces that are open
@@ -9,19 +30,7 @@
  *
  * Memory: struct incode_borrower, about 2.6 KB, and a search of the maker.
  * Work: a step goes on as far as a page that is missing, or the units that it
- * is allowed.
- *
- *     incode_borrower_begin(&borrower, t, &loan);
- *     while (!borrower.done)
- *         if (incode_borrower_step(&borrower, t, 100) == INCODE_WAITING)
- *             deliver(t);   // by incode_triangulator_page, what was asked for
- *     send(&borrower.found, incode_found_bytes(&borrower.found));
- */
-#ifndef INCODE_BORROWER_H
-#define INCODE_BORROWER_H
-
-#include "incode/front/loan.h"
-#include "triangulator.h"
+ * is allowed. */
 
 enum { INCODE_BORROWER_OPEN = 128 /* faces at once; where more, it ends */ };
 
