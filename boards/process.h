@@ -1,12 +1,5 @@
 /* What nodes that are processes of a system have in common, whatever brings
- * their bytes.
- *
- * Memory: none.  Work: a system call, or a pass over the program's segments.
- *
- *     board.fixed_bytes = process_static_bytes() + stack;
- *     board.arena = process_arena(board.arena_bytes);
- *     now_us = process_clock_us(CLOCK_MONOTONIC);
- */
+ * their bytes. */
 #ifndef BOARDS_PROCESS_H
 #define BOARDS_PROCESS_H
 

@@ -28,9 +28,7 @@ enum incode_step incode_triangulator_use(struct incode_triangulator *t,
  * of the run.  It stops when as much is found as fits an answer; what is open
  * then is the lender's as before.
  *
- * Memory: struct incode_borrower, about 2.6 KB, and a search of the maker.
- * Work: a step goes on as far as a page that is missing, or the units that it
- * is allowed. */
+ * Memory: struct incode_borrower, about 2.6 KB, and a search of the maker. */
 
 enum { INCODE_BORROWER_OPEN = 128 /* faces at once; where more, it ends */ };
 

@@ -41,9 +41,7 @@ struct incode_triangulator {
 };
 
 /* How a triangulator's arena is divided: the triangulator itself, a bit a
- * brick, the maker's share, and the front's or an insertion's.
- *
- * Memory: the arena.  Work: constant, but for tables that are cleared. */
+ * brick, the maker's share, and the front's or an insertion's. */
 
 static inline size_t incode_arena_aligned(size_t bytes) {
     return (bytes + 63) & ~(size_t)63;

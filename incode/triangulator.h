@@ -4,19 +4,16 @@
  * front asks, the maker answers.  Or it inserts all points into a triangulation
  * of its own, where they fit.
  *
- * Memory: one arena, divided by incode_triangulator_init (memory map: struct
- * incode_map), and anew where a job goes another way than the one before. Work:
- * a call of incode_triangulator_step closes at most one star, or takes one
- * search as far as one missing page, or some steps of an insertion
+ * Work: a call of incode_triangulator_step closes at most one star, or takes
+ * one search as far as one missing page, or some steps of an insertion
  * (insertion/insertion.h).  With the indexes `naive` and `grid` it builds at
- * most one tetrahedron, and looks at no more than 256 pages of points or about
- * 4,096 rows of cells and points.
+ * most one tetrahedron, and looks at no more than 256 pages of points or
+ * about 4,096 rows of cells and points.
  *
  *     t = incode_triangulator_init(arena, bytes, &setup, &outside, &why);
  *     incode_triangulator_start(t, &job);
  *     while (incode_triangulator_step(t) != INCODE_FINISHED)
- *         deliver(t);   // by incode_triangulator_page, what was asked for
- */
+ *         deliver(t);   // by incode_triangulator_page, what was asked for */
 #ifndef INCODE_TRIANGULATOR_H
 #define INCODE_TRIANGULATOR_H
 

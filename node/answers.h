@@ -2,9 +2,8 @@
  * asked until there is room for the answer, sends echoes back and its own out,
  * and knows when it is to restart.
  *
- * Memory: struct node_answers, a part of struct node; an answer is made on the
- * stack, CUBE_PAYLOAD_MAX bytes.  Work: constant a message; an answer costs
- * what the teller takes, and a step without any nothing. */
+ * Memory: struct node_answers, a part of struct node; an answer is made on
+ * the stack, CUBE_PAYLOAD_MAX bytes. */
 #ifndef NODE_ANSWERS_H
 #define NODE_ANSWERS_H
 

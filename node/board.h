@@ -2,9 +2,8 @@
  * struct, calls node_start once and node_step until it is stopped, and needs
  * nothing of other rooms but a driver of transport/drivers, where one fits.
  *
- * Memory: the arena is the whole of a node's tables; `fixed` states what the
- * board holds besides (.data, .bss, stack).  Work: every function returns at
- * once, but for idle, which sleeps until its time is over or a byte comes.
+ * Work: every function returns at once, but for idle, which sleeps until its
+ * time is over or a byte comes.
  *
  *     struct node *node = node_start(&board, &why);
  *     while (node_step(node) != NODE_STOPPED)

@@ -2,15 +2,8 @@
  * dimension from the greetings of its neighbours, its epoch from what its board
  * has that never comes again.  A board calls this before node_start.
  *
- * Memory: struct learner, the caller's.  Work: a call reads what the links have
- * brought, LEARN_BYTES each at most, and never waits.
- *
- *     node_identity_listen_ports(&learner, &board, 4, true);
- *     while (!node_identity_hear(&learner, &board.identity)) {
- *         node_identity_ask(&learner, board.now_us(board.context));
- *         board.idle(board.context, 50000);
- *     }
- */
+ * Work: a call reads what the links have brought, LEARN_BYTES each at most,
+ * and never waits. */
 #ifndef NODE_IDENTITY_H
 #define NODE_IDENTITY_H
 

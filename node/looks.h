@@ -1,14 +1,6 @@
 /* What a node sees of its links: that they move their frames often enough, in
  * the midst of long work as well, which have been up, which have fallen silent,
- * and what its board measures.
- *
- * Memory: struct node_looks, a part of struct node.  Work: node_looks_poll is
- * cube_poll, the others a few steps a link.
- *
- *     moved = node_looks_poll(&looks, board.now_us(board.context));
- *     news = node_looks_silent(&looks, now_us);
- *     node_looks_idle(&looks);
- */
+ * and what its board measures. */
 #ifndef NODE_LOOKS_H
 #define NODE_LOOKS_H
 

@@ -2,7 +2,7 @@
  * layouts.  All numbers little-endian, structs without padding, so that a node
  * copies them as they are (a machine of another byte order refuses to start).
  *
- * Memory: none.  Work: none.  Every message fits CUBE_PAYLOAD_MAX bytes. */
+ * Every message fits CUBE_PAYLOAD_MAX bytes. */
 #ifndef NODE_MESSAGE_H
 #define NODE_MESSAGE_H
 
@@ -378,9 +378,7 @@ static_assert(sizeof(struct node_spill_header) +
  * full its memory, what it last said; and what it is told to do but compute.
  * All of them are asked and answered in any role and in none, in the midst of a
  * run as well; a board's loader answers NODE_WHO, NODE_LINKS, NODE_LOG and
- * NODE_PROBE.  Both ends count these messages as all others (message.h).
- *
- * Memory: none.  Work: none.  Layouts as in message.h. */
+ * NODE_PROBE.  Both ends count these messages as all others (message.h). */
 
 enum node_question {
     NODE_WHO = 1, /* struct node_who */

@@ -2,10 +2,8 @@
  * (roles/roles.h), and moves messages between them.  Nothing here waits; the
  * board sleeps when a step had nothing to do.
  *
- * Memory: the board's arena, filled as struct node_map of message.h states.
- * Work: a step handles the frames that links hold, then lets the role
- * compute for NODE_PACE_US (pace.h) and send what may leave.  Where a piece of
- * its work takes longer, the links move their frames in its midst (looks.h).
+ * Work: a step handles the frames that links hold, then lets the role compute
+ * for NODE_PACE_US (pace.h) and send what may leave.
  *
  *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)

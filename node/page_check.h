@@ -11,15 +11,8 @@
  * Bernstein, SipHash: a fast short-input PRF, 2012, in its form of 32 bits):
  * additions, rotations and exclusive ors alone.
  *
- * Memory: the struct.  Work: a pass over the page: 13,300 instructions on
- * x86-64, 2 us; some 10,000 on a Cortex-M3, 0.4 ms at 25 MHz.
- *
- *     size = node_page_seal(&body, setup.page_key, bytes);      // the host
- *     node_page_check_init(&check, &setup, &counted, &fault);   // a node
- *     if (node_page_check_take(&check, &message, &page))
- *         data = page.bytes;
- *     sent = node_page_check_send(&check);   // and so in every step
- */
+ * Work: a pass over the page: 13,300 instructions on x86-64, 2 us; some
+ * 10,000 on a Cortex-M3, 0.4 ms at 25 MHz. */
 #ifndef NODE_PAGE_CHECK_H
 #define NODE_PAGE_CHECK_H
 

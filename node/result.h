@@ -13,8 +13,8 @@
  * were found by the sender.  The node's number is in bits 2-7 of the head; 63
  * there means that it is in the two bytes behind.
  *
- * Memory: the caller's.  Work: about 3 ns a tetrahedron each way; a batch is
- * read whatever its bytes are, without reading past its end. */
+ * Work: about 3 ns a tetrahedron each way; a batch is read whatever its bytes
+ * are, without reading past its end. */
 #ifndef NODE_RESULT_H
 #define NODE_RESULT_H
 
@@ -85,8 +85,7 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
 /* Messages of a node that wait for credit or for room on their link: a ring of
  * message buffers that are filled in place and leave in order.
  *
- * Memory: NODE_OUTBOX_BYTES(slots), from the node's arena.  Work: constant a
- * call. */
+ * Memory: NODE_OUTBOX_BYTES(slots), from the node's arena. */
 
 struct node_outbox_slot {
     uint16_t size;

@@ -144,12 +144,14 @@ static void look(struct node_pace *pace, uint32_t units) {
                                             : (uint32_t)fit;
 }
 
-bool node_pace_goes_on(struct node_pace *pace, uint32_t units) {
+/* Looks at it.  False: it is time to look at the links. */
+static bool node_pace_goes_on(struct node_pace *pace, uint32_t units) {
     look(pace, units);
     return pace->looked_us - pace->begun_us < NODE_PACE_LAST_US;
 }
 
-void node_pace_end(struct node_pace *pace, uint32_t units) {
+/* Work ends with so many, that is, fewer. */
+static void node_pace_end(struct node_pace *pace, uint32_t units) {
     look(pace, units);
 }
 

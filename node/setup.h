@@ -131,12 +131,6 @@ static inline bool node_pace_is_due(const struct node_pace *pace,
     return units * NODE_PACE_LOOKS >= pace->units;
 }
 
-/* Looks at it.  False: it is time to look at the links. */
-bool node_pace_goes_on(struct node_pace *pace, uint32_t units);
-
-/* Work ends with so many, that is, fewer. */
-void node_pace_end(struct node_pace *pace, uint32_t units);
-
 /* Steps between two looks at the links: as many as NODE_STEPS and the time
  * allow, while `step` does something.  It may work about so many units, and
  * sets how many it has.  How many steps did something. */

@@ -1,9 +1,6 @@
 /* The version of the programs: the host's and the nodes' are built together.
  *
- * Memory, work: none.
- *
- *     const char *name = "incode-node " NODE_VERSION;
- */
+ * Memory, work: none. */
 #ifndef NODE_VERSION_H
 #define NODE_VERSION_H
 

@@ -1,13 +1,5 @@
 /* Numbers among the bytes of a wire, the low byte first, whatever the machine's
- * order and alignment.
- *
- * Memory: none.  Work: constant; a compiler makes a load or store of each where
- * the machine has the order.
- *
- *     uint8_t bytes[4];
- *     bytes_put32(bytes, 0x04030201);   // 1, 2, 3, 4
- *     if (bytes_get16(bytes + 2) != 0x0403) return 1;
- */
+ * order and alignment. */
 #ifndef TRANSPORT_BYTES_H
 #define TRANSPORT_BYTES_H
 

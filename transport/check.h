@@ -1,10 +1,5 @@
 /* Assertions that stay on in production: an invariant that fails stops the
- * node at once, on any board.
- *
- * Memory: none.  Work: a comparison and a branch that is not taken.
- *
- *     LINK_ASSERT(slot < window);
- */
+ * node at once, on any board. */
 #ifndef TRANSPORT_CHECK_H
 #define TRANSPORT_CHECK_H
 

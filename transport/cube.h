@@ -22,8 +22,7 @@
  *     while (cube_poll(cube, now_us) > 0 && cube_read(cube, &message))
  *         cube_release(cube);
  *     if (cube_write(cube, CUBE_HOST, type, data, size) == CUBE_AGAIN)
- *         return 0; // later
- */
+ *         return 0; // later */
 #ifndef TRANSPORT_CUBE_H
 #define TRANSPORT_CUBE_H
 

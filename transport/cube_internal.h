@@ -3,10 +3,7 @@
  * (wrong wires in words).  Not for others, but
  * for who plays an end of a cube falsely: host/sim/stand_in.c.
  *
- * Memory and work: see cube.h.
- *
- *     cube_gossip(cube, now_us);
- */
+ * Memory and work: see cube.h. */
 #ifndef TRANSPORT_CUBE_INTERNAL_H
 #define TRANSPORT_CUBE_INTERNAL_H
 

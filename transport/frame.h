@@ -4,12 +4,7 @@
  * whatever went before, and believes no length or number that is not checked.
  *
  * Memory: none but a constant table of 1 KB.  Work: linear in the bytes given;
- * CRC-32C takes most of it where the processor does not compute it.
- *
- *     size_t n = frame_encode(out, &header, payload);
- *     if (frame_open(&reader, in, n - 1, &header) == FRAME_GOOD)
- *         good = frame_take(&reader, &header, slot) == FRAME_GOOD;
- */
+ * CRC-32C takes most of it where the processor does not compute it. */
 #ifndef TRANSPORT_FRAME_H
 #define TRANSPORT_FRAME_H
 

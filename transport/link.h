@@ -4,11 +4,10 @@
  * frame layout, handshake and timers.
  *
  * Memory: link_bytes() bytes that the caller gives: struct link, `window`
- * slots of `frame_payload` bytes each way, one message less one slot so that a
- * message of several frames lies in one piece, and two staging buffers of
- * `staging` encoded frames.  Credits are the receiver's free slots, so nothing
- * is ever received that has no place.  Work: link_poll handles at most window +
- * 2 frames each way, and calls the pipe at most 2 window + 5 times.
+ * slots of `frame_payload` bytes each way, one message less one slot so that
+ * a message of several frames lies in one piece, and two staging buffers of
+ * `staging` encoded frames.  Work: link_poll handles at most window + 2
+ * frames each way, and calls the pipe at most 2 window + 5 times.
  *
  *     struct link *link = link_init(memory, bytes, &config);
  *     link_poll(link, now_us);

@@ -29,7 +29,7 @@
  * that all come to the same whatever the order and number of datagrams, and how
  * it looks as bytes.  PROTOCOL.md has the layout.
  *
- * Memory: the caller's.  Work: at most CUBE_DEAD_MAX^2 comparisons a call. */
+ * Work: at most CUBE_DEAD_MAX^2 comparisons a call. */
 
 enum {
     WIRING_HEAD = 14, /* bytes, then 3 a dead link, 7 a wrong wire */

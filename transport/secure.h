@@ -9,12 +9,10 @@
  * which ends a frame.  Many in a row fail the connection; the link goes on over
  * the next.
  *
- * Memory: struct secure_shake while a connection is not proven, struct
- * secure_records then; keys are wiped as soon as they are not needed.  Work: a
- * shake hashes five short inputs, opens one empty record, and multiplies twice
- * on the curve, where it listens only for who knows the key; all else is linear
- * in the bytes given and taken, and between two good records no more than
- * SECURE_LOST_MAX bytes are opened or skipped in vain. */
+ * Work: a shake hashes five short inputs, opens one empty record, and
+ * multiplies twice on the curve, where it listens only for who knows the key;
+ * all else is linear in the bytes given and taken, and between two good
+ * records no more than SECURE_LOST_MAX bytes are opened or skipped in vain. */
 #ifndef TRANSPORT_SECURE_H
 #define TRANSPORT_SECURE_H
 
@@ -63,9 +61,7 @@ struct secure_suite {
  *
  * Without random bytes whoever knows the cube's key and the device can draw the
  * same: a wire has forward secrecy if one of its ends at least has random
- * bytes, or a device that nobody else knows.
- *
- * Memory: struct secure_source.  Work: two short hashes, and the board's. */
+ * bytes, or a device that nobody else knows. */
 
 enum { SECURE_DEVICE_BYTES = 32 };
 

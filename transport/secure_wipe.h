@@ -1,11 +1,5 @@
 /* Zeros that a compiler must write, where nobody reads them: over keys that
- * were used, and all that they can be computed from.
- *
- * Memory: none.  Work: linear in the bytes.
- *
- *     uint8_t root[32];
- *     secure_wipe(root, sizeof root);
- */
+ * were used, and all that they can be computed from. */
 #ifndef TRANSPORT_SECURE_WIPE_H
 #define TRANSPORT_SECURE_WIPE_H
 

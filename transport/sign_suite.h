@@ -3,13 +3,7 @@
  * Ed25519 (RFC 8032).  They are given, so that what uses them stays free of any
  * system; drivers/sign_sodium.h has those of libsodium.
  *
- * Memory: SIGN_HASH_BYTES, the caller's, aligned to 64.  Work: linear in the
- * bytes; `good` is two scalar multiplications.
- *
- *     suite->begin(hash);
- *     suite->add(hash, bytes, sizeof bytes);
- *     suite->end(hash, digest);
- */
+ * Memory: SIGN_HASH_BYTES, the caller's, aligned to 64. */
 #ifndef TRANSPORT_SIGN_SUITE_H
 #define TRANSPORT_SIGN_SUITE_H
 

@@ -1,13 +1,5 @@
 /* Words and figures put together in a text of bounded size, for messages that
- * a user reads: no stdio where there is no system.
- *
- * Memory: the caller's.  Work: a pass over what is put.
- *
- *     struct cube_text text = cube_text_in(room, sizeof room);
- *     cube_text_put(&text, "node ");
- *     cube_text_number(&text, 5);
- *     cube_text_printable(&text, "of \x1b[2J");
- */
+ * a user reads: no stdio where there is no system. */
 #ifndef TRANSPORT_TEXT_H
 #define TRANSPORT_TEXT_H
 

@@ -1,15 +1,8 @@
 /* A bare board as its node asks for it (node/board.h): pipes, time, sleep, who
  * it is, and its console; for the node program and the loader alike.
  *
- * Memory: struct bare_node, of which there is one.  Work: bare_node_learn waits
- * until a neighbour has told who the node is; the others return at once, but
- * for idle.
- *
- *     bare_node_begin(&bare, false);
- *     bare_node_tell_start(&bare);
- *     bare_node_learn(&bare);
- *     node = node_start(&bare.board, &why);
- */
+ * Work: bare_node_learn waits until a neighbour has told who the node is; the
+ * others return at once, but for idle. */
 #ifndef BOARDS_BARE_AS_NODE_H
 #define BOARDS_BARE_AS_NODE_H
 

@@ -1,15 +1,6 @@
 /* A node without an operating system: what its board must give, and what all
  * such boards share (this folder).  A board's start-up code sets up stacks,
- * .data and .bss (start.ld), and calls bare_main with interrupts off.
- *
- * Memory: that of start.ld's sections.  Work: each function's bound is beside
- * it.
- *
- *     board_start();
- *     board_unlock(0);
- *     while (!bare_uart_heard(&bare_uart[0]))
- *         board_wait(10000);
- */
+ * .data and .bss (start.ld), and calls bare_main with interrupts off. */
 #ifndef BOARDS_BARE_BARE_H
 #define BOARDS_BARE_BARE_H
 

@@ -2,13 +2,8 @@
  * its link: a record is 00 FF text 00.  One who reads frames drops it, as no
  * frame begins with FF and ends in such text; a terminal shows the text.
  *
- * Memory: none.  Work: waits for the UART, 100 ms a byte at most, and gives up
- * at the first that is not taken.
- *
- *     bare_console_begin();
- *     bare_console_put("incode: mps2-an500: started\r\n");
- *     bare_console_end();
- */
+ * Work: waits for the UART, 100 ms a byte at most, and gives up at the first
+ * that is not taken. */
 #ifndef BOARDS_BARE_CONSOLE_H
 #define BOARDS_BARE_CONSOLE_H
 

@@ -1,11 +1,4 @@
-/* Registers in words, for a fault's report.
- *
- * Memory: the caller's.  Work: a pass over the text.
- *
- *     struct cube_text text = cube_text_in(room, sizeof room);
- *     bare_text_hex(&text, 0x20400000, 8);   // 0x20400000
- *     bare_text_registers(&text, registers, 2);
- */
+/* Registers in words, for a fault's report. */
 #ifndef BOARDS_BARE_FAULT_TEXT_H
 #define BOARDS_BARE_FAULT_TEXT_H
 

@@ -1,7 +1,6 @@
 /* What a loader tells the image that it starts: in memory that neither clears,
  * at a place and in a layout on which they agree, of whatever version they are.
- *
- * Memory: struct bare_handover, in .noinit.  Work: a CRC over it. */
+ */
 #ifndef BOARDS_BARE_HANDOVER_H
 #define BOARDS_BARE_HANDOVER_H
 
@@ -35,8 +34,7 @@ bool bare_handover_drop(void);
 /* Why a board was restarted, as it was known before: kept in memory that a
  * restart leaves alone, and a loss of power does not.  A loader and the images
  * that it starts agree on its layout and place, of whatever version they are.
- *
- * Memory: struct bare_reason, in .noinit.  Work: a CRC over it. */
+ */
 
 enum bare_reason_kind {
     BARE_POWER_ON,

@@ -11,8 +11,10 @@
 #include "fault_text.h"
 #include "node/loader/incoming.h"
 #include "node/version.h"
-#include "sign_key.h"
+#include "transport/sign_suite.h"
 #include "transport/drivers/sign_sodium.h"
+
+extern const uint8_t bare_sign_key[SIGN_PUBLIC_BYTES];
 
 static struct bare_node bare;
 static struct loader_rules rules;

@@ -1,10 +1,6 @@
 /* Where start.ld has laid things.
  *
- * Memory, work: none.
- *
- *     board.arena = bare_arena;
- *     board.arena_bytes = bare_bytes(bare_arena, bare_arena_end);
- */
+ * Memory, work: none. */
 #ifndef BOARDS_BARE_SECTIONS_H
 #define BOARDS_BARE_SECTIONS_H
 

@@ -3,13 +3,6 @@
  * frames, as a record of console.h.  No frame is mistaken for a line: its
  * second byte is its kind (transport/PROTOCOL.md), which is no letter.  While
  * somebody types, and no frame comes, none is sent, for they are unreadable.
- *
- * Memory: struct bare_shell.  Work: constant a byte.
- *
- *     bare_shell_init(&shell, bare_uart_pipe(0));
- *     board.pipes[0] = bare_shell_pipe(&shell);
- *     if (bare_shell_line(&shell, line, board_now_us()))
- *         bare_shell_say(&shell, "incode: help, who, links\r\n");
  */
 #ifndef BOARDS_BARE_SHELL_H
 #define BOARDS_BARE_SHELL_H

@@ -1,10 +1,7 @@
 /* The node's stack: the start-up code has filled it with BARE_PAINT, so that
  * what was never used can be told from what was.
  *
- * Memory: none.  Work: a pass over the words that were never used.
- *
- *     uint32_t bytes = bare_stack_high_water();
- */
+ * Work: a pass over the words that were never used. */
 #ifndef BOARDS_BARE_STACK_H
 #define BOARDS_BARE_STACK_H
 

@@ -14,9 +14,7 @@
 
 /* Bytes from one who puts them to one who takes them, where one of the two is
  * an interrupt's handler: neither waits for the other, and neither needs a
- * lock.
- *
- * Memory: the caller's, a power of two bytes.  Work: constant a byte. */
+ * lock. */
 
 /* In handlers, which call nobody. */
 #define BARE_INLINE static inline __attribute__((always_inline))

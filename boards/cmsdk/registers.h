@@ -1,11 +1,7 @@
 /* Registers of Arm's Cortex-M System Design Kit, as on the MPS2 boards, and of
  * the Cortex-M processor itself.
  *
- * Memory, work: none.
- *
- *     if ((*cmsdk_at(CMSDK_TIMER) & 1) == 0)
- *         cortex_barrier();
- */
+ * Memory, work: none. */
 #ifndef BOARDS_CMSDK_REGISTERS_H
 #define BOARDS_CMSDK_REGISTERS_H
 

@@ -1,11 +1,4 @@
-/* What is wrong with what a user has asked of a node on Linux.
- *
- * Memory: none; texts stay the caller's.  Work: a few writes.
- *
- *     fault = (struct linux_fault){"--key", path, "does not open",
- *                                  "name a file that can be read", errno};
- *     fault_print(&fault);
- */
+/* What is wrong with what a user has asked of a node on Linux. */
 #ifndef BOARDS_LINUX_FAULT_H
 #define BOARDS_LINUX_FAULT_H
 

@@ -1,10 +1,4 @@
-/* The arguments of incode-node.
- *
- * Memory: the caller's; texts stay those of the arguments.  Work: one pass.
- *
- *     if (!linux_options_read(argv + 1, &options, &fault))
- *         fault_print(&fault);
- */
+/* The arguments of incode-node. */
 #ifndef BOARDS_LINUX_OPTIONS_H
 #define BOARDS_LINUX_OPTIONS_H
 

@@ -1,15 +1,4 @@
-/* The wires of a node on Linux: sockets, or terminals.
- *
- * Memory: struct linux_wire, and for a wire over TCP or at a path struct
- * tcp_wire, in memory that is given.  Work: as the drivers'.
- *
- *     linux_wire_inherit(&wire[0], fd);
- *     if (!linux_wire_open(&wire[1], "call:10.0.0.7:7001", &guard, &net,
- *                          &fault))
- *         return 1;
- *     board.pipes[0] = linux_wire_pipe(&wire[0]);
- *     linux_wires_idle(wire, 2, wait_us, 0);
- */
+/* The wires of a node on Linux: sockets, or terminals. */
 #ifndef BOARDS_LINUX_WIRE_H
 #define BOARDS_LINUX_WIRE_H
 

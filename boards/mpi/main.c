@@ -1,14 +1,6 @@
 /* A node as a rank of MPI.  It has no options of its own: rank 0, the host,
  * says how large the cube is and how much memory a node has, and rank i + 1 is
- * node i.  Its links are pipes to the ranks of its neighbours.
- *
- * Memory: a node's is --memory, as on other boards: its arena, its .data and
- * .bss, and a stack.  Nothing but the arena is enforced: what MPI allocates,
- * and the pipes' buffers, which stand for those of a network, are not the
- * node's.  Work: that of the node.
- *
- *     mpirun -np 9 incode run --link mpi ...      becomes this in ranks 1 .. 8
- */
+ * node i.  Its links are pipes to the ranks of its neighbours. */
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>

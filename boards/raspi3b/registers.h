@@ -1,11 +1,7 @@
 /* Registers of the Raspberry Pi 3 (Broadcom, BCM2835 ARM Peripherals, and
  * QA7 for those of the processors), and what C cannot say (start.S).
  *
- * Memory, work: none.
- *
- *     raspi3b_at(RASPI3B_GPIO)[0x94 / 4] = 2; // pull up
- *     raspi3b_sleep();
- */
+ * Memory, work: none. */
 #ifndef BOARDS_RASPI3B_REGISTERS_H
 #define BOARDS_RASPI3B_REGISTERS_H
 
@@ -80,10 +76,6 @@ extern const struct loader_flash raspi3b_flash;
  */
 
 void raspi3b_pl011(void);
-void raspi3b_pl011_receive(void);
-void raspi3b_pl011_send(void);
 void raspi3b_mini(void);
-void raspi3b_mini_receive(void);
-void raspi3b_mini_send(void);
 
 #endif

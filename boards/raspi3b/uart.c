@@ -51,7 +51,7 @@ enum { CORE_HZ = 250000000 }; /* enable_uart=1 in config.txt holds it there */
 
 /* Bytes that come leave the interrupt when they are taken; it is never cleared,
  * as that would hide those that are left. */
-RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
+static RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[FR] & FR_NOTHING_CAME) == 0;
          n++) {
@@ -63,7 +63,7 @@ RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
 
 /* The interrupt comes when no more than 2 bytes are left; as long as there are
  * others to send, 4 are put at least, so that it comes again. */
-RASPI3B_HANDLER void raspi3b_pl011_send(void) {
+static RASPI3B_HANDLER void raspi3b_pl011_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     uint8_t byte;
     uart[ICR] = INT_SEND;
@@ -74,7 +74,7 @@ RASPI3B_HANDLER void raspi3b_pl011_send(void) {
     }
 }
 
-RASPI3B_HANDLER void raspi3b_mini_receive(void) {
+static RASPI3B_HANDLER void raspi3b_mini_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint32_t state = LSR_CAME;
     for (int n = 0; n < BARE_BYTES_A_CALL && (state & LSR_CAME) != 0; n++) {
@@ -86,7 +86,7 @@ RASPI3B_HANDLER void raspi3b_mini_receive(void) {
 
 /* Its interrupt comes as long as it has nothing to send: so it is asked for
  * while there is. */
-RASPI3B_HANDLER void raspi3b_mini_send(void) {
+static RASPI3B_HANDLER void raspi3b_mini_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint8_t byte;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[LSR] & LSR_ROOM) != 0 &&

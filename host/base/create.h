@@ -3,14 +3,7 @@
  * link is not followed if it is the last name of a path, so a link that another
  * user has planted there has no effect.  Links in the folders above are the
  * user's own choice.  tests/lint refuses other ways of making a file or folder
- * in host/.
- *
- * Memory: none.  Work: a few system calls each.
- *
- *     int folder = host_folder_open("lab.cube.d", &error);
- *     int chip = host_folder_file(folder, "flash0", O_RDWR | O_CREAT);
- *     int key = host_create("lab.key", 0600);
- */
+ * in host/. */
 #ifndef HOST_CREATE_H
 #define HOST_CREATE_H
 

@@ -1,12 +1,7 @@
 /* Large arrays straight from the kernel: zeroed, on huge pages where there are
  * any, grown without a copy, given back at once; and how much is left.
  *
- * Memory: what is touched, rounded up to 4 KiB.  Work: the kernel's.
- *
- *     double *x = host_map(24 * n);
- *     x = host_remap(x, 24 * n, 48 * n);
- *     host_unmap(x, 48 * n);
- */
+ * Memory: what is touched, rounded up to 4 KiB. */
 #ifndef HOST_MEMORY_H
 #define HOST_MEMORY_H
 

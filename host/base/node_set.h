@@ -1,13 +1,7 @@
 /* A set of nodes as a person writes it, "0-3,7", or "all", and as answers are
  * told of several at once.
  *
- * Memory: 128 bytes.  Work: a pass over the text, or the nodes.
- *
- *     struct host_node_set set;
- *     if (host_node_set_parse(&set, "0-3,7", 8, &error) != 0)
- *         return error.code;
- *     host_node_set_print(&set, text, sizeof text); // "0-3,7"
- */
+ * Memory: 128 bytes. */
 #ifndef HOST_NODE_SET_H
 #define HOST_NODE_SET_H
 

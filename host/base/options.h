@@ -2,11 +2,7 @@
  * whatever is wrong is a host_error, names the option that may have been meant,
  * and is printed as other errors are.
  *
- * Memory: 4 KB of stack.  Work: two passes over the arguments.
- *
- *     if (host_options_parse(&argp, argc, argv, 0, &wanted, &error) != 0)
- *         return error.code;
- */
+ * Memory: 4 KB of stack. */
 #ifndef HOST_OPTIONS_H
 #define HOST_OPTIONS_H
 

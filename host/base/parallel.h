@@ -1,12 +1,6 @@
 /* Fork and join on a few threads, and what one call of the library may use.
  *
- * Memory: a thread's stack for each fork.  Work: 20 us a fork.
- *
- *     struct host_fork fork;
- *     host_fork_start(&fork, first_half, &job);
- *     second_half(&job);
- *     host_fork_join(&fork);
- */
+ * Work: 20 us a fork. */
 #ifndef HOST_PARALLEL_H
 #define HOST_PARALLEL_H
 

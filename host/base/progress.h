@@ -7,14 +7,7 @@
  * it side by side.
  *
  * Memory: a screen of text, 17 KiB of stack to draw it.  Work: one at most ten
- * times a second; else one look at the clock.
- *
- *     host_progress_begin(true);
- *     host_progress_phase("triangulating", "Mtet");
- *     host_progress_show(done, total, tetrahedra);
- *     host_note("node %u: %s", 3, "it does not answer");
- *     host_progress_end();
- */
+ * times a second; else one look at the clock. */
 #ifndef HOST_PROGRESS_H
 #define HOST_PROGRESS_H
 

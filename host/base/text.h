@@ -1,8 +1,7 @@
 /* Texts that come from elsewhere - names of files, nodes and devices, what a
  * file or a peer says - on their way to a terminal and to a shell.
  *
- * Memory: the caller's; HOST_SAY_BYTES of stack to say something.  Work: one
- * pass. */
+ * Memory: the caller's; HOST_SAY_BYTES of stack to say something. */
 #ifndef HOST_TEXT_H
 #define HOST_TEXT_H
 

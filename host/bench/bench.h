@@ -1,6 +1,4 @@
-/* `incode bench`: its arguments, and the benchmark that they name.
- *
- * Memory: the options.  Work: that of the benchmark. */
+/* `incode bench`: its arguments, and the benchmark that they name. */
 #ifndef HOST_BENCH_BENCH_H
 #define HOST_BENCH_BENCH_H
 
@@ -12,9 +10,7 @@
 int host_bench(int argc, char **argv, struct host_error *error);
 
 /* What a link does over a wire, measured from one of its ends: `incode bench
- * links` has two processes, each with an end, for each driver.
- *
- * Memory: a link.  Work: some seconds. */
+ * links` has two processes, each with an end, for each driver. */
 
 enum {
     HOST_BENCH_MESSAGE = 1600, /* bytes: a page and its head */
@@ -50,9 +46,7 @@ struct link_config host_bench_serial(uint32_t baud);
 uint64_t host_bench_used_us(void);
 
 /* The peers of `incode bench peers`: small programs about other triangulators,
- * of which those are made whose packages are here.
- *
- * Memory: their paths.  Work: a compiler's, the first time. */
+ * of which those are made whose packages are here. */
 
 struct host_bench_builds {
     bool there[HOST_BENCH_PEERS];

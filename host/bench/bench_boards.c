@@ -244,8 +244,10 @@ static void draw_key(FILE *file, int y) {
     }
 }
 
-int host_boards_plot(const char *path, const struct host_boards_row *rows,
-                     unsigned count, struct host_error *error) {
+/* 0, or HOST_BROKEN. */
+static int host_boards_plot(const char *path,
+                            const struct host_boards_row *rows, unsigned count,
+                            struct host_error *error) {
     double most = 1;
     int y = TOP;
     for (unsigned i = 0; i < count; i++) {

@@ -1,8 +1,7 @@
 /* `incode bench boards`: what a tetrahedron costs an emulated board, in
  * instructions and in bytes on its wires, and where they go.
  *
- * Memory: a table of a board's functions and of its blocks, some 30 MB.  Work:
- * a minute a board. */
+ * Memory: a table of a board's functions and of its blocks, some 30 MB. */
 #ifndef HOST_BENCH_BOARDS_H
 #define HOST_BENCH_BOARDS_H
 
@@ -25,8 +24,7 @@ int host_bench_boards(const struct host_bench_boards_options *options,
  * tells.  What the compiler has put into a function from another room is that
  * function's.  A loader, which runs below the image, is not counted.
  *
- * Memory: 24 bytes a function, freed before it returns.  Work: a pass over the
- * map, a search a block. */
+ * Memory: 24 bytes a function, freed before it returns. */
 
 enum host_room {
     HOST_ROOM_PREDICATES,
@@ -65,9 +63,5 @@ struct host_boards_row {
 
 /* Percent of all that were counted. */
 double host_boards_share(const struct host_boards_row *row, unsigned room);
-
-/* 0, or HOST_BROKEN. */
-int host_boards_plot(const char *path, const struct host_boards_row *rows,
-                     unsigned count, struct host_error *error);
 
 #endif

@@ -65,7 +65,9 @@ static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
     return (double)(s->now_us - begin);
 }
 
-int host_bench_sim(struct host_bench_row *row, struct host_error *error) {
+/* 0, or HOST_BROKEN without memory. */
+static int host_bench_sim(struct host_bench_row *row,
+                          struct host_error *error) {
     static struct sim_bench s;
     static const struct sim_quality quality = {.bytes_per_s =
                                                    HOST_BENCH_SIM_BYTES,

@@ -1,7 +1,5 @@
 /* `incode bench links`: what a link does over each driver, between two
- * processes.
- *
- * Memory: two links.  Work: some seconds a driver. */
+ * processes. */
 #ifndef HOST_BENCH_LINKS_H
 #define HOST_BENCH_LINKS_H
 
@@ -15,24 +13,15 @@
 int host_bench_links(struct host_error *error);
 
 /* What a link does over a simulated serial line, both ends in this process and
- * in virtual time.
- *
- * Memory: two links and a wire.  Work: some milliseconds. */
+ * in virtual time. */
 
 enum { HOST_BENCH_SIM_BYTES = 300000 }; /* a second, of the line */
-
-/* 0, or HOST_BROKEN without memory. */
-int host_bench_sim(struct host_bench_row *row, struct host_error *error);
 
 /* A run in virtual time: the host's service and the nodes as they are, in one
  * process on the simulator's world (host/sim/sim_world.h), without faults.
  * Each node's work is charged as the machine's model has it (model.h), each
  * message by the wires; the host's own work is not charged.  The same on every
- * machine that does the same arithmetic, however many processors it has.
- *
- * Memory: that of the nodes as far as they use it, and of the points and
- * tetrahedra as in run.h.  Work: that of all nodes together, and some
- * microseconds a message and hop. */
+ * machine that does the same arithmetic, however many processors it has. */
 
 struct host_virtual_run {
     const struct host_bench_machine *machine;

@@ -69,8 +69,9 @@ int host_bench_set_made(struct host_bench_set *set, const char *kind,
                : hold(set, &points, error);
 }
 
-int host_bench_set_read(struct host_bench_set *set, const char *path,
-                        struct host_error *error) {
+/* Of a file that `incode run` reads; named as it, without its extensions. */
+static int host_bench_set_read(struct host_bench_set *set, const char *path,
+                               struct host_error *error) {
     struct host_points points = {0};
     const char *slash = strrchr(path, '/');
     memset(set, 0, sizeof *set);
@@ -198,7 +199,8 @@ static const char *const ways[HOST_WAYS][7] = {
                          "1M"},
 };
 
-const struct host_bench_class *host_bench_class_row(unsigned i) {
+/* Row i; NULL past the last. */
+static const struct host_bench_class *host_bench_class_row(unsigned i) {
     return i < CLASSES ? &classes[i] : NULL;
 }
 
@@ -221,12 +223,15 @@ const char *host_bench_class_names(void) {
     return names;
 }
 
-const char *const *host_bench_way_options(enum host_bench_way way) {
+/* Its options, ended by NULL. */
+static const char *const *host_bench_way_options(enum host_bench_way way) {
     return ways[way];
 }
 
-double host_bench_goal(const struct host_bench_class *c, const char *name,
-                       bool *named) {
+/* The ratio that a file of this name is held to in a class; *named: it has one
+ * of its own, and counts as one of many points. */
+static double host_bench_goal(const struct host_bench_class *c,
+                              const char *name, bool *named) {
     *named = false;
     for (unsigned i = 0; i < sizeof goals / sizeof goals[0]; i++) {
         if (strcmp(name, goals[i].name) == 0) {

@@ -1,7 +1,5 @@
 /* `incode bench peers`: this program and other triangulators on the same points
- * by turns, in classes, with medians, ratios and goals.
- *
- * Memory: the largest set, thrice.  Work: ROUNDS runs a program and set. */
+ * by turns, in classes, with medians, ratios and goals. */
 #ifndef HOST_BENCH_PEERS_H
 #define HOST_BENCH_PEERS_H
 
@@ -78,28 +76,16 @@ struct host_bench_class {
     double summary[HOST_BENCH_PEERS]; /* of the median, or mean, of ratios */
 };
 
-/* Row i; NULL past the last. */
-const struct host_bench_class *host_bench_class_row(unsigned i);
-
 /* NULL: none has the name. */
 const struct host_bench_class *host_bench_class_named(const char *name);
 
 /* "real, small, cube", for help and messages. */
 const char *host_bench_class_names(void);
 
-/* Its options, ended by NULL. */
-const char *const *host_bench_way_options(enum host_bench_way way);
-
-/* The ratio that a file of this name is held to in a class; *named: it has one
- * of its own, and counts as one of many points. */
-double host_bench_goal(const struct host_bench_class *c, const char *name,
-                       bool *named);
-
 /* A set of points for several programs to read, as a .npy that has no name on
  * any disk and is gone with this process.
  *
- * Memory: 24 bytes a point, and the points once more while it is made.  Work:
- * a copy. */
+ * Memory: 24 bytes a point, and the points once more while it is made. */
 
 struct host_bench_set {
     char name[64];
@@ -111,10 +97,6 @@ struct host_bench_set {
 /* Of host_gen, seed 1. */
 int host_bench_set_made(struct host_bench_set *set, const char *kind,
                         uint64_t n, struct host_error *error);
-
-/* Of a file that `incode run` reads; named as it, without its extensions. */
-int host_bench_set_read(struct host_bench_set *set, const char *path,
-                        struct host_error *error);
 
 /* Also after a failure. */
 void host_bench_set_free(struct host_bench_set *set);

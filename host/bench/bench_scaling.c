@@ -153,7 +153,8 @@ row_of(const struct host_scaling_rows *rows, uint64_t points) {
     return NULL;
 }
 
-void host_scaling_points_head(struct host_scaling_rows *rows) {
+/* The heads of both tables. */
+static void host_scaling_points_head(struct host_scaling_rows *rows) {
     host_progress_erase();
     printf("Uniform points, sequential on one node of 4M: ns of processor time "
            "a point, of the\nnode, of the host (files apart) and of both; ns a "
@@ -170,8 +171,10 @@ void host_scaling_points_head(struct host_scaling_rows *rows) {
     }
 }
 
-void host_scaling_points_row(struct host_scaling_rows *rows,
-                             const struct host_scaling_point *point) {
+/* Takes a row and prints it.  One of 10,000,000 points is held to 1.15 times
+ * what a point costs of 1,000,000. */
+static void host_scaling_points_row(struct host_scaling_rows *rows,
+                                    const struct host_scaling_point *point) {
     const struct host_scaling_point *p = &rows->point[rows->points++];
     rows->point[rows->points - 1] = *point;
     const struct host_scaling_point *million = row_of(rows, 1000000);
@@ -201,7 +204,7 @@ void host_scaling_points_row(struct host_scaling_rows *rows,
     }
 }
 
-void host_scaling_nodes_head(uint64_t points) {
+static void host_scaling_nodes_head(uint64_t points) {
     host_progress_erase();
     printf("\nUniform %llu in virtual time, at the prices of this machine's "
            "model, as processes here\nshare processors: ns of processor time a "
@@ -227,8 +230,8 @@ static double alone(const struct host_scaling_rows *rows,
     return rows->node[i].busiest_s;
 }
 
-void host_scaling_nodes_row(struct host_scaling_rows *rows,
-                            const struct host_scaling_node *node) {
+static void host_scaling_nodes_row(struct host_scaling_rows *rows,
+                                   const struct host_scaling_node *node) {
     const struct host_scaling_node *n = &rows->node[rows->nodes++];
     rows->node[rows->nodes - 1] = *node;
     double speed_up = alone(rows, n->strategy) / n->busiest_s;
@@ -305,8 +308,9 @@ static void put_panels(FILE *plot) {
     fprintf(plot, "\nunset multiplot\n");
 }
 
-int host_scaling_draw(const struct host_scaling_rows *rows, const char *path,
-                      struct host_error *error) {
+/* 0, or as host_gnuplot_draw. */
+static int host_scaling_draw(const struct host_scaling_rows *rows,
+                             const char *path, struct host_error *error) {
     FILE *script = tmpfile();
     if (script == NULL) {
         return host_fail(error, HOST_BROKEN, "%s: %s; free memory", path,

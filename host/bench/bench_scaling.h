@@ -7,8 +7,8 @@
  * (virtual_run.h), at the prices of host_bench_here (model.h): what the busiest
  * node works, and all of them together; the host's own work is not charged.
  *
- * Memory: that of the largest run.  Work: some minutes; `quick` takes at most
- * 30,000 points and 8 nodes, and some seconds. */
+ * Work: some minutes; `quick` takes at most 30,000 points and 8 nodes, and
+ * some seconds. */
 #ifndef HOST_BENCH_SCALING_H
 #define HOST_BENCH_SCALING_H
 
@@ -29,9 +29,7 @@ struct host_scaling_options {
 int host_bench_scaling(const struct host_scaling_options *options,
                        struct host_error *error);
 
-/* The rows of `incode bench scaling`: printed, as CSV, and drawn.
- *
- * Memory: struct host_scaling_rows.  Work: a line a row. */
+/* The rows of `incode bench scaling`: printed, as CSV, and drawn. */
 
 enum { HOST_SCALING_ROWS = 24, HOST_SCALING_STRATEGIES = 2 };
 
@@ -61,26 +59,8 @@ struct host_scaling_rows {
 
 extern const char *const host_scaling_strategies[HOST_SCALING_STRATEGIES];
 
-/* The heads of both tables. */
-void host_scaling_points_head(struct host_scaling_rows *rows);
-void host_scaling_nodes_head(uint64_t points);
-
-/* Takes a row and prints it.  One of 10,000,000 points is held to 1.15 times
- * what a point costs of 1,000,000. */
-void host_scaling_points_row(struct host_scaling_rows *rows,
-                             const struct host_scaling_point *point);
-void host_scaling_nodes_row(struct host_scaling_rows *rows,
-                            const struct host_scaling_node *node);
-
-/* 0, or as host_gnuplot_draw. */
-int host_scaling_draw(const struct host_scaling_rows *rows, const char *path,
-                      struct host_error *error);
-
 /* A program that is run to be measured: the time that it says it took, or that
- * it was ended at its limit.
- *
- * Memory: what it says, a few KiB.  Work: a process, and a look ten times a
- * second. */
+ * it was ended at its limit. */
 
 struct host_trial {
     bool late;  /* it was ended at the limit; nothing else is known then */

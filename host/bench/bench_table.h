@@ -1,7 +1,5 @@
 /* A class of `incode bench peers` as a table: a row a set, goals beside what
- * is held to them, and the ratios of all rows.
- *
- * Memory: struct host_bench_table.  Work: a line a row. */
+ * is held to them, and the ratios of all rows. */
 #ifndef HOST_BENCH_TABLE_H
 #define HOST_BENCH_TABLE_H
 

@@ -33,9 +33,7 @@
  * D. Laforenza, R. Perego, R. Scopigno, C. Montani, "Evaluation of
  * parallelization strategies for an incremental Delaunay triangulator in E3",
  * Concurrency: Practice and Experience 7(1), 1995.  Speed-ups and efficiencies
- * follow from the times, to the digits that the paper prints.
- *
- * Memory: the figures.  Work: none. */
+ * follow from the times, to the digits that the paper prints. */
 
 enum { HOST_PAPER_ROWS = 9 };
 

@@ -1,7 +1,5 @@
 /* The runs of `incode bench paper` in virtual time: each is made once, however
- * many tables have it, and its sets of points as well.
- *
- * Memory: the sets, and a few numbers a run.  Work: that of the runs. */
+ * many tables have it, and its sets of points as well. */
 #ifndef HOST_BENCH_PAPER_H
 #define HOST_BENCH_PAPER_H
 
@@ -66,11 +64,6 @@ int host_paper_runs_begin(struct host_paper_runs *runs,
                           struct host_error *error);
 void host_paper_runs_end(struct host_paper_runs *runs);
 
-/* A set by its name; NULL: error tells. */
-const struct host_points *host_paper_set(struct host_paper_runs *runs,
-                                         const char *set, uint64_t points,
-                                         struct host_error *error);
-
 /* The result of a run, made where it has not been; NULL: error tells.  It stays
  * until the end. */
 const struct host_paper_result *host_paper_run(struct host_paper_runs *runs,
@@ -88,10 +81,7 @@ double host_paper_alone_s(struct host_paper_runs *runs,
  * (paper_figures.h), relation (1) of section 4.3, and the project's goals.
  * Table 1 is measured; all others are run in virtual time (virtual_run.h) on
  * the machines of model.h, and the model is held against real runs on this
- * machine.
- *
- * Memory: that of a run.  Work: some minutes; `quick` takes a tenth of the
- * points, and less than one. */
+ * machine. */
 
 struct host_paper_options {
     /* Of host_paper_tables, separated by commas; NULL: all. */
@@ -137,25 +127,13 @@ int host_paper_print_end(struct host_paper_print *print, const char *csv,
 /* A table, "2", and a part of it, with the head of its columns. */
 void host_paper_table(struct host_paper_print *print, const char *table,
                       const char *title);
-void host_paper_head(const char *first, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
 void host_paper_note(const char *format, ...)
     __attribute__((format(printf, 1, 2)));
-
-/* A row; alone_s: what its speed-up is against; the paper's series and row
- * beside it, or NULL. */
-void host_paper_line(struct host_paper_print *print,
-                     const struct host_paper_result *result, double alone_s,
-                     const struct host_bench_machine *machine,
-                     const struct host_paper_series *series,
-                     const struct host_paper_row *row);
 
 void host_paper_csv_row(struct host_paper_print *print,
                         const struct host_paper_csv *row);
 
-/* The tables of `incode bench paper` that are run in virtual time.
- *
- * Memory: struct host_paper_bench.  Work: that of the runs. */
+/* The tables of `incode bench paper` that are run in virtual time. */
 
 struct host_paper_bench {
     const struct host_paper_options *options;
@@ -185,28 +163,14 @@ int host_paper_table_7(struct host_paper_bench *bench,
  * estimate of the hybrid, and the project's goals, each said to be reached or
  * missed with its figure. */
 
-/* A hybrid of clusters of four pays where S_spatial(4N) / S_spatial(N) <
- * S_master-slaves(4), for N of 16 and more; and whether the estimate of Table 5
- * comes true.  0, or what a run ends with. */
-int host_paper_relation(struct host_paper_bench *bench,
-                        struct host_error *error);
-
-/* 0, or what a run ends with, be the goals reached or not. */
-int host_paper_goals(struct host_paper_bench *bench, struct host_error *error);
-
 /* The paper's figure 11 as an SVG through gnuplot: tetrahedra a second, and a
  * second and Mflop/s, against the number of processing elements. */
-
-/* Draws it where options->svg says, and prints what it shows.  0, what a run
- * ends with, or HOST_BROKEN where gnuplot does not draw. */
-int host_paper_figure_11(struct host_paper_bench *bench,
-                         struct host_error *error);
 
 /* What `incode bench paper` measures on this machine: Table 1, the sequential
  * program naive and optimised; and the model's prices, held against real runs
  * on one node and two.
  *
- * Memory: a run of 20,000 points.  Work: half a minute, most of it naive. */
+ * Memory: a run of 20,000 points. */
 
 /* 0, or what a run ends with. */
 int host_paper_table_1(struct host_paper_bench *bench,
@@ -217,7 +181,7 @@ int host_paper_check(struct host_paper_bench *bench, struct host_error *error);
  * once more, without the search for apexes.
  *
  * Memory: 16 bytes a face, of twice as many faces as there are tetrahedra at
- * most.  Work: four searches a tetrahedron. */
+ * most. */
 
 struct host_paper_list {
     uint64_t searches;
@@ -235,7 +199,7 @@ int host_paper_list(const struct host_tetrahedra *tets, uint64_t vertices,
  * and the prices of model.h, none of them negative, that make the sum of
  * squares of the relative errors of the node's processor time least.
  *
- * Memory: a run of 20,000 points.  Work: a second or two. */
+ * Memory: a run of 20,000 points. */
 
 enum {
     HOST_CALIBRATE_RUNS = 8,
@@ -252,17 +216,9 @@ struct host_calibration {
     unsigned runs;
 };
 
-/* quick: each run once, and not the least of nine.  0, or what a run ends
- * with. */
-int host_calibrate(bool quick, struct host_calibration *fit,
-                   struct host_error *error);
-
 /* The x >= 0 for which the sum over rows of (sum of a[row][k] x[k] - 1)^2 is
  * least. */
 void host_calibrate_fit(const double (*a)[HOST_CALIBRATE_TERMS], unsigned rows,
                         double x[HOST_CALIBRATE_TERMS]);
-
-/* Messages of a node that has told so much, as near as its bytes say. */
-double host_calibrate_messages(const struct node_finished_message *totals);
 
 #endif

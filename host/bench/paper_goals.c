@@ -80,8 +80,11 @@ static int estimate(struct host_paper_bench *bench, unsigned nodes,
     return error->code;
 }
 
-int host_paper_relation(struct host_paper_bench *bench,
-                        struct host_error *error) {
+/* A hybrid of clusters of four pays where S_spatial(4N) / S_spatial(N) <
+ * S_master-slaves(4), for N of 16 and more; and whether the estimate of Table 5
+ * comes true.  0, or what a run ends with. */
+static int host_paper_relation(struct host_paper_bench *bench,
+                               struct host_error *error) {
     double slaves = 0;
     host_paper_table(&bench->print, "relation",
                      "Relation (1): S_spatial(4N) / S_spatial(N) < "
@@ -174,7 +177,9 @@ static int hold(struct host_paper_bench *bench, const struct goal *g,
     return error->code;
 }
 
-int host_paper_goals(struct host_paper_bench *bench, struct host_error *error) {
+/* 0, or what a run ends with, be the goals reached or not. */
+static int host_paper_goals(struct host_paper_bench *bench,
+                            struct host_error *error) {
     const char *missing = "";
     host_paper_table(&bench->print, "goals", "Goals, modelled nCUBE 2");
     for (size_t i = 0; i < sizeof goals / sizeof goals[0]; i++) {
@@ -320,8 +325,10 @@ static int draw(struct host_paper_bench *bench, FILE *plot,
     return error->code;
 }
 
-int host_paper_figure_11(struct host_paper_bench *bench,
-                         struct host_error *error) {
+/* Draws it where options->svg says, and prints what it shows.  0, what a run
+ * ends with, or HOST_BROKEN where gnuplot does not draw. */
+static int host_paper_figure_11(struct host_paper_bench *bench,
+                                struct host_error *error) {
     const char *path = bench->options->svg;
     host_paper_table(
         &bench->print, "11",

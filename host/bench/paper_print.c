@@ -60,7 +60,7 @@ void host_paper_note(const char *format, ...) {
     (void)fflush(stdout);
 }
 
-void host_paper_head(const char *first, const char *format, ...) {
+static void host_paper_head(const char *first, const char *format, ...) {
     va_list arguments;
     host_progress_erase();
     printf("\n");
@@ -183,11 +183,14 @@ static void csv_of(struct host_paper_print *print,
     host_paper_csv_row(print, &line);
 }
 
-void host_paper_line(struct host_paper_print *print,
-                     const struct host_paper_result *result, double alone_s,
-                     const struct host_bench_machine *machine,
-                     const struct host_paper_series *series,
-                     const struct host_paper_row *row) {
+/* A row; alone_s: what its speed-up is against; the paper's series and row
+ * beside it, or NULL. */
+static void host_paper_line(struct host_paper_print *print,
+                            const struct host_paper_result *result,
+                            double alone_s,
+                            const struct host_bench_machine *machine,
+                            const struct host_paper_series *series,
+                            const struct host_paper_row *row) {
     const struct host_paper_result *r = result;
     unsigned nodes = elements_of(r->c.nodes, r->c.builders);
     double speed_up = over(alone_s, r->t_max);

@@ -65,9 +65,11 @@ static int make_set(const struct host_paper_runs *runs, const char *set,
                     xyz, error);
 }
 
-const struct host_points *host_paper_set(struct host_paper_runs *runs,
-                                         const char *set, uint64_t points,
-                                         struct host_error *error) {
+/* A set by its name; NULL: error tells. */
+static const struct host_points *host_paper_set(struct host_paper_runs *runs,
+                                                const char *set,
+                                                uint64_t points,
+                                                struct host_error *error) {
     for (unsigned i = 0; i < runs->sets; i++) {
         if (strcmp(runs->set[i].set, set) == 0 &&
             runs->set[i].points == points) {
@@ -438,6 +440,9 @@ static int hold(struct host_paper_bench *bench,
     return error->code;
 }
 
+static int host_calibrate(bool quick, struct host_calibration *fit,
+                          struct host_error *error);
+
 int host_paper_check(struct host_paper_bench *bench, struct host_error *error) {
     static struct host_calibration fit;
     static const struct {
@@ -530,7 +535,9 @@ static const struct {
     {"grid", 8000, 4 << 20},     {"terrain", 10000, 4 << 20},
 };
 
-double host_calibrate_messages(const struct node_finished_message *totals) {
+/* Messages of a node that has told so much, as near as its bytes say. */
+static double
+host_calibrate_messages(const struct node_finished_message *totals) {
     return (double)(totals->bytes_in + totals->bytes_out) / CUBE_PAYLOAD_MAX;
 }
 
@@ -602,8 +609,10 @@ static void divide(struct host_calibration *fit) {
     fit->price[HOST_BENCH_CALLS] = both - fit->price[HOST_BENCH_BUILT];
 }
 
-int host_calibrate(bool quick, struct host_calibration *fit,
-                   struct host_error *error) {
+/* quick: each run once, and not the least of nine.  0, or what a run ends
+ * with. */
+static int host_calibrate(bool quick, struct host_calibration *fit,
+                          struct host_error *error) {
     double a[HOST_CALIBRATE_RUNS][HOST_CALIBRATE_TERMS];
     double x[HOST_CALIBRATE_TERMS], square = 0;
     for (unsigned i = 0; i < HOST_CALIBRATE_RUNS; i++) {

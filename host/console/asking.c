@@ -18,8 +18,8 @@ int host_shell_set(struct host_shell *shell, const char *word,
     return host_node_set_parse(set, word, shell->machine.nodes, &shell->error);
 }
 
-int host_shell_node(struct host_shell *shell, const char *word,
-                    unsigned *node) {
+static int host_shell_node(struct host_shell *shell, const char *word,
+                           unsigned *node) {
     uint64_t number;
     if (host_parse_number(word, 0, shell->machine.nodes - 1, &number) != 0) {
         return host_fail(&shell->error, HOST_USAGE,
@@ -35,6 +35,10 @@ const void *host_shell_answer(const struct host_shell *shell, unsigned node,
     const struct host_visit_node *n = &shell->visit.node[node];
     return n->answered && n->size >= size ? n->answer : NULL;
 }
+
+static int host_shell_look_ask(struct host_shell *shell,
+                               const struct host_node_set *set,
+                               enum node_question what);
 
 int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
                    enum node_question what, unsigned target) {
@@ -442,9 +446,9 @@ int host_shell_reach(struct host_shell *shell) {
     return host_shell_open(shell, &shell->error);
 }
 
-int host_shell_look_ask(struct host_shell *shell,
-                        const struct host_node_set *set,
-                        enum node_question what) {
+static int host_shell_look_ask(struct host_shell *shell,
+                               const struct host_node_set *set,
+                               enum node_question what) {
     const struct host_shell_sink *sink = shell->sink;
     if (host_look_ask(&shell->look, set, what, HOST_SHELL_ANSWER_US,
                       &shell->error) != 0) {

@@ -18,6 +18,18 @@ static int leave(struct host_shell *shell, unsigned count,
     return 0;
 }
 
+static int host_shell_run(struct host_shell *shell, unsigned count,
+                          const char *const *words);
+
+static int host_shell_abort(struct host_shell *shell, unsigned count,
+                            const char *const *words);
+
+static int host_shell_wait(struct host_shell *shell, unsigned count,
+                           const char *const *words);
+
+static int host_shell_reset(struct host_shell *shell, unsigned count,
+                            const char *const *words);
+
 static const struct host_shell_command commands[] = {
     {"nodes",
      "[SET]",
@@ -392,8 +404,8 @@ static void tell_reset(struct host_shell *shell, unsigned node,
     (void)json_object_set_new(object, "reset", json_true());
 }
 
-int host_shell_reset(struct host_shell *shell, unsigned count,
-                     const char *const *words) {
+static int host_shell_reset(struct host_shell *shell, unsigned count,
+                            const char *const *words) {
     struct host_visit *visit = &shell->visit;
     struct host_node_set set, there = {{0}}, left = {{0}}, late;
     (void)count;
@@ -509,8 +521,8 @@ static int prepare_run(struct host_shell *shell) {
     return status;
 }
 
-int host_shell_run(struct host_shell *shell, unsigned count,
-                   const char *const *words) {
+static int host_shell_run(struct host_shell *shell, unsigned count,
+                          const char *const *words) {
     const struct host_shell_place *place = shell->place;
     bool behind = strcmp(words[count - 1], "&") == 0;
     if (shell->running) {
@@ -537,8 +549,8 @@ int host_shell_run(struct host_shell *shell, unsigned count,
     return await_run(shell);
 }
 
-int host_shell_abort(struct host_shell *shell, unsigned count,
-                     const char *const *words) {
+static int host_shell_abort(struct host_shell *shell, unsigned count,
+                            const char *const *words) {
     const struct host_shell_place *place = shell->place;
     int status = 0;
     (void)count, (void)words;
@@ -556,8 +568,8 @@ int host_shell_abort(struct host_shell *shell, unsigned count,
     return 0;
 }
 
-int host_shell_wait(struct host_shell *shell, unsigned count,
-                    const char *const *words) {
+static int host_shell_wait(struct host_shell *shell, unsigned count,
+                           const char *const *words) {
     (void)count, (void)words;
     return shell->running ? await_run(shell) : 0;
 }

@@ -1,11 +1,5 @@
 /* The console's commands: a row each, from which help and completion come.  A
- * new one is a row and its function.
- *
- * Memory: none.  Work: that of the command.
- *
- *     const struct host_shell_command *command = host_shell_command("ping");
- *     status = command->run(&shell, 2, words);
- */
+ * new one is a row and its function. */
 #ifndef HOST_CONSOLE_COMMANDS_H
 #define HOST_CONSOLE_COMMANDS_H
 
@@ -59,11 +53,7 @@ int host_shell_nodes(struct host_shell *, unsigned, const char *const *);
 int host_shell_links(struct host_shell *, unsigned, const char *const *);
 int host_shell_stat(struct host_shell *, unsigned, const char *const *);
 int host_shell_top(struct host_shell *, unsigned, const char *const *);
-int host_shell_run(struct host_shell *, unsigned, const char *const *);
-int host_shell_abort(struct host_shell *, unsigned, const char *const *);
-int host_shell_wait(struct host_shell *, unsigned, const char *const *);
 int host_shell_log(struct host_shell *, unsigned, const char *const *);
-int host_shell_reset(struct host_shell *, unsigned, const char *const *);
 int host_shell_ping(struct host_shell *, unsigned, const char *const *);
 int host_shell_trace(struct host_shell *, unsigned, const char *const *);
 int host_shell_memory(struct host_shell *, unsigned, const char *const *);
@@ -82,7 +72,6 @@ void host_shell_note(struct host_shell *shell, const char *format, ...)
 /* The set that a word names, all where it is NULL. */
 int host_shell_set(struct host_shell *shell, const char *word,
                    struct host_node_set *set);
-int host_shell_node(struct host_shell *shell, const char *word, unsigned *node);
 
 /* Gives the wires up, until a command needs them. */
 void host_shell_leave_cube(struct host_shell *shell);
@@ -111,9 +100,6 @@ int host_shell_answers(struct host_shell *shell,
 /* The cube for this command: its own, or a look at another program's. */
 int host_shell_reach(struct host_shell *shell);
 void host_shell_look_end(struct host_shell *shell);
-int host_shell_look_ask(struct host_shell *shell,
-                        const struct host_node_set *set,
-                        enum node_question what);
 
 /* What a run has said, without the name that a note and a failure have before
  * them anyway. */
@@ -137,15 +123,5 @@ const char *host_shell_time(uint64_t us, char text[HOST_SHELL_FIGURE]);
 enum { HOST_SHELL_BAR = 64 };
 const char *host_shell_bar(double part, unsigned cells,
                            char text[HOST_SHELL_BAR]);
-
-/* How a link is, as struct node_link_state has it: "up", "dead", "wrong wire:
- * node 3"; of the host's own wire as well. */
-const char *host_shell_state(const struct node_link_state *link, char *text,
-                             size_t size);
-struct node_link_state host_shell_own_link(const struct host_shell *shell);
-
-/* Remembers what was lost on the links of a node that has answered NODE_LINKS,
- * and notes what has been lost since it did before. */
-void host_shell_note_lost(struct host_shell *shell, unsigned node);
 
 #endif

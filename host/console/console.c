@@ -22,7 +22,8 @@ static void interrupt(int number) {
     ending = number;
 }
 
-int host_script_ending(void) {
+/* The signal that ends it, for who has cleared away; 0: none came. */
+static int host_script_ending(void) {
     return ending;
 }
 
@@ -48,7 +49,7 @@ static bool interrupted(void *context) {
     return ending != 0;
 }
 
-const struct host_shell_sink *host_script_sink(void) {
+static const struct host_shell_sink *host_script_sink(void) {
     static const struct host_shell_sink sink = {
         NULL, show_line, show_note, show_failed, NULL, NULL, interrupted};
     const struct sigaction action = {.sa_handler = interrupt,
@@ -96,8 +97,10 @@ static size_t do_lines(struct host_shell *shell, char *text, size_t used) {
     return used;
 }
 
-int host_script_read(struct host_shell *shell, const char *name, int file,
-                     struct host_error *error) {
+/* Does the lines until the end, `exit` or a signal.  0, or HOST_INPUT: it
+ * cannot be read. */
+static int host_script_read(struct host_shell *shell, const char *name,
+                            int file, struct host_error *error) {
     static char text[HOST_SCRIPT_LINE];
     size_t used = 0;
     while (!shell->leaves && await_bytes(shell, file)) {

@@ -1,6 +1,6 @@
 /* `incode console`: a person, or a script, and a cube.
  *
- * Memory: the shell's.  Work: until the person leaves, or the script ends. */
+ * Work: until the person leaves, or the script ends. */
 #ifndef HOST_CONSOLE_CONSOLE_H
 #define HOST_CONSOLE_CONSOLE_H
 
@@ -12,8 +12,8 @@ int host_console_command(int argc, char **argv, struct host_error *error);
 /* `incode nodes`: the console's `nodes`, once: who is there, what is missing,
  * what is wired wrongly, and what to do next.
  *
- * Memory: the shell's.  Work: until all nodes have answered, or those that have
- * not are known to be behind wires that are dead; 12 s at most. */
+ * Work: until all nodes have answered, or those that have not are known to be
+ * behind wires that are dead; 12 s at most. */
 
 /* 0: all are there, and their wires; HOST_CUBE: not, which is said. */
 int host_nodes_command(int argc, char **argv, struct host_error *error);
@@ -21,19 +21,8 @@ int host_nodes_command(int argc, char **argv, struct host_error *error);
 /* The console without a person: lines of a file, of a pipe or of an option, and
  * answers on standard output.
  *
- * Memory: HOST_SCRIPT_LINE bytes.  Work: reads when there is something to read,
- * and tends the cube meanwhile. */
+ * Memory: HOST_SCRIPT_LINE bytes. */
 
 enum { HOST_SCRIPT_LINE = 65536 };
-
-const struct host_shell_sink *host_script_sink(void);
-
-/* Does the lines until the end, `exit` or a signal.  0, or HOST_INPUT: it
- * cannot be read. */
-int host_script_read(struct host_shell *shell, const char *name, int file,
-                     struct host_error *error);
-
-/* The signal that ends it, for who has cleared away; 0: none came. */
-int host_script_ending(void);
 
 #endif

@@ -1,10 +1,33 @@
-#include "drawing.h"
+/* A drawing of the cube's wires in letters, dead and wrong ones marked: as a
+ * person sees it up to dimension 4, as a matrix beyond. */
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include "transport/cube.h"
 
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "commands.h"
+
+enum { HOST_DRAWING_MAX = 4 }; /* dimensions */
+
+enum host_wire_state {
+    HOST_WIRE_UP,
+    HOST_WIRE_UNKNOWN, /* nobody at its ends has answered */
+    HOST_WIRE_DOWN,
+    HOST_WIRE_DEAD,
+    HOST_WIRE_WRONG
+};
+
+struct host_drawing {
+    unsigned dimension;
+    uint8_t wire[CUBE_NODES_MAX][CUBE_LINKS_MAX]; /* of the lower end; link
+                                                     `dimension` of node 0: the
+                                                     host's */
+    bool absent[CUBE_NODES_MAX];
+};
 
 /* A cube of three dimensions: dimension 0 to the right, 1 up, 2 to the back. */
 enum {
@@ -96,7 +119,8 @@ static void print_canvas(const struct canvas *c, unsigned dimension,
     }
 }
 
-void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
+/* Up to HOST_DRAWING_MAX. */
+static void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
     struct canvas c;
     unsigned nodes = 1u << drawing->dimension;
     unsigned dimensions = drawing->dimension < 3 ? drawing->dimension : 3;
@@ -120,8 +144,9 @@ void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
     fprintf(out, "%*s%c\n%*shost\n", LEFT, "", mark, LEFT, "");
 }
 
-void host_drawing_row(const struct host_drawing *drawing, unsigned node,
-                      char text[CUBE_LINKS_MAX + 1]) {
+/* A letter for each link of a node. */
+static void host_drawing_row(const struct host_drawing *drawing, unsigned node,
+                             char text[CUBE_LINKS_MAX + 1]) {
     for (unsigned d = 0; d < drawing->dimension; d++) {
         text[d] = mark_of(drawing->wire[node & ~(1u << d)][d]);
     }
@@ -147,6 +172,11 @@ static void add_end(struct host_drawing *drawing, unsigned node, unsigned d,
         *wire = (uint8_t)state;
     }
 }
+
+static struct node_link_state
+host_shell_own_link(const struct host_shell *shell);
+
+static void host_shell_note_lost(struct host_shell *shell, unsigned node);
 
 static void gather(struct host_shell *shell, struct host_drawing *drawing) {
     struct node_link_state link = host_shell_own_link(shell);
@@ -203,6 +233,9 @@ static void tell_drawing(struct host_shell *shell,
     }
     free(text);
 }
+
+static const char *host_shell_state(const struct node_link_state *link,
+                                    char *text, size_t size);
 
 /* "wrong wire: node 3 link 1" of an end of the wire that says so, or NULL. */
 static const char *said_by_end(const struct host_shell *shell, unsigned node,
@@ -304,8 +337,10 @@ int host_shell_wires(struct host_shell *shell, unsigned count,
 
 /* links: how each link of each node is, and what was lost on it. */
 
-const char *host_shell_state(const struct node_link_state *link, char *text,
-                             size_t size) {
+/* How a link is, as struct node_link_state has it: "up", "dead", "wrong wire:
+ * node 3"; of the host's own wire as well. */
+static const char *host_shell_state(const struct node_link_state *link,
+                                    char *text, size_t size) {
     static const char *const states[] = {"down",   "opening", "up",   "silent",
                                          "closed", "closed",  "wrong"};
     static const char *const refusals[] = {"",           "another version",
@@ -330,7 +365,8 @@ const char *host_shell_state(const struct node_link_state *link, char *text,
     return text;
 }
 
-struct node_link_state host_shell_own_link(const struct host_shell *shell) {
+static struct node_link_state
+host_shell_own_link(const struct host_shell *shell) {
     const struct cube *cube = shell->visit.cube;
     const struct link_statistics *s = cube_link_statistics(cube, 0);
     const struct link_peer *peer = cube_link_peer(cube, 0);
@@ -352,7 +388,9 @@ struct node_link_state host_shell_own_link(const struct host_shell *shell) {
     };
 }
 
-void host_shell_note_lost(struct host_shell *shell, unsigned node) {
+/* Remembers what was lost on the links of a node that has answered NODE_LINKS,
+ * and notes what has been lost since it did before. */
+static void host_shell_note_lost(struct host_shell *shell, unsigned node) {
     const struct host_visit_node *n = &shell->visit.node[node];
     struct node_link_state link;
     for (unsigned d = 0; !shell->looking && d < CUBE_LINKS_MAX &&

@@ -1,8 +1,7 @@
 /* What nodes have to say, of which most say the same: equal rows become one,
  * with the set of those who said it, as cluster shells show it.
  *
- * Memory: each row that differs, and 128 bytes.  Work: a row is compared with
- * those that differ. */
+ * Memory: each row that differs, and 128 bytes. */
 #ifndef HOST_CONSOLE_FOLD_H
 #define HOST_CONSOLE_FOLD_H
 

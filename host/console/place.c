@@ -42,8 +42,11 @@ static _Noreturn void become(const char *const *words, const int *report,
     _exit(NO_PROGRAM);
 }
 
-int host_child_run_begin(struct host_child_run *run, const char *const *words,
-                         bool quiet, struct host_error *error) {
+/* words: its arguments, the program's name first, NULL last.  quiet: its output
+ * comes by `look`, not on the terminal. */
+static int host_child_run_begin(struct host_child_run *run,
+                                const char *const *words, bool quiet,
+                                struct host_error *error) {
     int report[2] = {-1, -1};
     pid_t host = getpid();
     if (quiet && pipe2(report, O_CLOEXEC) != 0) {
@@ -104,9 +107,10 @@ static bool read_said(struct host_child_run *run,
     }
 }
 
-bool host_child_run_look(struct host_child_run *run, int *status,
-                         void (*say)(void *context, const char *text),
-                         void *context, uint64_t wait_us) {
+/* Whether it has ended, and then *status, as a shell has it. */
+static bool host_child_run_look(struct host_child_run *run, int *status,
+                                void (*say)(void *context, const char *text),
+                                void *context, uint64_t wait_us) {
     struct pollfd said = {run->said, POLLIN, 0};
     int found, wait_ms = (int)(wait_us / 1000);
     bool over = false;
@@ -133,7 +137,8 @@ bool host_child_run_look(struct host_child_run *run, int *status,
     return true;
 }
 
-void host_child_run_interrupt(const struct host_child_run *run) {
+/* As Ctrl-C does. */
+static void host_child_run_interrupt(const struct host_child_run *run) {
     if (run->pid > 0) {
         (void)kill(run->pid, SIGINT);
     }

@@ -1,7 +1,5 @@
 /* The console's cube where its options say it is: the wires, lines that reset
- * boards, and runs beside it.
- *
- * Memory: struct host_console_place.  Work: as its parts'. */
+ * boards, and runs beside it. */
 #ifndef HOST_CONSOLE_PLACE_H
 #define HOST_CONSOLE_PLACE_H
 
@@ -16,10 +14,7 @@
 #include "shell.h"
 
 /* `incode run` as a child of the console, with its own group, so that Ctrl-C at
- * the console's line is not its.
- *
- * Memory: struct host_child_run.  Work: a fork and an exec; a look reads what
- * the child has said. */
+ * the console's line is not its. */
 
 struct host_child_run {
     pid_t pid; /* 0: none runs */
@@ -27,19 +22,6 @@ struct host_child_run {
     size_t used;
     char line[1024];
 };
-
-/* words: its arguments, the program's name first, NULL last.  quiet: its output
- * comes by `look`, not on the terminal. */
-int host_child_run_begin(struct host_child_run *run, const char *const *words,
-                         bool quiet, struct host_error *error);
-
-/* Whether it has ended, and then *status, as a shell has it. */
-bool host_child_run_look(struct host_child_run *run, int *status,
-                         void (*say)(void *context, const char *text),
-                         void *context, uint64_t wait_us);
-
-/* As Ctrl-C does. */
-void host_child_run_interrupt(const struct host_child_run *run);
 
 enum { HOST_CONSOLE_PATH = 4200 };
 

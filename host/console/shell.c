@@ -10,9 +10,9 @@
 #include "commands.h"
 #include "host/base/text.h"
 
-void host_watch_init(struct host_watch *watch,
-                     const struct host_machine *machine,
-                     const struct host_shell_sink *sink) {
+static void host_watch_init(struct host_watch *watch,
+                            const struct host_machine *machine,
+                            const struct host_shell_sink *sink) {
     memset(watch, 0, sizeof *watch);
     watch->beneath = *machine;
     watch->sink = sink;
@@ -131,7 +131,9 @@ static void told(void *context, const char *line) {
     w->sink->note(w->sink->context, line);
 }
 
-struct host_machine host_watch_machine(struct host_watch *watch) {
+/* Stays valid as long as the watch stays where it is.  Where a person has
+ * interrupted, its `check` fails with HOST_CUBE, and watch->cut is set. */
+static struct host_machine host_watch_machine(struct host_watch *watch) {
     struct host_machine machine = watch->beneath;
     const struct host_machine *b = &watch->beneath;
     machine.context = watch;

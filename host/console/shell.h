@@ -2,8 +2,8 @@
  * cube that it visits, gives lines back, or an object of JSON for each command.
  * Between two lines it has to be tended, for the cube's links wait for nobody.
  *
- * Memory: the visit's, 100 bytes a link, and what one answer takes; none of it
- * grows with time.  Work: a line returns when it is done, or abandoned. */
+ * Memory: the visit's, 100 bytes a link, and what one answer takes; none of
+ * it grows with time. */
 #ifndef HOST_CONSOLE_SHELL_H
 #define HOST_CONSOLE_SHELL_H
 
@@ -15,9 +15,7 @@
 
 /* A machine as it is, but that a person may cut its waits short, that what it
  * has to tell goes where the person reads, and that bytes which are no frame
- * can be shown.
- *
- * Memory: struct host_watch.  Work: a copy of the last bytes that came. */
+ * can be shown. */
 
 struct host_shell_sink;
 
@@ -31,14 +29,6 @@ struct host_watch {
     unsigned used;
     uint8_t last[HOST_WATCH_BYTES]; /* that came */
 };
-
-void host_watch_init(struct host_watch *watch,
-                     const struct host_machine *machine,
-                     const struct host_shell_sink *sink);
-
-/* Stays valid as long as the watch stays where it is.  Where a person has
- * interrupted, its `check` fails with HOST_CUBE, and watch->cut is set. */
-struct host_machine host_watch_machine(struct host_watch *watch);
 
 /* The last bytes that came, as a person can read them. */
 void host_watch_noise(const struct host_watch *watch, char *text, size_t size);

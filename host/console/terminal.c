@@ -85,7 +85,9 @@ static void load(History *list) {
     (void)fclose(file);
 }
 
-History *host_history_open(void) {
+/* NULL: no memory.  Without a file, which is no error, it lasts as long as the
+ * program. */
+static History *host_history_open(void) {
     HistEvent event;
     History *list = history_init();
     if (list == NULL) {
@@ -98,7 +100,8 @@ History *host_history_open(void) {
     return list;
 }
 
-void host_history_add(History *list, const char *line) {
+/* A line without its line feed, unless it is empty or the same as before. */
+static void host_history_add(History *list, const char *line) {
     HistEvent event;
     bool same =
         history(list, &event, H_FIRST) == 0 && strcmp(event.str, line) == 0;
@@ -115,7 +118,7 @@ void host_history_add(History *list, const char *line) {
     }
 }
 
-void host_history_close(History *list) {
+static void host_history_close(History *list) {
     history_end(list);
     if (folder >= 0) {
         (void)close(folder);

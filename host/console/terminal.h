@@ -2,7 +2,7 @@
  * completion, while the cube beneath is tended.  Ctrl-C abandons the line or
  * the command under way, a second one leaves; Ctrl-D leaves.
  *
- * Memory: libedit's.  Work: a look at the cube 50 times a second at least. */
+ * Work: a look at the cube 50 times a second at least. */
 #ifndef HOST_CONSOLE_TERMINAL_H
 #define HOST_CONSOLE_TERMINAL_H
 
@@ -14,18 +14,9 @@
  * $XDG_STATE_HOME/incode/history, or ~/.local/state/incode/history, which its
  * owner alone can read.  Several consoles add to it at once.
  *
- * Memory: HOST_HISTORY_LINES lines.  Work: a line is appended at once, so that
- * none is lost with the program. */
+ * Memory: HOST_HISTORY_LINES lines. */
 
 enum { HOST_HISTORY_LINES = 1000 };
-
-/* NULL: no memory.  Without a file, which is no error, it lasts as long as the
- * program. */
-History *host_history_open(void);
-
-/* A line without its line feed, unless it is empty or the same as before. */
-void host_history_add(History *history, const char *line);
-void host_history_close(History *history);
 
 /* Where its answers go; there is one terminal. */
 const struct host_shell_sink *host_terminal_sink(void);

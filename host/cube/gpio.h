@@ -1,16 +1,6 @@
 /* A line of a GPIO chip as an output, whichever version of libgpiod drives it:
  * lines_gpiod1.c has the calls of version 1, and the Makefile takes the file of
- * the version that is installed.
- *
- * Memory: what the library takes, and a file descriptor a line.  Work: opening,
- * a look at each chip of this machine; else a system call.
- *
- *     if (host_gpio_open(&gpio, &pin, why) != 0)
- *         puts(why);
- *     else if (host_gpio_set(gpio, true) != 0)
- *         puts(strerror(errno));
- *     host_gpio_close(gpio);
- */
+ * the version that is installed. */
 #ifndef HOST_GPIO_H
 #define HOST_GPIO_H
 

@@ -29,7 +29,8 @@ static void take(int signal) {
     errno = reason;
 }
 
-int host_guard_begin(struct host_guard *guard) {
+/* 0, or -1 and errno. */
+static int host_guard_begin(struct host_guard *guard) {
     struct sigaction action = {.sa_handler = take, .sa_flags = SA_RESTART};
     memset(guard, 0, sizeof *guard);
     if (pipe2(guard->ends, O_CLOEXEC | O_NONBLOCK) != 0) {
@@ -46,7 +47,8 @@ int host_guard_begin(struct host_guard *guard) {
     return 0;
 }
 
-bool host_guard_wait(struct host_guard *guard, unsigned ms) {
+/* Sleeps; false: cut short by a signal.  Ctrl-Z does not cut it short. */
+static bool host_guard_wait(struct host_guard *guard, unsigned ms) {
     struct pollfd look = {.fd = guard->ends[0], .events = POLLIN};
     uint64_t end_us = host_now_us() + (uint64_t)ms * 1000, now_us;
     int got = 0;
@@ -56,7 +58,8 @@ bool host_guard_wait(struct host_guard *guard, unsigned ms) {
     return got <= 0;
 }
 
-void host_guard_end(struct host_guard *guard) {
+/* Signals that came meanwhile are raised before it returns. */
+static void host_guard_end(struct host_guard *guard) {
     for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
         if (guard->taken[i]) {
             (void)sigaction(signals[i], &guard->before[i], NULL);

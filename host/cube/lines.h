@@ -4,10 +4,7 @@
  * that: an error, Ctrl-C, Ctrl-\, Ctrl-Z, SIGTERM and SIGHUP, which are held
  * back for it (guard.h).  Who kills the program with SIGKILL in the midst of a
  * reset leaves the board to the chip's driver; opening the lines again releases
- * it.
- *
- * Memory: struct host_lines, a pointer a line.  Work: a system call a change; a
- * reset sleeps. */
+ * it. */
 #ifndef HOST_LINES_H
 #define HOST_LINES_H
 
@@ -48,10 +45,7 @@ void host_lines_close(struct host_lines *lines);
 /* A stretch of time in which a signal that would end, or stop, the program
  * waits until something is put right: Ctrl-C, Ctrl-\, Ctrl-Z, SIGTERM, SIGHUP.
  * What the program does about signals beside is as it was again afterwards, and
- * happens then.  SIGKILL waits for nobody.
- *
- * Memory: struct host_guard; one at a time in the process.  Work: some system
- * calls; waiting sleeps. */
+ * happens then.  SIGKILL waits for nobody. */
 
 enum { HOST_GUARD_SIGNALS = 5 };
 
@@ -60,14 +54,5 @@ struct host_guard {
     bool taken[HOST_GUARD_SIGNALS]; /* not one that is ignored */
     int ends[2];                    /* of the pipe that a signal writes to */
 };
-
-/* 0, or -1 and errno. */
-int host_guard_begin(struct host_guard *guard);
-
-/* Sleeps; false: cut short by a signal.  Ctrl-Z does not cut it short. */
-bool host_guard_wait(struct host_guard *guard, unsigned ms);
-
-/* Signals that came meanwhile are raised before it returns. */
-void host_guard_end(struct host_guard *guard);
 
 #endif

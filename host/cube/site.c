@@ -80,9 +80,11 @@ static void hear(struct listener *l, const struct link_pipe *pipe) {
     }
 }
 
-void host_greeting_wait(struct host_greeting *greeting,
-                        const struct host_machine *machine, bool first_hello,
-                        uint64_t wait_us) {
+/* Asks by machine->pipe until somebody greets, wait_us at most; first_hello:
+ * who is there listens for a link's greeting first, as over a socket. */
+static void host_greeting_wait(struct host_greeting *greeting,
+                               const struct host_machine *machine,
+                               bool first_hello, uint64_t wait_us) {
     struct listener l;
     uint64_t begun_us = machine->now_us(machine->context), now_us = begun_us,
              asked_us = 0;

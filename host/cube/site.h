@@ -72,10 +72,4 @@ struct host_greeting {
     uint16_t frame_payload; /* bytes */
 };
 
-/* Asks by machine->pipe until somebody greets, wait_us at most; first_hello:
- * who is there listens for a link's greeting first, as over a socket. */
-void host_greeting_wait(struct host_greeting *greeting,
-                        const struct host_machine *machine, bool first_hello,
-                        uint64_t wait_us);
-
 #endif

@@ -2,12 +2,8 @@
  * are asked, what boards' loaders are sent.  Nodes may come, go and begin anew
  * meanwhile; wires that are dead, or were never there, are gone round.
  *
- * Memory: struct host_visit, and what the cube and the answers take, some 8 KB
- * a node.  Work: a round moves what the links hold, asks for what has not been
- * answered (again after a second, as it may have been lost with a node on its
- * way), and sleeps when there is nothing to do.  Pings, a second apart for each
- * node, grow rarer where pongs take long: they are to leave the wire to others.
- */
+ * Memory: struct host_visit, and what the cube and the answers take, some 8
+ * KB a node. */
 #ifndef HOST_VISIT_H
 #define HOST_VISIT_H
 

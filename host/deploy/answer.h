@@ -1,7 +1,4 @@
-/* What a board is sent for what it is and has, and how that is told.
- *
- * Memory: the reply and the unit's text, on the heap.  Work: a digest of each.
- */
+/* What a board is sent for what it is and has, and how that is told. */
 #ifndef HOST_ANSWER_H
 #define HOST_ANSWER_H
 
@@ -20,7 +17,7 @@ void host_answer_done(struct host_deploy_board *board, const char *state);
  * lines for a shell.  Both hold what `incode cube FILE` prints, with the
  * board's own paths.
  *
- * Memory: the text, up to 64 KiB.  Work: one pass over the node's options. */
+ * Memory: the text, up to 64 KiB. */
 
 struct host_unit {
     const struct host_cube_file *file;

@@ -2,8 +2,7 @@
  * (script.h), and what that says.  All boards are at work at once: the caller
  * polls, and says which file has something.
  *
- * Memory: 6 KiB, and while it is at work the text of its unit.  Work: as bytes
- * come and go; nothing waits. */
+ * Memory: 6 KiB, and while it is at work the text of its unit. */
 #ifndef HOST_BOARD_H
 #define HOST_BOARD_H
 

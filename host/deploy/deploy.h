@@ -19,8 +19,7 @@ int host_deploy(int argc, char **argv, struct host_error *error);
 
 /* The node programs of `make nodes`, one a processor, as boards are sent them.
  *
- * Memory: the programs that boards asked for, some 500 KB each.  Work: reading
- * each once. */
+ * Memory: the programs that boards asked for, some 500 KB each. */
 
 enum { HOST_PROGRAMS_MAX = 4, HOST_SHA256_DIGITS = 64 };
 

@@ -10,13 +10,7 @@
  * - a line: "keep", or the key's 64 digits; "leave": nothing follows
  * - a line: "keep", or the number of lines that follow: the unit, or the lines
  *   that start the node where no systemd runs
- * - a line: "keep", or the SHA-256 of all bytes to the end: the program
- *
- * Memory: the text.  Work: none.
- *
- *     char *command = host_script_command("deploy", 3, "/opt/incode");
- *     execlp("ssh", "ssh", "pi@10.0.0.11", command, NULL);
- */
+ * - a line: "keep", or the SHA-256 of all bytes to the end: the program */
 #ifndef HOST_SCRIPT_H
 #define HOST_SCRIPT_H
 

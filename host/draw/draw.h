@@ -1,7 +1,4 @@
-/* `incode draw`: a plane section through a triangulation, as a picture.
- *
- * Memory: the points, the tetrahedra, the section and the picture.  Work: what
- * reading takes, as a rule. */
+/* `incode draw`: a plane section through a triangulation, as a picture. */
 #ifndef HOST_DRAW_H
 #define HOST_DRAW_H
 

@@ -49,15 +49,16 @@ struct host_picture host_picture_of(const struct host_section *section,
     return p;
 }
 
-void host_picture_place(const struct host_picture *picture,
-                        const float corner[2], double at[2]) {
+/* A corner's place in pixels, from the upper left. */
+static void host_picture_place(const struct host_picture *picture,
+                               const float corner[2], double at[2]) {
     at[0] = MARGIN + picture->scale * (double)corner[0];
     at[1] = MARGIN + picture->scale *
                          (picture->section->proportion[1] - (double)corner[1]);
 }
 
-unsigned host_picture_colour(const struct host_picture *picture,
-                             const struct host_cell *cell) {
+static unsigned host_picture_colour(const struct host_picture *picture,
+                                    const struct host_cell *cell) {
     double less = picture->section->size_mean - (double)cell->size;
     double colour = 22.0 - 11.0 * less;
     return colour < 0.0                ? 0
@@ -66,7 +67,7 @@ unsigned host_picture_colour(const struct host_picture *picture,
 }
 
 /* Hue, of which 60 % are saturated, and lightness, as CSS has them. */
-uint32_t host_picture_rgb(unsigned colour) {
+static uint32_t host_picture_rgb(unsigned colour) {
     double hue = (225.0 - 4.0 * colour) / 30.0;
     double light = 0.38 + 0.012 * colour;
     double half = 0.6 * (light < 0.5 ? light : 1.0 - light);

@@ -1,8 +1,6 @@
 /* A section as a picture: where its cells lie in it, their colours - the
  * smaller a tetrahedron is, the bluer - and the formats that it is written in.
- *
- * Memory: an output's buffer; see svg.c and png.c.  Work: one pass over the
- * cells for each of the colours (SVG) or a few ns a pixel (PNG). */
+ */
 #ifndef HOST_PICTURE_H
 #define HOST_PICTURE_H
 
@@ -13,8 +11,8 @@
  * cells that adjoin cover adds up to 1, so that no seam shows between them, in
  * whatever order they come.
  *
- * Memory: the raster.  Work: a few ns for each pixel that a polygon covers, and
- * 20 ns for each line of them. */
+ * Work: a few ns for each pixel that a polygon covers, and 20 ns for each
+ * line of them. */
 
 /* Red, green and blue times the covered part; that part; the part that lines
  * cover. */
@@ -49,14 +47,7 @@ struct host_picture {
 struct host_picture host_picture_of(const struct host_section *section,
                                     unsigned width);
 
-/* A corner's place in pixels, from the upper left. */
-void host_picture_place(const struct host_picture *picture,
-                        const float corner[2], double at[2]);
-
 /* The cell's colour, 0 to HOST_COLOURS - 1, and a colour as 0xrrggbb. */
-unsigned host_picture_colour(const struct host_picture *picture,
-                             const struct host_cell *cell);
-uint32_t host_picture_rgb(unsigned colour);
 enum { HOST_PICTURE_EDGES = 0x1b2a41 };
 
 typedef int host_picture_writer(struct host_output *out,

@@ -4,14 +4,7 @@
  * or along faces; it is then the limit of planes that come from below.
  *
  * Memory: 40 bytes a cell.  Work: two passes over the tetrahedra, 5 ns each,
- * and 300 ns a cell.
- *
- *     struct host_plane plane = host_plane_through_middle(&points);
- *     if (host_section_make(&section, &points, &tets, plane, &error) != 0)
- *         return error.code;
- *     double width = section.extent[0];
- *     host_section_free(&section);
- */
+ * and 300 ns a cell. */
 #ifndef HOST_SECTION_H
 #define HOST_SECTION_H
 

@@ -26,7 +26,8 @@ static void keep(int number) {
     came = number;
 }
 
-void host_flash_cut_begin(void) {
+/* From here on signals are kept, and up to there. */
+static void host_flash_cut_begin(void) {
     const struct sigaction action = {.sa_handler = keep,
                                      .sa_flags = (int)SA_RESETHAND};
     came = 0;
@@ -38,13 +39,14 @@ void host_flash_cut_begin(void) {
     }
 }
 
-void host_flash_cut_end(void) {
+static void host_flash_cut_end(void) {
     for (int i = 0; i < SIGNALS; i++) {
         (void)sigaction(signals[i], &before[i], NULL);
     }
 }
 
-int host_flash_cut(void) {
+/* The signal that came; 0: none has. */
+static int host_flash_cut(void) {
     return came;
 }
 
@@ -108,7 +110,8 @@ void host_flash_cut_tell(FILE *out, const struct host_spread *spread, int argc,
     host_say(out, "incode: flash: interrupted; go on with: %s\n", line);
 }
 
-void host_flash_cut_finish(void) {
+/* Returns where no signal came; else ends the program by it. */
+static void host_flash_cut_finish(void) {
     if (came != 0) {
         (void)signal(came, SIG_DFL);
         (void)raise(came);

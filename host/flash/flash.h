@@ -1,7 +1,5 @@
 /* `incode flash IMAGE`: brings an image to the boards of a cube, and shows how
- * far each is: a row a node on a terminal, lines where there is none.
- *
- * Memory: the image, and that of a visit.  Work: spread.h. */
+ * far each is: a row a node on a terminal, lines where there is none. */
 #ifndef HOST_FLASH_H
 #define HOST_FLASH_H
 
@@ -19,28 +17,17 @@ int host_flash(int argc, char **argv, struct host_error *error);
  * boards do now, and how to go on.  Then the program ends as by the signal; a
  * second one ends it at once.
  *
- * Memory: 4 KB of stack for a line.  Work: a pass over the nodes. */
-
-/* From here on signals are kept, and up to there. */
-void host_flash_cut_begin(void);
-void host_flash_cut_end(void);
-
-/* The signal that came; 0: none has. */
-int host_flash_cut(void);
+ * Memory: 4 KB of stack for a line. */
 
 /* argv: the command, argv[0] as "incode flash"; the same goes on. */
 void host_flash_cut_tell(FILE *out, const struct host_spread *spread, int argc,
                          char *const *argv);
 
-/* Returns where no signal came; else ends the program by it. */
-void host_flash_cut_finish(void);
-
 /* What a person sees of an image's way to boards: a row a node on a terminal
  * that has room for them, or some nodes a row; where there is none, a line
  * whenever a node comes to something new.
  *
- * Memory: struct host_flash_show.  Work: a pass over the nodes, ten times a
- * second at most. */
+ * Work: a pass over the nodes, ten times a second at most. */
 
 struct host_flash_show {
     const struct host_spread *spread;

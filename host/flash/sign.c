@@ -94,11 +94,12 @@ static_assert((int)HOST_SIGN_SECRET_BYTES == crypto_sign_ed25519_SECRETKEYBYTES,
 static_assert((int)SECURE_KEY_BYTES == (int)SIGN_PUBLIC_BYTES,
               "a key's file holds a public half");
 
-void host_sign_hex(char *text, const uint8_t *bytes, size_t size) {
+/* As text: 2 * size digits, and 0. */
+static void host_sign_hex(char *text, const uint8_t *bytes, size_t size) {
     (void)sodium_bin2hex(text, 2 * size + 1, bytes, size);
 }
 
-void host_sign_key_wipe(struct host_sign_key *pair) {
+static void host_sign_key_wipe(struct host_sign_key *pair) {
     secure_wipe(pair->secret, sizeof pair->secret);
 }
 
@@ -201,8 +202,9 @@ static int refuse(const char *path, enum key_file_state state,
     }
 }
 
-int host_sign_key_read(struct host_sign_key *pair, const char *path,
-                       struct host_error *error) {
+/* HOST_INPUT: also of a file that others can read, or that is a cube's key. */
+static int host_sign_key_read(struct host_sign_key *pair, const char *path,
+                              struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     enum key_file_state state = key_file_read_marked(path, MARK, seed);
     if (state == KEY_FILE_GOOD) {
@@ -232,8 +234,10 @@ int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
                          : key_file_text(state).what);
 }
 
-void host_sign_key_sign(const struct host_sign_key *pair, const uint8_t *bytes,
-                        size_t size, uint8_t signature[SIGN_BYTES]) {
+/* The signature of these bytes. */
+static void host_sign_key_sign(const struct host_sign_key *pair,
+                               const uint8_t *bytes, size_t size,
+                               uint8_t signature[SIGN_BYTES]) {
     (void)crypto_sign_ed25519_detached(signature, NULL, bytes, size,
                                        pair->secret);
 }

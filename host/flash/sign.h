@@ -1,7 +1,5 @@
 /* `incode sign` and `incode image`: makes an image of a board's binary, or
- * signs one anew; says what is in one.
- *
- * Memory: the file's bytes.  Work: a pass over them. */
+ * signs one anew; says what is in one. */
 #ifndef HOST_SIGN_H
 #define HOST_SIGN_H
 
@@ -12,10 +10,7 @@
 #include "host/base/error.h"
 #include "transport/sign_suite.h"
 
-/* An image as a file of the host's.
- *
- * Memory: the file's bytes.  Work: a pass over them; two scalar multiplications
- * for a signature. */
+/* An image as a file of the host's. */
 
 struct host_image {
     struct host_source source; /* its bytes, the header first */
@@ -42,10 +37,7 @@ int host_image_show(int argc, char **argv, struct host_error *error);
 
 /* A pair that images are signed with: the secret half in a file for its owner
  * alone, a word and 64 hexadecimal digits, and the public half beside it, in
- * FILE.pub, 64 digits.
- *
- * Memory: the halves; the secret one is the caller's to wipe.  Work: a few
- * system calls; a scalar multiplication. */
+ * FILE.pub, 64 digits. */
 
 enum { HOST_SIGN_SECRET_BYTES = 64 };
 
@@ -58,20 +50,8 @@ struct host_sign_key {
  * or HOST_BROKEN: nothing is left then. */
 int host_sign_key_make(const char *path, struct host_error *error);
 
-/* HOST_INPUT: also of a file that others can read, or that is a cube's key. */
-int host_sign_key_read(struct host_sign_key *pair, const char *path,
-                       struct host_error *error);
-void host_sign_key_wipe(struct host_sign_key *pair);
-
 /* The public half alone, from FILE.pub. */
 int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
                           struct host_error *error);
-
-/* The signature of these bytes. */
-void host_sign_key_sign(const struct host_sign_key *pair, const uint8_t *bytes,
-                        size_t size, uint8_t signature[SIGN_BYTES]);
-
-/* As text: 2 * size digits, and 0. */
-void host_sign_hex(char *text, const uint8_t *bytes, size_t size);
 
 #endif

@@ -19,6 +19,9 @@ static void look_at_clock(struct host_spread *spread) {
     spread->now_us = machine->now_us(machine->context);
 }
 
+static void spread_hear(struct host_spread *spread, unsigned i,
+                        const struct loader_state_message *state);
+
 static void take(void *context, const struct cube_message *message) {
     struct host_spread *spread = context;
     struct loader_state_message state = {0};
@@ -76,6 +79,8 @@ static bool has_looked(const struct host_spread *spread) {
     return all || (now - spread->began_us >= GRACE_US &&
                    now - spread->arrived_us >= ARRIVAL_US);
 }
+
+static void spread_judge(struct host_spread *spread, unsigned i);
 
 static void judge_all(struct host_spread *spread) {
     look_at_clock(spread);
@@ -158,6 +163,8 @@ static void look_at_generation(struct host_spread *spread) {
     }
 }
 
+static void spread_expire(struct host_spread *spread, unsigned i);
+
 int host_spread_step(struct host_spread *spread, uint64_t wait_us,
                      struct host_error *error) {
     look_at_generation(spread);
@@ -175,6 +182,8 @@ int host_spread_step(struct host_spread *spread, uint64_t wait_us,
     say_who_is_awaited(spread);
     return status;
 }
+
+static void spread_explain(struct host_spread *spread, unsigned i);
 
 /* The last that a board that has fallen back says for itself. */
 static int ask_for_logs(struct host_spread *spread, struct host_error *error) {
@@ -436,7 +445,8 @@ static void judge_absent(struct host_spread *spread, unsigned i) {
     }
 }
 
-void spread_judge(struct host_spread *spread, unsigned i) {
+/* By what the visit knows of it; by what its loader says. */
+static void spread_judge(struct host_spread *spread, unsigned i) {
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
     if (spread_ended(n) || pass_over(spread, i)) {
@@ -496,8 +506,8 @@ static void take_whole(struct host_spread *spread, unsigned i,
     }
 }
 
-void spread_hear(struct host_spread *spread, unsigned i,
-                 const struct loader_state_message *state) {
+static void spread_hear(struct host_spread *spread, unsigned i,
+                        const struct loader_state_message *state) {
     struct host_spread_node *n = &spread->node[i];
     if (!spread_in_loader(spread, i) || n->phase >= HOST_SPREAD_STARTS) {
         return;
@@ -530,7 +540,7 @@ void spread_hear(struct host_spread *spread, unsigned i,
 }
 
 /* Its lines, the last ones if they are too many, as one. */
-void spread_explain(struct host_spread *spread, unsigned i) {
+static void spread_explain(struct host_spread *spread, unsigned i) {
     enum { LOG_MAX = 120 };
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
@@ -554,7 +564,8 @@ void spread_explain(struct host_spread *spread, unsigned i) {
 
 /* --- no further ----------------------------------------------------------- */
 
-void spread_expire(struct host_spread *spread, unsigned i) {
+/* A node that has got no further for too long. */
+static void spread_expire(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     char text[HOST_SPREAD_TEXT];
     const char *reason = NULL;

@@ -4,9 +4,7 @@
  * all have it verified; then they start it.  Nodes may be off, restart, lose
  * power or links meanwhile; what they have they keep, and are sent the rest.
  *
- * Memory: struct host_spread, and 800 bytes a node.  Work: a step is a round of
- * the visit, and sends as many blocks as there is room for; a node that gets no
- * further for patience_us is given up, and the others are done. */
+ * Memory: struct host_spread, and 800 bytes a node. */
 #ifndef HOST_SPREAD_H
 #define HOST_SPREAD_H
 
@@ -108,9 +106,7 @@ void host_spread_close(struct host_spread *spread);
 const char *host_spread_phase_text(enum host_spread_phase phase);
 
 /* What the parts of spread.h share: judging a node by what it answers, and
- * sending what is due.
- *
- * Memory: struct host_spread.  Work: a pass over the nodes. */
+ * sending what is due. */
 
 enum {
     SPREAD_AGAIN_US = 4000000 /* an order that had no effect is repeated */
@@ -132,17 +128,6 @@ bool spread_goes_home(const struct host_spread *spread, unsigned i);
 
 void spread_set(struct host_spread *spread, unsigned i,
                 enum host_spread_phase phase);
-
-/* By what the visit knows of it; by what its loader says. */
-void spread_judge(struct host_spread *spread, unsigned i);
-void spread_hear(struct host_spread *spread, unsigned i,
-                 const struct loader_state_message *state);
-
-/* Adds to what is said of a node that fell back its answer to NODE_LOG. */
-void spread_explain(struct host_spread *spread, unsigned i);
-
-/* A node that has got no further for too long. */
-void spread_expire(struct host_spread *spread, unsigned i);
 
 /* Restarts, beginnings, questions, verifications and starts that are due; the
  * blocks that there is room for. */

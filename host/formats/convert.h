@@ -1,11 +1,5 @@
 /* One file to another by their extensions: points to points, or tetrahedra to
- * tetrahedra (which are brought into canonical order).
- *
- * Memory: the contents once.  Work: reading plus writing.
- *
- *     host_convert("bunny.ply", NULL, "b.npy", &error);
- *     host_convert("a.ele", NULL, "a.vtu", &error);
- */
+ * tetrahedra (which are brought into canonical order). */
 #ifndef HOST_CONVERT_H
 #define HOST_CONVERT_H
 

@@ -1,13 +1,4 @@
-/* The columns of a text whose first line names them.
- *
- * Memory: none.  Work: one pass over a line.
- *
- *     struct host_csv csv = {0};
- *     if (host_csv_header(&csv, &scan, &error) != 0)
- *         return error.code;
- *     while (csv.fields > 0 && host_scan_skip_blank_lines(&scan))
- *         host_csv_row(&csv, &scan, xyz, &error);
- */
+/* The columns of a text whose first line names them. */
 #ifndef HOST_CSV_H
 #define HOST_CSV_H
 

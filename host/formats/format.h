@@ -5,14 +5,7 @@
  * A reader takes bytes in memory.  For a packed file it takes the beginning,
  * and then what host_source_more adds, if its format sets `pieces`; else all of
  * it. It returns whatever the bytes are.  Sizes that a file claims are checked
- * against its length before memory is reserved.
- *
- * Memory: a reader's, what it appends; a writer's, none.  Work: one pass.
- *
- *     const struct host_format host_format_planets = {
- *         .name = "planets", .extensions = {".planets"},
- *         .read_points = read_planets, .write_points = write_planets};
- */
+ * against its length before memory is reserved. */
 #ifndef HOST_FORMAT_H
 #define HOST_FORMAT_H
 

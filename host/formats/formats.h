@@ -1,12 +1,5 @@
 /* The formats that the host knows, one row each: files are read and written by
- * it, and what help and messages list of formats and extensions is from it.
- *
- * Memory: the table.  Work: a comparison an extension.
- *
- *     const struct host_format *f = host_format_of("a.ply", HOST_READ_POINTS);
- *     if (f == NULL)
- *         host_format_list(HOST_READ_POINTS, text, sizeof text);
- */
+ * it, and what help and messages list of formats and extensions is from it. */
 #ifndef HOST_FORMATS_H
 #define HOST_FORMATS_H
 

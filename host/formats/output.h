@@ -4,14 +4,6 @@
  * what was there before stays as it was.
  *
  * Memory: a buffer of 1 MiB an output that is open; its names until the end.
- * Work: a write a MiB, and one copy of what comes in smaller pieces.
- *
- *     if (host_output_open(&out, "a.ele", &error) != 0)
- *         return error.code;
- *     host_output_unsigned(&out, 7);
- *     host_output_text(&out, "\n");
- *     host_output_close(&out, 1, &error);  // so may others, and what may fail
- *     return host_output_commit(&error);
  */
 #ifndef HOST_OUTPUT_H
 #define HOST_OUTPUT_H

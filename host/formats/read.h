@@ -1,7 +1,6 @@
 /* Points and tetrahedra from files, in the format that the extension says.
  *
- * Memory: what is read, and the file itself while it is read.  Work: one pass
- * over the file, 40 ns a number of text at most. */
+ * Work: one pass over the file, 40 ns a number of text at most. */
 #ifndef HOST_READ_H
 #define HOST_READ_H
 

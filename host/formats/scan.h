@@ -1,14 +1,8 @@
 /* Reading numbers and words from text in memory, with the place of a mistake
  * worked out only when there is one.
  *
- * Memory: none.  Work: about 15 ns a number of up to 19 digits, correctly
- * rounded; strtod for the rest.
- *
- *     struct host_scan s = host_scan_start("a.xyz", data, bytes);
- *     while (host_scan_skip_blank_lines(&s))
- *         if (host_scan_double(&s, &x, &error) != 0)
- *             return error.code;
- */
+ * Work: about 15 ns a number of up to 19 digits, correctly rounded; strtod
+ * for the rest. */
 #ifndef HOST_SCAN_H
 #define HOST_SCAN_H
 

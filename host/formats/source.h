@@ -2,15 +2,9 @@
  * what it unpacks to.
  *
  * Memory: for a plain file, at most half of the memory available when reading
- * begins, as the points need the rest.  For a packed file a window of 1 MiB, or
- * 16 MiB if it has long lines; if the format needs the whole file, at most a
- * quarter of the available memory.  16 MiB are always allowed.  Work: one pass.
- *
- *     struct host_source source;
- *     if (host_source_open(&source, "a.xyz.gz", true, &error) != 0)
- *         return error.code;
- *     host_source_close(&source);
- */
+ * begins, as the points need the rest.  For a packed file a window of 1 MiB,
+ * or 16 MiB if it has long lines; if the format needs the whole file, at most
+ * a quarter of the available memory.  16 MiB are always allowed. */
 #ifndef HOST_SOURCE_H
 #define HOST_SOURCE_H
 

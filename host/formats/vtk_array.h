@@ -1,13 +1,5 @@
 /* The packed forms of a DataArray in VTK's XML files: base64 or raw, in blocks
- * by zlib or plain, to the bytes that they hold.
- *
- * Memory: the bytes that come out.  Work: one pass.
- *
- *     struct vtk_array a;
- *     if (vtk_array_unpack(&a, &source, &coding, text, bytes, &error) == 0)
- *         fwrite(a.data, 1, a.bytes, stdout);
- *     vtk_array_free(&a);
- */
+ * by zlib or plain, to the bytes that they hold. */
 #ifndef HOST_VTK_ARRAY_H
 #define HOST_VTK_ARRAY_H
 

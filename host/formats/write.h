@@ -56,8 +56,7 @@ int host_write_probe(const char *path, const char *input,
  * no file that it reads, and writes no file twice.  Two names are one file if
  * they have the same device and inode, links followed.  For a file that does
  * not exist yet, the directory and the last name are compared, links followed.
- *
- * Memory: a name a file.  Work: a stat a file, and a comparison with each. */
+ */
 
 struct host_claim;
 
@@ -82,9 +81,7 @@ void host_claims_free(struct host_claims *claims);
 
 /* Where a name leads in the end, by the kernel's own word: links are followed
  * by it alone, so that one which the system does not follow (another user's in
- * a sticky directory, or on a mount without links) is not followed here.
- *
- * Memory: a name.  Work: a handful of system calls. */
+ * a sticky directory, or on a mount without links) is not followed here. */
 
 /* What `path` is in the end, links followed, also those that lead to where
  * nothing is yet (there a file is made and removed at once).  To be freed; NULL

@@ -3,14 +3,7 @@
  *
  * Each thread takes region after region, copies pages straight from the order,
  * and appends tetrahedra to a list of its own.  The lists are put together when
- * all regions are done.
- *
- * Memory: an arena a thread (host_direct_arena), spilled faces, the tetrahedra.
- * Work: that of the triangulators.
- *
- *     if (host_direct_run(&order, &tets, NULL, &error) != HOST_DIRECT_DONE)
- *         return error.code;
- */
+ * all regions are done. */
 #ifndef HOST_DELAUNAY_H
 #define HOST_DELAUNAY_H
 

@@ -2,14 +2,7 @@
  * vertex is p, sorted, so that twins stand side by side.
  *
  * Memory: 4 bytes a tetrahedron and 8 a vertex.  Work: two passes; a group of g
- * facets O(g log g).
- *
- *     if (host_adjacency_make(&a, &tets, rows, &error) != 0 ||
- *         host_adjacency_group(&a, p, &group, &error) != 0)
- *         return error.code;
- *     host_group_free(&group);
- *     host_adjacency_free(&a);
- */
+ * facets O(g log g). */
 #ifndef HOST_ADJACENCY_H
 #define HOST_ADJACENCY_H
 

@@ -2,14 +2,7 @@
  * k-d build.
  *
  * Memory: 32 bytes a distinct point, 12 to 25 more a row while it works.  Work:
- * O(n) expected, one hash table a thread.
- *
- *     struct host_distinct distinct;
- *     if (host_distinct_make(&distinct, xyz, rows, &error) != 0)
- *         return error.code;
- *     host_kd_box(distinct.items, distinct.count, lo, hi);
- *     host_distinct_free(&distinct);
- */
+ * O(n) expected, one hash table a thread. */
 #ifndef HOST_DUPLICATES_H
 #define HOST_DUPLICATES_H
 

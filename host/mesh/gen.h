@@ -1,13 +1,7 @@
 /* Point sets made from a seed, the same on every machine: no function of the C
  * library's mathematics but sqrt takes part.
  *
- * Memory: the points.  Work: O(n).
- *
- *     struct host_points points = {0};
- *     if (host_gen("uniform", 20000, 1, &points, &error) != 0)
- *         return error.code;
- *     host_points_free(&points);
- */
+ * Work: O(n). */
 #ifndef HOST_GEN_H
 #define HOST_GEN_H
 

@@ -2,12 +2,7 @@
  * bricks and their leaves are compact.
  *
  * Memory: the records (32 bytes a point), O(log n) stack.  Work: O(n log n),
- * two or three moves a point and level.
- *
- *     host_kd_box(items, n, lo, hi);
- *     size_t below = host_kd_below(items, n, 0, wall);
- *     host_kd_bricks(items + below, n - below, 7, threads, sink, context);
- */
+ * two or three moves a point and level. */
 #ifndef HOST_KD_BUILD_H
 #define HOST_KD_BUILD_H
 

@@ -1,14 +1,5 @@
 /* Lumps of points, bricks and all that is below a page, and their lifted boxes
- * (incode/pages/boxes.h).
- *
- * Memory: struct host_lump.  Work: a pass over the points of a brick for its
- * lump; two over all points of a lump for a lifted box, and none where it would
- * say no more than the box along the axes, as in a volume.
- *
- *     host_lump_brick(&lump[0], &brick[0]);
- *     host_lump_join(&all, lump, 1);
- *     host_lift(&boxes, 0, &lump[0], &brick[0], 1);
- */
+ * (incode/pages/pages.h). */
 #ifndef HOST_LIFT_H
 #define HOST_LIFT_H
 

@@ -5,14 +5,8 @@
  * The mark that a vertex was reached comes many times over.  A list keeps it
  * once, as one bit for the vertex.
  *
- * Memory: blocks of 512 bytes up to blocks_memory, and 48 bytes a list; beyond
- * it, disk.  Work: constant a block.
- *
- *     if (host_spill_put(&spill, node, faces, count, &error) != 0)
- *         return error.code;
- *     list = host_spill_detach(&spill, node, brick);
- *     return host_spill_take(&spill, &list, faces, 128, &count, &error);
- */
+ * Memory: blocks of 512 bytes up to blocks_memory, and 48 bytes a list;
+ * beyond it, disk. */
 #ifndef HOST_SPILL_H
 #define HOST_SPILL_H
 

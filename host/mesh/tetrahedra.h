@@ -2,15 +2,7 @@
  * digest.
  *
  * Memory: 16 bytes a tetrahedron, grown without a second copy, sorted in
- * place.  Work: appending is amortised O(1); sorting about 40 ns a row.
- *
- *     uint32_t(*v)[4] = host_tetrahedra_room(&tets, 100, &error);
- *     for (n = 0; v != NULL && n < 100; n++)
- *         v[n][0] = 0, v[n][1] = 1, v[n][2] = 2, v[n][3] = 3 + n;
- *     host_tetrahedra_keep(&tets, n);
- *     host_tetrahedra_map(&tets, row);
- *     host_tetrahedra_sort(&tets);
- */
+ * place.  Work: appending is amortised O(1); sorting about 40 ns a row. */
 #ifndef HOST_TETRAHEDRA_H
 #define HOST_TETRAHEDRA_H
 

@@ -45,7 +45,8 @@ static int fill(int fd) {
     return 0;
 }
 
-int host_chip_make(int fd, bool card) {
+/* A chip as it is sold, erased, or a card with a table: 0, or -1 and errno. */
+static int host_chip_make(int fd, bool card) {
     if (fill(fd) != 0) {
         return -1;
     }
@@ -115,8 +116,10 @@ static int install_mapped(void *bytes, bool card,
     return install(card ? &on_card : &chip, source, path, error);
 }
 
-int host_chip_install(int fd, bool card, const char *path,
-                      struct host_error *error) {
+/* The file has HOST_FLASH_BYTES, and no board uses it.  0, or HOST_CUBE: what
+ * is at the path is no image, or the card has no place for it. */
+static int host_chip_install(int fd, bool card, const char *path,
+                             struct host_error *error) {
     struct host_source source;
     if (host_source_open_bounded(&source, path, LOADER_IMAGE_MAX, "an image",
                                  error) != 0) {
@@ -439,10 +442,11 @@ static struct host_machine machine_of(struct cube *cube) {
     return machine;
 }
 
-int host_emulated_start(const struct host_board *board,
-                        const struct host_cluster_options *options,
-                        struct host_started *started,
-                        struct host_error *error) {
+/* The start function of a board whose row names what emulates it. */
+static int host_emulated_start(const struct host_board *board,
+                               const struct host_cluster_options *options,
+                               struct host_started *started,
+                               struct host_error *error) {
     const struct host_bare *bare = board->bare;
     struct cube *cube = &the_cube;
     struct host_cluster_options mine = *options;

@@ -169,7 +169,8 @@ int host_wires_make(struct host_wires *wires, const struct host_link *link,
     return status;
 }
 
-void host_wires_close_nodes(struct host_wires *wires) {
+/* Closes the nodes' ends here, once the nodes have theirs. */
+static void host_wires_close_nodes(struct host_wires *wires) {
     for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
         for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
             close_end(&wires->end[i][d]);
@@ -332,6 +333,8 @@ static unsigned host_ports(const struct host_cluster_options *options) {
                                                 : CUBE_HOST_PORTS_MAX;
 }
 
+static void host_cluster_stop(struct host_cluster *cluster);
+
 int host_cluster_start(struct host_cluster *cluster,
                        const struct host_cluster_options *options,
                        struct host_error *error) {
@@ -368,7 +371,10 @@ int host_cluster_start(struct host_cluster *cluster,
     return status;
 }
 
-int host_cluster_check(struct host_cluster *cluster, struct host_error *error) {
+/* Starts nodes again that have died.  0, or HOST_CUBE for one that does so too
+ * often: child.h. */
+static int host_cluster_check(struct host_cluster *cluster,
+                              struct host_error *error) {
     if (!host_child_any_died()) {
         return 0;
     }
@@ -387,7 +393,9 @@ int host_cluster_check(struct host_cluster *cluster, struct host_error *error) {
     return 0;
 }
 
-bool host_cluster_ended(struct host_cluster *cluster) {
+/* Whether every node has ended, however it did.  From here on none is started
+ * again. */
+static bool host_cluster_ended(struct host_cluster *cluster) {
     bool ended = true;
     host_wires_close_nodes(&cluster->wires); /* so that an end is heard */
     for (unsigned i = 0; i < cluster->nodes; i++) {
@@ -397,7 +405,8 @@ bool host_cluster_ended(struct host_cluster *cluster) {
     return ended;
 }
 
-void host_cluster_stop(struct host_cluster *cluster) {
+/* Ends what still runs and waits for it.  Also after a failed start. */
+static void host_cluster_stop(struct host_cluster *cluster) {
     for (unsigned i = 0; i < cluster->nodes; i++) {
         (void)host_child_kill(&cluster->process[i]);
     }

@@ -3,8 +3,8 @@
  * the kernel, or of an emulator, all gone when the host goes.  One that dies is
  * started again, on the same wires; one that dies too often is an error.
  *
- * Memory: 24 bytes a node; both ends of every wire, for nodes that start again.
- * Work: a fork and an exec a start of a node. */
+ * Memory: 24 bytes a node; both ends of every wire, for nodes that start
+ * again. */
 #ifndef HOST_CLUSTER_H
 #define HOST_CLUSTER_H
 
@@ -42,10 +42,7 @@ const char *host_link_name(unsigned i);
 const struct host_link *host_link_named(const char *name);
 
 /* For tests: emulated boards that are reset, stopped for a while or killed, one
- * after the other, each once, so many microseconds apart.
- *
- * Memory: struct host_troubled.  Work: a look at the clock a call; a request to
- * an emulator's monitor now and then. */
+ * after the other, each once, so many microseconds apart. */
 
 enum host_trouble_kind {
     HOST_TROUBLE_RESET,
@@ -75,8 +72,8 @@ bool host_trouble_due(struct host_troubled *troubled, uint64_t now_us,
 /* The wires between nodes that this machine emulates, and from the host to the
  * first of them: pairs of open files, one end for each side, by kind.
  *
- * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel what
- * a wire of its kind takes.  Work: a few system calls a wire. */
+ * Memory: 4 bytes for each port of HOST_PROCESSES_MAX nodes; in the kernel
+ * what a wire of its kind takes. */
 
 enum { HOST_PROCESSES_MAX = 64 }; /* nodes on one machine */
 
@@ -92,9 +89,6 @@ struct host_wires {
 int host_wires_make(struct host_wires *wires, const struct host_link *link,
                     unsigned nodes, unsigned dimension, unsigned host_ports,
                     struct host_error *error);
-
-/* Closes the nodes' ends here, once the nodes have theirs. */
-void host_wires_close_nodes(struct host_wires *wires);
 
 /* Closes all. */
 void host_wires_close(struct host_wires *wires);
@@ -154,17 +148,6 @@ int host_cluster_start(struct host_cluster *cluster,
 
 /* The cluster as the service's machine, which points to it. */
 struct host_machine host_cluster_machine(struct host_cluster *cluster);
-
-/* Starts nodes again that have died.  0, or HOST_CUBE for one that does so too
- * often: child.h. */
-int host_cluster_check(struct host_cluster *cluster, struct host_error *error);
-
-/* Whether every node has ended, however it did.  From here on none is started
- * again. */
-bool host_cluster_ended(struct host_cluster *cluster);
-
-/* Ends what still runs and waits for it.  Also after a failed start. */
-void host_cluster_stop(struct host_cluster *cluster);
 
 /* A machine whose host is slow on purpose, for tests: reads no faster than a
  * rate for a while, all its wires together, and stalls at random. */

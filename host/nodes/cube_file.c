@@ -127,6 +127,9 @@ static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
     return key == NULL ? 0 : read_key(file, key, error);
 }
 
+static int host_cube_check_ssh(const struct host_cube_file *file,
+                               struct host_error *error);
+
 static int read_settings(struct host_cube_file *file, const config_t *config,
                          struct host_error *error) {
     static const char *const names[] = {
@@ -225,6 +228,9 @@ static char *read_text(const char *path, struct host_error *error) {
     }
     return text;
 }
+
+static int host_cube_scan(const char *path, const char *text,
+                          struct host_error *error);
 
 int host_cube_file_parse(struct host_cube_file *file, const char *path,
                          const char *text, struct host_error *error) {
@@ -332,8 +338,10 @@ static const char *take(struct scan *s) {
     }
 }
 
-int host_cube_scan(const char *path, const char *text,
-                   struct host_error *error) {
+/* Whether the library can be given a text: HOST_INPUT with the line where it
+ * asks for other files, or for more than any cube file has.  Work: a pass. */
+static int host_cube_scan(const char *path, const char *text,
+                          struct host_error *error) {
     struct scan s = {.at = text, .line = 1};
     while (*s.at != '\0') {
         const char *end = skip(s.at);
@@ -497,8 +505,8 @@ int host_cube_read_ssh(struct host_cube_file *file,
     return 0;
 }
 
-int host_cube_check_ssh(const struct host_cube_file *file,
-                        struct host_error *error) {
+static int host_cube_check_ssh(const struct host_cube_file *file,
+                               struct host_error *error) {
     for (unsigned i = 0; i < file->nodes && error->code == 0; i++) {
         const struct host_cube_ssh *ssh = host_cube_ssh(file, i);
         if (ssh != NULL && (file->local[i] || host_cube_is_bare(file, i))) {

@@ -2,8 +2,7 @@
  * the format, boards/linux/ an example for each kind of wire.  Links between
  * two bare boards go from UART to UART, and may be left out.
  *
- * Memory: about 600 bytes a wire, 160 a reset or boot line.  Work: one pass
- * over the file, and a look-up for each host name. */
+ * Memory: about 600 bytes a wire, 160 a reset or boot line. */
 #ifndef HOST_CUBE_FILE_H
 #define HOST_CUBE_FILE_H
 
@@ -136,17 +135,9 @@ const char *host_cube_start_line(const struct host_cube_file *file,
 const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
                                 size_t size);
 
-/* `incode cube FILE`: prints how each node is started. */
-int host_cube_print(const char *path, struct host_error *error);
-
 /* What the parts of the cube file's reader share: its settings as libconfig has
  * them (cube_values.c), its links (cube_wires.c), its boards (cube_boards.c)
  * and the lines to them (cube_pins.c). */
-
-/* Whether the library can be given a text: HOST_INPUT with the line where it
- * asks for other files, or for more than any cube file has.  Work: a pass. */
-int host_cube_scan(const char *path, const char *text,
-                   struct host_error *error);
 
 /* HOST_INPUT with the line of a setting; NULL: the first. */
 int host_cube_wrong(const struct host_cube_file *file,
@@ -201,11 +192,6 @@ int host_cube_read_pins(struct host_cube_file *file,
                         const config_setting_t *group, unsigned node,
                         struct host_error *error);
 
-/* Adds what DTR and RTS of a wire's port do, and sets what they are beside. */
-int host_cube_read_modem(struct host_cube_file *file,
-                         const config_setting_t *group,
-                         struct host_cube_wire *wire, struct host_error *error);
-
 /* Adds the wire of a group to file->wire, which has room for it. */
 int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                         struct host_error *error);
@@ -229,13 +215,9 @@ host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
 int host_cube_read_ssh(struct host_cube_file *file,
                        const config_setting_t *group, unsigned node,
                        struct host_error *error);
-int host_cube_check_ssh(const struct host_cube_file *file,
-                        struct host_error *error);
 
 /* `incode key FILE`: makes a cube's key, 64 hexadecimal digits of the kernel's
- * random numbers, in a file for its owner alone.
- *
- * Memory: the digits, wiped.  Work: a few system calls. */
+ * random numbers, in a file for its owner alone. */
 
 /* Mode 0600 whatever the umask, and on the disk when it returns.  0; HOST_INPUT
  * where there is such a file already, which stays as it is, or where it cannot

@@ -148,7 +148,8 @@ static void print_bare(const struct host_cube_file *file, unsigned node) {
     printf("\n");
 }
 
-int host_cube_print(const char *path, struct host_error *error) {
+/* `incode cube FILE`: prints how each node is started. */
+static int host_cube_print(const char *path, struct host_error *error) {
     /* A byte becomes "$(printf '\\377')" at most. */
     static char line[20 * HOST_NODE_OPTIONS_MAX * HOST_NODE_OPTION_BYTES];
     static struct host_cube_file file;

@@ -22,6 +22,11 @@ static int read_device(const struct host_cube_file *file,
     return 0;
 }
 
+static int host_cube_read_modem(struct host_cube_file *file,
+                                const config_setting_t *group,
+                                struct host_cube_wire *wire,
+                                struct host_error *error);
+
 static int read_line(struct host_cube_file *file, const config_setting_t *group,
                      struct host_cube_wire *wire, struct host_error *error) {
     const config_setting_t *pair = config_setting_get_member(group, "serial");
@@ -558,10 +563,11 @@ static int read_modem_line(struct host_cube_file *file,
                : wrong(file, setting, rts ? "rts" : "dtr", what, error);
 }
 
-int host_cube_read_modem(struct host_cube_file *file,
-                         const config_setting_t *group,
-                         struct host_cube_wire *wire,
-                         struct host_error *error) {
+/* Adds what DTR and RTS of a wire's port do, and sets what they are beside. */
+static int host_cube_read_modem(struct host_cube_file *file,
+                                const config_setting_t *group,
+                                struct host_cube_wire *wire,
+                                struct host_error *error) {
     const config_setting_t *dtr = config_setting_get_member(group, "dtr");
     const config_setting_t *rts = config_setting_get_member(group, "rts");
     wire->dtr_low = dtr != NULL;

@@ -3,8 +3,7 @@
  * the processors that are allowed here, so that it and its neighbours do not
  * wait for each other's way between them.
  *
- * Memory: 16 KB, in the child.  Work: a look at PATH, and of a start an exec.
- */
+ * Memory: 16 KB, in the child. */
 #ifndef HOST_EMULATOR_H
 #define HOST_EMULATOR_H
 
@@ -83,8 +82,8 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn);
  * over a socket that it has inherited.  It is spoken to in lines of JSON;
  * events and answers to others are passed over.
  *
- * Memory: struct host_qmp.  Work: a request waits for its answer, which takes
- * milliseconds on a quiet machine, and never waits longer than wait_us. */
+ * Work: a request waits for its answer, which takes milliseconds on a quiet
+ * machine, and never waits longer than wait_us. */
 
 enum { HOST_QMP_US = 10000000, HOST_QMP_LINE = 4096 };
 

@@ -1,8 +1,6 @@
 /* The host's end of a wire, whatever its kind: a connected socket, a serial
  * port that may vanish and come back, or a call over TCP that is made again
- * when it breaks.
- *
- * Memory: struct host_port.  Work: as the drivers'. */
+ * when it breaks. */
 #ifndef HOST_PORT_H
 #define HOST_PORT_H
 
@@ -21,8 +19,8 @@
 /* Nodes as children of this process, which end when it does.  One that dies may
  * be started again, but not for ever.
  *
- * Memory: struct host_process.  Work: a fork, and a wait until the child's
- * program has begun; a system call a look. */
+ * Work: a fork, and a wait until the child's program has begun; a system call
+ * a look. */
 
 enum { HOST_FAULTS_MAX = 3, HOST_DEATHS_MAX = 10, HOST_DEATHS_US = 10000000 };
 
@@ -73,9 +71,7 @@ void host_child_wait(struct host_process *process);
 /* What a bare board's console says, among the frames of a wire or alone: a
  * record is a zero, 0xFF, a text and a zero, which is no frame, so that the
  * link above passes over it.  A report of a fault is said on standard error,
- * and kept for who asks why a node is not heard.
- *
- * Memory: struct host_console.  Work: constant a byte. */
+ * and kept for who asks why a node is not heard. */
 
 enum { HOST_CONSOLE_TEXT = 640 }; /* of a record, at most */
 

@@ -2,13 +2,7 @@
  * under `start` the host starts on this machine, and again when they die; the
  * others are there already, or come.
  *
- * Memory: two ports, and 24 bytes a node.  Work: a fork and an exec for each
- * node that the host starts.
- *
- *     if (host_remote_start(&remote, &file, "incode-node", &error) != 0)
- *         return error.code;
- *     machine = host_remote_machine(&remote); // whose stop ends the nodes
- */
+ * Memory: two ports, and 24 bytes a node. */
 #ifndef HOST_REMOTE_H
 #define HOST_REMOTE_H
 

@@ -122,6 +122,8 @@ static const struct argp_option options_of_run[] = {
      "Start FILE for a node instead of incode-node", 4},
     {0}};
 
+static bool host_arguments_given(const struct host_arguments *p, int key);
+
 static int of_cube(const struct host_arguments *p) {
     for (int key = KEY_STRATEGY; key < KEY_THREADS; key++) {
         if (host_arguments_given(p, key)) {
@@ -422,6 +424,10 @@ static error_t parse_option(int key, char *value, struct argp_state *state) {
     }
 }
 
+static int host_arguments_together(const struct host_arguments *p);
+
+static char *host_arguments_help(int key, const char *text, void *input);
+
 /* flags: of argp_parse. */
 static int parse_run(int argc, char **argv, unsigned flags,
                      struct host_run_options *options,
@@ -527,7 +533,8 @@ static char *list_formats(const char *text, enum host_use use,
                : whole;
 }
 
-char *host_arguments_help(int key, const char *text, void *input) {
+/* As argp asks for it: `text` itself, or what is to be freed. */
+static char *host_arguments_help(int key, const char *text, void *input) {
     (void)input;
     switch (key) {
     case 'o':
@@ -549,7 +556,8 @@ char *host_arguments_help(int key, const char *text, void *input) {
 
 /* --- arguments together --------------------------------------------------- */
 
-bool host_arguments_given(const struct host_arguments *p, int key) {
+/* Whether the option of a key from KEY_STRATEGY on was given. */
+static bool host_arguments_given(const struct host_arguments *p, int key) {
     return (p->given >> (key - KEY_STRATEGY) & 1) != 0;
 }
 
@@ -574,7 +582,9 @@ static int settle_bare(const struct host_arguments *p) {
     return 0;
 }
 
-int host_arguments_together(const struct host_arguments *p) {
+/* 0, or HOST_USAGE: an option that would change nothing is a misunderstanding.
+ * What a board settles is settled then. */
+static int host_arguments_together(const struct host_arguments *p) {
     const struct host_run_options *o = p->options;
     bool cube = o->cube != NULL, bare = !cube && o->board->bare != NULL;
     bool ranks = !cube && !bare && o->link->ranks;

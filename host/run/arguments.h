@@ -66,14 +66,4 @@ struct host_arguments {
     uint64_t given; /* bits of keys from KEY_STRATEGY on */
 };
 
-/* Whether the option of a key from KEY_STRATEGY on was given. */
-bool host_arguments_given(const struct host_arguments *arguments, int key);
-
-/* 0, or HOST_USAGE: an option that would change nothing is a misunderstanding.
- * What a board settles is settled then. */
-int host_arguments_together(const struct host_arguments *arguments);
-
-/* As argp asks for it: `text` itself, or what is to be freed. */
-char *host_arguments_help(int key, const char *text, void *input);
-
 #endif

@@ -4,12 +4,7 @@
  * their flash chips: who starts it again on the same FILE has turned all boards
  * off and on.
  *
- * Memory: that of board_emulated.h.  Work: a look at the boards every 20 ms.
- *
- *     char *argv[] = {"incode emulate", "--help", NULL};
- *     if (host_emulate(2, argv, &error) != 0)
- *         return error.code;
- */
+ * Work: a look at the boards every 20 ms. */
 #ifndef HOST_EMULATE_H
 #define HOST_EMULATE_H
 

@@ -26,7 +26,9 @@ static double ratio(double a, double b) {
     return b > 0.0 ? a / b : 0.0;
 }
 
-void host_report_head(FILE *file, const char *title) {
+/* The columns of the paper's Table 2: their head, under a title; a row, with
+ * the speed-up against `alone`; and what the columns are. */
+static void host_report_head(FILE *file, const char *title) {
     fprintf(file,
             "\n%s\n"
             "%5s %8s %8s %8s %8s %5s %10s %6s %8s %8s %5s\n",
@@ -34,8 +36,8 @@ void host_report_head(FILE *file, const char *title) {
             "tetrahedra", "dupl.", "cpu_max", "speed-up", "eff.");
 }
 
-void host_report_row(FILE *file, const struct host_run_result *r,
-                     const struct host_run_result *alone) {
+static void host_report_row(FILE *file, const struct host_run_result *r,
+                            const struct host_run_result *alone) {
     double wall = ratio(alone->t_max_s, r->t_max_s);
     double cpu = ratio(busiest(alone), busiest(r));
     fprintf(file,
@@ -47,7 +49,7 @@ void host_report_row(FILE *file, const struct host_run_result *r,
             cpu / r->nodes);
 }
 
-void host_report_notes(FILE *file) {
+static void host_report_notes(FILE *file) {
     fprintf(file,
             "Seconds; t_min, t_max: of the fastest and the slowest node, on "
             "the clock, %ld\nprocessors shared by all.  cpu_max: processor "
@@ -78,7 +80,8 @@ static void node_lines(FILE *file, const struct host_run_result *r) {
             r->memory_held == NULL ? "" : r->memory_held);
 }
 
-uint64_t host_node_stack_bytes(const struct host_node_report *report) {
+/* Of a node's memory: what its board tells, or what processes have. */
+static uint64_t host_node_stack_bytes(const struct host_node_report *report) {
     uint32_t told = report->statistics.stack_bytes;
     return told > 0 ? told : HOST_STACK_BYTES;
 }
@@ -92,7 +95,8 @@ static void map_line(FILE *file, uint64_t bytes, const char *what,
     fputc('\n', file);
 }
 
-void host_report_map(FILE *file, const struct host_run_result *result) {
+/* How the tables of node 0 fill its memory. */
+static void host_report_map(FILE *file, const struct host_run_result *result) {
     const struct node_map *m = &result->node[0].map.map;
     const struct node_role *role = node_role_named(result->node[0].map.role);
     uint64_t stack = host_node_stack_bytes(&result->node[0]);

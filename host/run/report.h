@@ -13,19 +13,6 @@ void host_report_run(FILE *file, const struct host_run_options *options,
                      const struct host_run_result *result,
                      const struct host_run_result *alone);
 
-/* Of a node's memory: what its board tells, or what processes have. */
-uint64_t host_node_stack_bytes(const struct host_node_report *report);
-
-/* How the tables of node 0 fill its memory. */
-void host_report_map(FILE *file, const struct host_run_result *result);
-
-/* The columns of the paper's Table 2: their head, under a title; a row, with
- * the speed-up against `alone`; and what the columns are. */
-void host_report_head(FILE *file, const char *title);
-void host_report_row(FILE *file, const struct host_run_result *result,
-                     const struct host_run_result *alone);
-void host_report_notes(FILE *file);
-
 /* The statistics of a run as one JSON object.
  *
  * Memory: about 1 KiB a node while it is written.  Work: O(nodes). */

@@ -65,6 +65,8 @@ static void end_stretch(const struct stretch *stretch,
         used_seconds(CLOCK_PROCESS_CPUTIME_ID) - stretch->cpu_s;
 }
 
+static void host_run_sum_nodes(struct host_run_result *result);
+
 void host_run_sum(const struct host_service *service,
                   struct host_run_result *result) {
     struct host_run_result *r = result;
@@ -79,7 +81,8 @@ void host_run_sum(const struct host_service *service,
     host_run_sum_nodes(r);
 }
 
-void host_run_sum_nodes(struct host_run_result *result) {
+/* The sums over the reports of result->node. */
+static void host_run_sum_nodes(struct host_run_result *result) {
     struct host_run_result *r = result;
     for (unsigned i = 0; i < r->nodes; i++) {
         const struct node_finished_message *f = &r->node[i].statistics;
@@ -477,6 +480,12 @@ static int run_alone(const struct host_run_options *options,
     return status;
 }
 
+static int host_triangulate_direct(const struct host_run_options *options,
+                                   const struct host_points *points,
+                                   struct host_tetrahedra *tets,
+                                   struct host_run_result *result,
+                                   struct host_error *error);
+
 static int run_on(const struct host_run_options *options,
                   const struct host_points *points,
                   struct host_run_result *result, struct host_run_result *alone,
@@ -657,11 +666,12 @@ static int check(const struct host_run_options *options,
     return status;
 }
 
-int host_triangulate_direct(const struct host_run_options *options,
-                            const struct host_points *points,
-                            struct host_tetrahedra *tets,
-                            struct host_run_result *result,
-                            struct host_error *error) {
+/* The same by threads of this process, the library's way. */
+static int host_triangulate_direct(const struct host_run_options *options,
+                                   const struct host_points *points,
+                                   struct host_tetrahedra *tets,
+                                   struct host_run_result *result,
+                                   struct host_error *error) {
     struct host_order order = {0};
     struct timespec used;
     result->strategy = &strategy_direct;

@@ -1,14 +1,7 @@
 /* `incode run`: points in, a cube of nodes, tetrahedra out.
  *
  * Memory: 52 bytes a point and 16 a tetrahedron at the end, 108 a point while
- * the points are ordered.  Work: the sum of its parts; the times are in the
- * result.
- *
- *     host_run_defaults(&options);
- *     options.input = "bunny.xyz";
- *     if (host_run(&options, &result, &error) != 0)
- *         return error.code;
- */
+ * the points are ordered. */
 #ifndef HOST_RUN_H
 #define HOST_RUN_H
 
@@ -124,13 +117,6 @@ int host_triangulate(const struct host_run_options *options,
                      struct host_tetrahedra *tets,
                      struct host_run_result *result, struct host_error *error);
 
-/* The same by threads of this process, the library's way. */
-int host_triangulate_direct(const struct host_run_options *options,
-                            const struct host_points *points,
-                            struct host_tetrahedra *tets,
-                            struct host_run_result *result,
-                            struct host_error *error);
-
 /* The same on nodes that are there already, result->nodes of them, with
  * result's strategy and memory as they are.  Ends the machine, whatever
  * happens. */
@@ -146,9 +132,6 @@ int host_triangulate_on(const struct host_run_options *options,
  * time at work: neither of holders, nor of nodes lost before they told. */
 void host_run_sum(const struct host_service *service,
                   struct host_run_result *result);
-
-/* The sums over the reports of result->node. */
-void host_run_sum_nodes(struct host_run_result *result);
 
 /* The whole command: reads, triangulates, verifies, writes. */
 int host_run(const struct host_run_options *options,

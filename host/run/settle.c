@@ -71,9 +71,12 @@ setup_of(const struct host_run_options *options, uint32_t bricks,
     return setup;
 }
 
-bool host_memory_fits(const struct host_run_options *options,
-                      const struct host_strategy *strategy, unsigned nodes,
-                      uint32_t bricks, const uint32_t cells[3]) {
+/* Whether every node does with the memory of the options.  bricks, cells: of
+ * the order, where it is known; else 1 and none. */
+static bool host_memory_fits(const struct host_run_options *options,
+                             const struct host_strategy *strategy,
+                             unsigned nodes, uint32_t bricks,
+                             const uint32_t cells[3]) {
     struct node_setup_message setup = setup_of(options, bricks, cells);
     return does_with(options, strategy, cube_dimension(nodes), &setup,
                      options->memory);

@@ -5,7 +5,7 @@
  *
  * Memory: 1 MB, while it works.  Work: a look at a thousand bricks; where they
  * do not, and the triangulation does not fit a node, 2,500 insertions
- * (host/mesh/open.h). */
+ * (host/mesh/order.h). */
 #ifndef HOST_SETTLE_H
 #define HOST_SETTLE_H
 
@@ -13,12 +13,6 @@
 
 /* The memory that a run's nodes need, and what is said where they have less.
  */
-
-/* Whether every node does with the memory of the options.  bricks, cells: of
- * the order, where it is known; else 1 and none. */
-bool host_memory_fits(const struct host_run_options *options,
-                      const struct host_strategy *strategy, unsigned nodes,
-                      uint32_t bricks, const uint32_t cells[3]);
 
 /* 0, or HOST_USAGE: the options give less, and what can be done. */
 int host_memory_check(const struct host_run_options *options,
@@ -39,8 +33,7 @@ bool host_settle_ordered(const struct host_run_options *options,
                          struct host_run_result *result);
 
 /* `incode run --cube FILE`: a run on nodes that are wired as a cube file says.
- *
- * Memory: that of the cube file and of remote.h.  Work: as theirs. */
+ */
 
 /* Reads options->cube and makes these options those of its cube, on whose
  * nodes host_run will be.  0, HOST_USAGE for options that do not fit that

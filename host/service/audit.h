@@ -19,14 +19,9 @@
  * more than nodes + 4 checks have failed.
  *
  * Memory: that of the check, a byte a brick and 300 KB; while faults are
- * analysed, 48 bytes a brick as well.  Work: that of the check.  The analysis
- * of a failure adds the judge's work for at most 512 tetrahedra, their facets
- * and the tetrahedra beyond these, and a pass over the result.
- *
- *     bool passed = false;
- *     if (host_audit_step(&service, &passed, &error) != 0)
- *         return error.code;
- */
+ * analysed, 48 bytes a brick as well.  The analysis of a failure adds the
+ * judge's work for at most 512 tetrahedra, their facets and the tetrahedra
+ * beyond these, and a pass over the result. */
 #ifndef HOST_AUDIT_H
 #define HOST_AUDIT_H
 

@@ -349,6 +349,8 @@ int host_detector_doubt(const struct host_service *service, unsigned node,
                      next ? "" : "; look after that node and its wires");
 }
 
+static void host_idle_check(struct host_service *service, uint64_t elapsed_us);
+
 int host_detector_check(struct host_service *service, uint64_t now_us,
                         struct host_error *error) {
     struct host_service *s = service;
@@ -661,7 +663,8 @@ static void leave_for_good(struct host_service *s, unsigned node,
     }
 }
 
-void host_idle_check(struct host_service *service, uint64_t elapsed_us) {
+/* Sets service->loss where a node is left aside. */
+static void host_idle_check(struct host_service *service, uint64_t elapsed_us) {
     struct host_service *s = service;
     for (unsigned i = 0; i < s->machine->nodes && !s->loss; i++) {
         struct host_node *node = &s->node[i];

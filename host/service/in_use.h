@@ -2,13 +2,7 @@
  * says.  That host may have died just before: then the node says so no more
  * after three seconds, and lets this one in a moment later.  Meanwhile the wire
  * is left alone each time that it was told so, where there is an other who
- * needs it.
- *
- * Memory: the struct.  Work: constant a look.
- *
- *     if (host_in_use_look(&in_use, &machine, peer, now_us) == HOST_STAYS)
- *         return host_in_use_fail(&machine, 0, &error);
- */
+ * needs it. */
 #ifndef HOST_IN_USE_H
 #define HOST_IN_USE_H
 

@@ -1,23 +1,13 @@
 /* Which bricks are committed, which are out, and under which epoch.  A result
- * counts when the brick that owns it (incode/front/owner.h) is committed; what
+ * counts when the brick that owns it (incode/front/job.h) is committed; what
  * a loss left uncommitted is dropped by host_ledger_abandon, and those bricks
  * are given out again, in ranges.
  *
  * The ledger also knows which node committed a brick and which node found a
  * tetrahedron, so that the check of the result (audit.h) can name the node.
  *
- * Memory: 3 bytes a brick, 40 bytes a node and 16 bytes for each change of the
- * finder between two tetrahedra that follow each other.  Work: constant a call,
- * but for host_ledger_abandon, one pass over the tetrahedra, and
- * host_ledger_next, which passes over the bricks once between two calls of the
- * former.
- *
- *     while (host_ledger_next(&ledger, &order, &first, &last))
- *         epoch = host_ledger_open(&ledger, node, first, last);
- *     if (host_ledger_current(&ledger, node, epoch) &&
- *         host_ledger_commit(&ledger, node, brick) != 0)
- *         return HOST_CUBE;
- */
+ * Memory: 3 bytes a brick, 40 bytes a node and 16 bytes for each change of
+ * the finder between two tetrahedra that follow each other. */
 #ifndef HOST_LEDGER_H
 #define HOST_LEDGER_H
 

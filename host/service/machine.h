@@ -1,14 +1,7 @@
 /* All that the host's service asks of the place where its cube runs, as
  * node/board.h is all that a node asks of its board: processes of this machine,
  * ranks of MPI, real boards, or a simulation.  The service reads the time and
- * sleeps through it alone.
- *
- * Memory: none of its own.  Work: every function returns at once, but for idle.
- *
- *     uint64_t due_us = machine.now_us(machine.context) + 1000;
- *     machine.idle(machine.context, due_us);
- *     machine.stop(machine.context);
- */
+ * sleeps through it alone. */
 #ifndef HOST_MACHINE_H
 #define HOST_MACHINE_H
 

@@ -2,15 +2,7 @@
  * nodes as any counted message, and only while they ask.
  *
  * Memory: struct host_onlooking, 0.4 KB.  Work: constant a message; where
- * nobody looks, a call every 50 ms.
- *
- *     host_onlooking_look(&onlooking, &machine, now_us, &progress);
- *     if (host_onlooking_due(&onlooking, node, &question) &&
- *         cube_write(cube, 3, NODE_QUESTION, &question, sizeof question) == 0)
- *         host_onlooking_sent(&onlooking, node);
- *     if (message.type == NODE_ANSWER)
- *         host_onlooking_take(&onlooking, &machine, &message);
- */
+ * nobody looks, a call every 50 ms. */
 #ifndef HOST_ONLOOKERS_H
 #define HOST_ONLOOKERS_H
 

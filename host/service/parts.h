@@ -1,6 +1,4 @@
-/* The host's end of a cube, on a machine's wires.
- *
- * Memory: its windows, a kilobyte or two a frame.  Work: one allocation. */
+/* The host's end of a cube, on a machine's wires. */
 #ifndef HOST_SERVICE_PARTS_H
 #define HOST_SERVICE_PARTS_H
 
@@ -117,8 +115,7 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
  * job, these are judged.  If some are wrong or come twice, the node is refused;
  * else the bound is doubled, as a hub or two skew lines have so many.
  *
- * Memory: none of its own; a copy of a job's results or a node's faces while
- * they are judged.  Work: about 10 ns a tetrahedron. */
+ * Work: about 10 ns a tetrahedron. */
 
 /* Of a job that is current; the results behind the header.  0, or an error. */
 int host_results_take(struct host_service *service,
@@ -269,9 +266,6 @@ void host_doubts_heard(struct host_service *service, unsigned node, bool anew);
 
 /* The node has done something, or has something to do from now on. */
 void host_idle_progress(struct host_service *service, unsigned node);
-
-/* Sets service->loss where a node is left aside. */
-void host_idle_check(struct host_service *service, uint64_t elapsed_us);
 
 /* A node is not to be trusted with work, as `why` says: ends it for a new
  * start, or leaves it aside.  False: it had its new start already. */

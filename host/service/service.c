@@ -107,7 +107,7 @@ int host_service_open(struct host_service *service, struct host_error *error) {
     return 0;
 }
 
-bool host_service_is_up(const struct host_service *service) {
+static bool host_service_is_up(const struct host_service *service) {
     return service->up == service->work.living && !service->searching;
 }
 

@@ -9,15 +9,7 @@
  * run is over, the whole result is checked: audit.h.
  *
  * Memory: the cube's windows, 3 KiB a node, a byte a brick, the spilled faces
- * (see spill.h), and the tetrahedra themselves.  Work: a few ns a byte.
- *
- *     struct host_service service = {.machine = &machine, .order = &order,
- *                                    .tets = &tets, .setup = setup};
- *     if (host_service_start(&service, &error) == 0 &&
- *         host_service_run(&service, &error) == 0)
- *         busy_us = service.report[0].statistics.busy_us;
- *     host_service_end(&service);
- */
+ * (see spill.h), and the tetrahedra themselves. */
 #ifndef HOST_SERVICE_H
 #define HOST_SERVICE_H
 
@@ -191,7 +183,6 @@ int host_service_start(struct host_service *service, struct host_error *error);
  * loop: before the first; one; and whether every node has answered. */
 int host_service_open(struct host_service *service, struct host_error *error);
 int host_service_round(struct host_service *service, struct host_error *error);
-bool host_service_is_up(const struct host_service *service);
 
 /* Hands out the setup and the jobs, and returns when every brick is committed
  * and every node has told its statistics. */

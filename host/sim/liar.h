@@ -4,13 +4,7 @@
  * one of the ways of enum host_lie.  The simulator uses it, and so do the
  * processes of tests/system/liar.
  *
- * Memory: the struct, 16 KB.  Work: a pass over each message that may be
- * altered.
- *
- *     struct host_liar liar = {.way = HOST_LIE_DROP, .one_in = 500};
- *     liar.random = sim_seed(17, 3);
- *     int status = host_liar_write(&liar, counted, dest, type, data, size);
- */
+ * Memory: the struct, 16 KB. */
 #ifndef HOST_SIM_LIAR_H
 #define HOST_SIM_LIAR_H
 

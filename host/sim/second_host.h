@@ -1,14 +1,6 @@
 /* A second host that comes to the simulated cube while the first is at work:
  * the host's service as it is, a round at a time, on a connection that takes
- * the place of the first host's, as over TCP.  It has to be sent away.
- *
- * Memory: the service's, while it is there.  Work: its rounds.
- *
- *     options.second = host_second_host_round;
- *     host_second_host_come(&second, &world, leave_us, host_us);
- *     host_second_host_leave(&second);
- *     bool let_in = second.fault[0] != '\0';
- */
+ * the place of the first host's, as over TCP.  It has to be sent away. */
 #ifndef HOST_SIM_SECOND_HOST_H
 #define HOST_SIM_SECOND_HOST_H
 

@@ -1,16 +1,7 @@
 /* `incode sim`: host, nodes and links as they are, in one process and one
  * thread, in virtual time, from one seed.  Faults strike, then they stop, and
  * the result must be that of the triangulator alone.  Where a node lies, and
- * all through, a run may give up instead, if it names that node.
- *
- * Memory: the nodes' and a few times the points.  Work: a tenth of a second a
- * seed, as a rule.
- *
- *     host_sim_plan_draw(&plan, 17, 0);
- *     if (host_sim_run(&plan, &outcome, &error) != 0)
- *         return error.code;
- *     uint64_t trace = outcome.trace; // the same whenever the plan is
- */
+ * all through, a run may give up instead, if it names that node. */
 #ifndef HOST_SIM_H
 #define HOST_SIM_H
 

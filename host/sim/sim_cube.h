@@ -7,13 +7,7 @@
  * a node leads to node ^ 1 << d, link `dimension` to the host; link k of the
  * host to the k-th node that has a wire to it.
  *
- * Memory: sim_wire_bytes() and two ports a wire, once.  Work: linear in the
- * bytes.
- *
- *     host_sim_cube_open(&cube, &options, &now_us, &error);
- *     config.pipes[2] = host_sim_cube_pipe(&cube, 5, 2);
- *     host_sim_cube_cut(&cube, host_sim_cube_wire(&cube, 5, 2), true);
- */
+ * Memory: sim_wire_bytes() and two ports a wire, once. */
 #ifndef HOST_SIM_CUBE_H
 #define HOST_SIM_CUBE_H
 

@@ -1,12 +1,5 @@
 /* Numbers drawn from a state of one's own: as transport/drivers/sim.h draws,
- * the same on every machine.
- *
- * Memory: the state.  Work: a few operations a draw, and one a doubling.
- *
- *     uint64_t state = sim_seed(17, 2);
- *     unsigned node = (unsigned)host_sim_draw(&state, 0, 7);
- *     uint64_t us = host_sim_draw_log(&state, 1000, 1000000);
- */
+ * the same on every machine. */
 #ifndef HOST_SIM_DRAW_H
 #define HOST_SIM_DRAW_H
 

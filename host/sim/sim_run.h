@@ -1,11 +1,4 @@
-/* A simulated run at work, as sim.c and sim_faults.c share it.
- *
- * Memory: the world's, and a few times the points.  Work: none of its own.
- *
- *     struct host_sim_run *run = calloc(1, sizeof *run);
- *     run->plan = &plan;
- *     run->random = sim_seed(plan.seed, 2);
- */
+/* A simulated run at work, as sim.c and sim_faults.c share it. */
 #ifndef HOST_SIM_RUN_H
 #define HOST_SIM_RUN_H
 

@@ -1,12 +1,5 @@
 /* Faults for which something else stands at a node's place (stand_in.h): how a
- * plan draws them, and when they come and go.
- *
- * Memory: none.  Work: a step a fault.
- *
- *     host_sim_stand_ins_prepare(run);
- *     if (host_sim_stand_ins_us(run) <= run->world.now_us)
- *         host_sim_stand_ins_strike(run);
- */
+ * plan draws them, and when they come and go. */
 #ifndef HOST_SIM_STAND_INS_H
 #define HOST_SIM_STAND_INS_H
 

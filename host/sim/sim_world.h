@@ -1,10 +1,7 @@
 /* A cube in virtual time: its nodes run the real code on boards that are no
  * more than memory and wires, one step at a time, in the order of their clocks.
  * The host is who calls: whenever it asks for the time or sleeps, the rest of
- * the world runs until then.  No clock of this machine takes part.
- *
- * Memory: the nodes' arenas, and the bytes of each wire.  Work: a heap of
- * nodes, log n a step, besides the nodes' own. */
+ * the world runs until then.  No clock of this machine takes part. */
 #ifndef HOST_SIM_WORLD_H
 #define HOST_SIM_WORLD_H
 
@@ -152,9 +149,7 @@ void host_world_give_up(struct host_world *world, unsigned node,
 const char *host_world_damage(const struct host_world *world);
 
 /* How a node of a simulated cube starts: told who it is, or, as on a bare
- * board, asking its neighbours.
- *
- * Memory: the node's.  Work: that of node_start, or of a look at its wires. */
+ * board, asking its neighbours. */
 
 /* What its memory holds before is chance. */
 void host_sim_boot(struct host_world *world, unsigned node);

@@ -223,7 +223,8 @@ uint64_t host_stand_in_wait_us(const struct host_stand_in *one) {
     return due < AGAIN_US ? due : AGAIN_US;
 }
 
-unsigned host_stand_in_told(const struct host_stand_in *one) {
+/* Links whose other end was told of the wiring. */
+static unsigned host_stand_in_told(const struct host_stand_in *one) {
     return one->told;
 }
 

@@ -1,14 +1,6 @@
 /* What is at a node's place and is no sound node, on the board of one: an idler
  * answers pings and never works; a teller tells its neighbours of a wiring that
- * another host began.
- *
- * Memory: the board's arena.  Work: a step handles the frames that links hold.
- *
- *     struct host_stand_in_orders orders = {.kind = HOST_IDLER};
- *     struct host_stand_in *one = host_stand_in_start(&board, &orders);
- *     while (one != NULL && host_stand_in_step(one) != NODE_STOPPED)
- *         board.idle(board.context, host_stand_in_wait_us(one));
- */
+ * another host began. */
 #ifndef HOST_SIM_STAND_IN_H
 #define HOST_SIM_STAND_IN_H
 
@@ -32,8 +24,5 @@ host_stand_in_start(const struct node_board *board,
 /* As of node.h. */
 enum node_event host_stand_in_step(struct host_stand_in *one);
 uint64_t host_stand_in_wait_us(const struct host_stand_in *one);
-
-/* Links whose other end was told of the wiring. */
-unsigned host_stand_in_told(const struct host_stand_in *one);
 
 #endif

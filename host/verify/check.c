@@ -70,7 +70,8 @@ void check_fault(struct check *c, const char *subject, const char *what,
     (void)pthread_mutex_unlock(&c->lock);
 }
 
-void check_fail(struct check *c, const struct host_error *error) {
+/* Notes an error, unless there is one. */
+static void check_fail(struct check *c, const struct host_error *error) {
     (void)pthread_mutex_lock(&c->lock);
     if (error->code != 0 && c->error->code == 0) {
         *c->error = *error;
@@ -206,6 +207,8 @@ static int cut_parts(struct check *c) {
     }
     return 0;
 }
+
+static int check_twins(struct check *c);
 
 static int check_all(struct check *c) {
     if (getrandom(c->key, sizeof c->key, 0) != (ssize_t)sizeof c->key) {
@@ -573,7 +576,9 @@ static void walk_vertices(void *context, unsigned number) {
 
 /* --- All together ----------------------------------------------------- */
 
-int check_twins(struct check *c) {
+/* twins.c: pairs the facets of all tetrahedra, or of those that are listed, and
+ * adds the facets without a twin to the hull. */
+static int check_twins(struct check *c) {
     size_t bytes = ((size_t)c->sites->count + 1) * sizeof(uint32_t);
     bool enough = true;
     for (unsigned i = 0; i < c->parts; i++) {

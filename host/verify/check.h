@@ -15,8 +15,7 @@
  * Memory: on T <= 4 threads 8 T + 2 bytes a vertex number; 80 a facet of the
  * hull; and 8 a tetrahedron for the Delaunay depth, or for tiling 12 for each
  * tetrahedron whose lowest or second vertex is the lowest of a facet of the
- * hull.  Work: O(n) on all threads for vertices of bounded degree.  The
- * tetrahedra stay as they are. */
+ * hull.  Work: O(n) on all threads for vertices of bounded degree. */
 #ifndef HOST_CHECK_H
 #define HOST_CHECK_H
 
@@ -95,7 +94,7 @@ int host_check(const struct host_sites *sites,
 
 /* The exact check (check.h) of tetrahedra whose vertices are rows of points.
  *
- * Memory: 4 bytes a point beyond that of the check.  Work: that of the check.
+ * Memory: 4 bytes a point beyond that of the check.
  *
  *     if (host_verify(&points, &tets, HOST_CHECK_DELAUNAY, &report, &error) ==
  * HOST_UNVERIFIED) fputs(report.text, stderr); */

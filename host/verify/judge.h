@@ -4,15 +4,7 @@
  * Memory: 48 bytes a brick (64 vertex numbers), made once.  Work: a box test
  * for each 64 bricks, and for each of these that the sphere or half-space
  * touches, a box test a brick; an exact test for each point of the bricks
- * touched.
- *
- *     struct host_judge judge;
- *     if (host_judge_make(&judge, &sites, &error) != 0)
- *         return error.code;
- *     if (!host_judge_tetrahedron(&judge, tets.v[i]))
- *         puts("some point lies inside");
- *     host_judge_free(&judge);
- */
+ * touched. */
 #ifndef HOST_JUDGE_H
 #define HOST_JUDGE_H
 

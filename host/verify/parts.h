@@ -1,7 +1,5 @@
 /* Data that the parts of the check share: ranges of tetrahedra, one a thread,
- * marks and sums of vertices, and the faults found.
- *
- * Memory: that of the check.  Work: none of its own. */
+ * marks and sums of vertices, and the faults found. */
 #ifndef HOST_CHECK_PARTS_H
 #define HOST_CHECK_PARTS_H
 
@@ -105,9 +103,6 @@ void check_fault(struct check *c, const char *subject, const char *what,
                  const uint64_t *tets, int tet_count, const uint32_t *vertices,
                  int count);
 
-/* Notes an error, unless there is one. */
-void check_fail(struct check *c, const struct host_error *error);
-
 static inline bool check_is_bad(const struct check *c, uint64_t tet) {
     return c->any_bad && (c->bad[tet / 64] >> tet % 64 & 1) != 0;
 }
@@ -137,9 +132,5 @@ static inline void check_lowest_two(const uint32_t t[4], uint32_t low[2]) {
 /* sums.c: leaves out tetrahedra that are not positive, and finds the vertices
  * that are unused or hot. */
 int check_sums(struct check *c);
-
-/* twins.c: pairs the facets of all tetrahedra, or of those that are listed, and
- * adds the facets without a twin to the hull. */
-int check_twins(struct check *c);
 
 #endif

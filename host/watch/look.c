@@ -117,7 +117,7 @@ static void find_since(struct host_holder *holder) {
     }
 }
 
-bool host_holder_of(struct host_holder *holder, int file) {
+static bool host_holder_of(struct host_holder *holder, int file) {
     struct ucred peer;
     socklen_t size = sizeof peer;
     memset(holder, 0, sizeof *holder);
@@ -234,7 +234,11 @@ static bool has_open(const struct host_holder *holder, const char *wire) {
     return found;
 }
 
-bool host_holder_believed(const struct host_holder *holder, const char *wire) {
+/* Any user may take a meeting place.  A holder is believed if it belongs to
+ * this user or to root.  Root also believes another user's process that has the
+ * wire open. */
+static bool host_holder_believed(const struct host_holder *holder,
+                                 const char *wire) {
     return holder->uid == geteuid() || holder->uid == 0 ||
            (geteuid() == 0 && has_open(holder, wire));
 }

@@ -15,7 +15,7 @@
  * "WHAT; NEXT"}.  Then {"ask": WHAT, "nodes": SET} is
  * answered by {"ask": WHAT, "committed": bricks, "bricks": of so many,
  * "tetrahedra": so far, "answers": {"0": HEX, ..}}: what each node answered to
- * that question of node/questions.h, byte for byte; a node that has not
+ * that question of node/message.h, byte for byte; a node that has not
  * answered in two seconds is left out.  WHAT: "who", "links", "top", "memory",
  * "totals", "log".
  *
@@ -62,12 +62,6 @@ const char *host_holder_text(const struct host_holder *holder, char *text,
 /* For look.h and offer.h: the meeting place of a wire, and the process at the
  * other end of a socket there. */
 socklen_t host_holder_address(const char *wire, struct sockaddr_un *address);
-bool host_holder_of(struct host_holder *holder, int file);
-
-/* Any user may take a meeting place.  A holder is believed if it belongs to
- * this user or to root.  Root also believes another user's process that has the
- * wire open. */
-bool host_holder_believed(const struct host_holder *holder, const char *wire);
 
 enum { HOST_LOOKERS_MAX = 4 };
 

@@ -1,14 +1,7 @@
 /* The side of look.h that has the cube: lets others find it, takes their
  * questions, and gives them the answers.
  *
- * Memory: struct host_offer, and the answer to the question that is out.
- * Work: see look.h.  It never waits, and needs neither threads nor signals.
- *
- *     host_offer_begin(&offer, "serial:/dev/ttyUSB0");
- *     host_offer_machine(&offer, &machine);
- *     machine.onlookers = &offer.onlookers;
- *     host_offer_end(&offer);
- */
+ * It never waits, and needs neither threads nor signals. */
 #ifndef HOST_OFFER_H
 #define HOST_OFFER_H
 

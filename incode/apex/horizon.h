@@ -9,9 +9,7 @@
  * of any size, planes among them, keep their precision near the vertex.
  *
  * Memory: 106 bytes a box, for 128 to 320 of them, and 768 a copied brick,
- * given by its owner.  Work: a brick's horizon is made by a walk over the box
- * pages around it; a search looks at every box, and at the points of those
- * bricks that it cannot rule out. */
+ * given by its owner. */
 #ifndef INCODE_HORIZON_H
 #define INCODE_HORIZON_H
 
@@ -37,7 +35,7 @@ enum {
 /* The farness of what may be anywhere. */
 #define INCODE_ANYWHERE 3e30F
 
-/* Boxes along the axes and lifted ones (incode/pages/boxes.h) in the horizon's
+/* Boxes along the axes and lifted ones (incode/pages/pages.h) in the horizon's
  * units; the numbers of all boxes stand together. */
 struct incode_horizon {
     float *lo[3], *hi[3]; /* rounded outward */
@@ -165,10 +163,7 @@ static inline bool incode_horizon_holds(const struct incode_horizon *h,
  * for every tetrahedron that is built there.  Far vertices are appended as they
  * are met.
  *
- * Memory: struct incode_local_points, about 43 KB.  Work: one walk a leaf, one
- * pass a vertex; a scan looks at every point around the vertex, a vector at a
- * time in single precision, and leaves what its error bound cannot tell to the
- * exact predicates. */
+ * Memory: struct incode_local_points, about 43 KB. */
 
 enum {
     INCODE_AROUND_POINTS = 768, /* around a leaf */
@@ -271,7 +266,7 @@ uint32_t incode_local_inside(const struct incode_local_points *local,
  * the first of them draws the ball in, and what falls out of it is dropped
  * where room is wanted.  What is left is for the predicates.
  *
- * Memory: struct incode_hits, about 5 KB.  Work: that of the points given. */
+ * Memory: struct incode_hits, about 5 KB. */
 
 enum { INCODE_HITS = 128 /* kept at a time */ };
 

@@ -15,13 +15,7 @@
  * incode_maker_bytes states: the horizon's boxes and copies, frames of pages.
  * Work: a call takes one search as far as its next missing page; with the
  * indexes `naive` and `grid` it looks at no more than 256 pages of points or
- * about 4,096 rows of cells and points.
- *
- *     incode_maker_init(&maker, memory, &share, &points, &source, &pause);
- *     happened = incode_maker_apexes(&maker, 0, faces, count, answers, &done);
- *     if (happened == INCODE_WAIT)
- *         page = maker.search[0].page;   // deliver it and ask again
- */
+ * about 4,096 rows of cells and points. */
 #ifndef INCODE_MAKER_H
 #define INCODE_MAKER_H
 

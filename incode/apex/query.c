@@ -420,7 +420,7 @@ static uint32_t bricks_to(const struct walk *w, uint32_t level,
 
 /* ---- which lifted boxes a question concerns ---- */
 
-/* A lower bound of det |r|^2 - m . r over a lifted box (incode/pages/boxes.h),
+/* A lower bound of det |r|^2 - m . r over a lifted box (incode/pages/pages.h),
  * less what rounding and the errors of det and m may do; of the plane where
  * there is no sphere.  Not a number where something overflows. */
 static double least_value(const struct incode_query *q,

@@ -2,8 +2,7 @@
  * order or the other way round, and can be suspended at a missing page and
  * resumed there.
  *
- * Memory: the struct; stack for INCODE_LEVELS_MAX levels.  Work: the boxes of
- * the pages whose own box passes the question. */
+ * Memory: the struct; stack for INCODE_LEVELS_MAX levels. */
 #ifndef INCODE_QUERY_H
 #define INCODE_QUERY_H
 
@@ -160,9 +159,9 @@ double incode_scale_for(double extent);
  * pages of the grid's two lists and from their bricks; the search can be
  * suspended at a missing page, and resumed there.
  *
- * Memory: struct incode_cell_search.  Work: INCODE_CELL_SEARCH_WORK rows and
- * points a call and at most one shell; a shell's rows of cells are tested whole
- * against the sphere, and halved as long as they hold many points. */
+ * Work: INCODE_CELL_SEARCH_WORK rows and points a call and at most one shell;
+ * a shell's rows of cells are tested whole against the sphere, and halved as
+ * long as they hold many points. */
 
 enum {
     INCODE_CELL_SEARCH_WORK = 4096,

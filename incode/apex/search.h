@@ -1,7 +1,5 @@
 /* Searches of the whole set by the tree of boxes, the planes of the hull that
- * are known, and what the maker counts; shared by its parts.
- *
- * Memory: struct incode_search.  Work: stated at each. */
+ * are known, and what the maker counts; shared by its parts. */
 #ifndef INCODE_SEARCH_H
 #define INCODE_SEARCH_H
 

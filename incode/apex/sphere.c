@@ -49,9 +49,10 @@ static double refined(double value, double bound) {
     return __builtin_fabs(value) + 1e-15 * bound;
 }
 
-void incode_sphere_fine(struct incode_fine *f, const double v[3],
-                        const double b[3], const double c[3], const double *a,
-                        double scale) {
+/* a: NULL for the plane alone. */
+static void incode_sphere_fine(struct incode_fine *f, const double v[3],
+                               const double b[3], const double c[3],
+                               const double *a, double scale) {
     struct incode_dd_vector rb = incode_dd_relative(b, v, scale),
                             rc = incode_dd_relative(c, v, scale);
     struct incode_dd_vector n = incode_dd_vector_product(rb.d, rc.d);

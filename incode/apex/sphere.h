@@ -115,11 +115,6 @@ struct incode_fine {
     struct incode_dd n[3], m[3], det;
 };
 
-/* a: NULL for the plane alone. */
-void incode_sphere_fine(struct incode_fine *f, const double v[3],
-                        const double b[3], const double c[3], const double *a,
-                        double scale);
-
 enum { INCODE_FINE_UNITS = 32 }; /* of incode/predicates/pause.h, at the most */
 
 /* Sharpens the bounds of an ill-conditioned plane or sphere; where that is not
@@ -161,7 +156,7 @@ static inline double incode_plane_error(const struct incode_sphere *s,
  * (Aurenhammer, SIAM J. Comput. 16, 1987).  Near the face, it leaves a sliver
  * of the set.
  *
- * Memory: struct incode_empty_spheres, about 1 KB.  Work: constant. */
+ * Memory: struct incode_empty_spheres, about 1 KB. */
 
 enum {
     INCODE_EMPTY_SPHERES = 8,

@@ -1,7 +1,7 @@
 /* The steps of an insertion, for the files of this room alone: where the point
  * is, which cells give way, what takes their place.
  *
- * Memory: the complex's, and 32 KB of stack.  Work: as in complex.h. */
+ * Memory: the complex's, and 32 KB of stack. */
 #ifndef INCODE_CAVITY_H
 #define INCODE_CAVITY_H
 
@@ -31,12 +31,6 @@ bool incode_complex_holds(const struct incode_complex *x,
 uint32_t incode_complex_locate(struct incode_complex *x,
                                struct incode_tally *tally, uint32_t from,
                                const double p[3]);
-
-/* The cells that hold p, as `first` does; INCODE_NONE: too many. */
-uint32_t incode_complex_find_small(struct incode_complex *x,
-                                   struct incode_tally *tally,
-                                   const double p[3], uint32_t first,
-                                   uint32_t cells[INCODE_COMPLEX_CAVITY]);
 
 enum incode_cavity_result
 incode_complex_insert_small(struct incode_complex *x,

@@ -159,6 +159,11 @@ bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
     return r == INCODE_CAVITY_FILLED;
 }
 
+static uint32_t
+incode_complex_find_small(struct incode_complex *x, struct incode_tally *tally,
+                          const double p[3], uint32_t first,
+                          uint32_t cells[INCODE_COMPLEX_CAVITY]);
+
 uint32_t incode_complex_cavity(struct incode_complex *x,
                                struct incode_tally *tally, const double p[3],
                                uint32_t near,
@@ -273,10 +278,11 @@ static bool find(struct incode_complex *x, struct incode_tally *tally,
     return true;
 }
 
-uint32_t incode_complex_find_small(struct incode_complex *x,
-                                   struct incode_tally *tally,
-                                   const double p[3], uint32_t first,
-                                   uint32_t cells[INCODE_COMPLEX_CAVITY]) {
+/* The cells that hold p, as `first` does; INCODE_NONE: too many. */
+static uint32_t
+incode_complex_find_small(struct incode_complex *x, struct incode_tally *tally,
+                          const double p[3], uint32_t first,
+                          uint32_t cells[INCODE_COMPLEX_CAVITY]) {
     struct cavity cavity;
     bool all = find(x, tally, p, first, &cavity);
     forget(x, &cavity);

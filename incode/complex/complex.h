@@ -7,16 +7,7 @@
  * with the vertex INCODE_COMPLEX_INFINITE; so every cell has four neighbours.
  *
  * Memory: given by its owner, 32 bytes a point and 32 a cell, of which there
- * are some 7 a point; 40 KB of stack.  Work: an insertion walks to the point
- * from a cell near by, and looks at the cells that give way and at those around
- * them; there may be as many as there are.  It breathes
- * (incode/predicates/pause.h).
- *
- *     incode_complex_init(&x, memory, bytes);
- *     v = incode_complex_add(&x, p, id);   // four of them, and others
- *     if (incode_complex_begin(&x, &tally, four))
- *         room = incode_complex_insert(&x, &tally, v, near);
- */
+ * are some 7 a point; 40 KB of stack. */
 #ifndef INCODE_COMPLEX_H
 #define INCODE_COMPLEX_H
 

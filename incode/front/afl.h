@@ -2,21 +2,16 @@
  * the list of its key vertex (its first), found by a hash of that key; and the
  * table of bricks that the front has touched.
  *
- * Memory: incode_afl_bytes(faces, bricks), fixed.  Work: a toggle looks at the
- * faces of one key vertex and of those that share its hash, constant as long as
- * stars stay bounded (front.h: hubs).  A list that grows nevertheless, as where
- * all hubs are in use, is spread over neighbouring heads by its faces' other
- * vertices, and a toggle looks at one part of it; INCODE_AFL_WIDE lists can be
- * at a time, and one that is short again gives way.
+ * Memory: incode_afl_bytes(faces, bricks), fixed.  A list that grows
+ * nevertheless, as where all hubs are in use, is spread over neighbouring
+ * heads by its faces' other vertices, and a toggle looks at one part of it;
+ * INCODE_AFL_WIDE lists can be at a time, and one that is short again gives
+ * way.
  *
  * A face may be held, as it has been asked about elsewhere: it stays open, and
  * its twin closes it as any other, but it is taken no more until it is let go.
  * Or it is foreign: what lies beyond is another's to build, so that it is not
- * let go either.
- *
- *     incode_afl_toggle(&afl, v, b, c);   // opens the face, or closes its twin
- *     n = incode_afl_take(&afl, v, pairs, 256, &more);   // empties its list
- */
+ * let go either. */
 #ifndef INCODE_AFL_H
 #define INCODE_AFL_H
 

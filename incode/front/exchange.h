@@ -44,20 +44,17 @@
  * the bricks of vertices that are lent are not committed, and the front is not
  * quiet, until they are back.
  *
- * Memory: struct incode_exchange, in the front, and incode_exchange_bytes:
- * three bits a brick.  Work: a call of incode_front_next looks at 256 lists of
- * the hash and all that is in them, or 512 entries and 64 commits of a sweep;
- * or at 256 bricks or entries in search of a vertex, and at a bit for each own
- * brick, 64 at a time; or, to let faces go, at the lists of one brick.  Sweeps
- * look at each face once for four tetrahedra that are built.  One that is taken
- * toggles four faces. */
+ * Work: a call of incode_front_next looks at 256 lists of the hash and all
+ * that is in them, or 512 entries and 64 commits of a sweep; or at 256 bricks
+ * or entries in search of a vertex, and at a bit for each own brick, 64 at a
+ * time; or, to let faces go, at the lists of one brick. */
 #ifndef INCODE_EXCHANGE_H
 #define INCODE_EXCHANGE_H
 
 #include "front.h"
 
 /* Stars that a loaded front lends to who has nothing to do: a run of its ready
- * vertices with their open faces.  Who borrows them (incode/borrower.h) finds
+ * vertices with their open faces.  Who borrows them (incode/lending.h) finds
  * tetrahedra beside those faces, and beside the faces that these open at the
  * same vertices, and tells them in the order in which it found them.  The
  * faces stay open meanwhile, and their vertices are not worked on here.

@@ -17,20 +17,13 @@
  * has INCODE_STAR_FACES faces and builds INCODE_STAR_BUILT tetrahedra at most.
  * All else is constant, but for a look at the tasks or hubs, 16 and 32.
  *
- *     incode_front_init(&front, memory, &share, bricks, rule, &out, &pause);
- *     incode_front_start(&front, &job);
- *     while ((turn = incode_front_turn(&front, 0, &task)) != INCODE_TURN_END)
- *         if (turn == INCODE_TURN_NEXT)
- *             turn = incode_front_next(&front, &task);   // and run the task
- *
  * A task is a vertex that is worked on; it may be suspended and resumed.  It
  * runs between incode_front_run and incode_front_done or _suspend.  In it,
  * either the whole star is opened (incode_star_open), its faces are taken one
  * by one (_take), the answer to each is built (_build), and what has none yet
  * is put back (_put, _shut); or one face is looked at (incode_front_face), and
  * its answer is used some time later, if the face is still open
- * (incode_front_use).
- */
+ * (incode_front_use). */
 #ifndef INCODE_FRONT_H
 #define INCODE_FRONT_H
 

@@ -10,10 +10,8 @@
  * its points are.  Of others' bricks, the points that have to do with own ones
  * are inserted last.
  *
- * Memory: struct incode_insertion, about 2 KB, and a block given by its owner:
- * 34 KB, two bits a brick, the complex the rest.  Work: a step takes a brick
- * in, or inserts or emits some, or looks at some cells; releasing looks at each
- * once.  It listens to the maker's walker. */
+ * Memory: struct incode_insertion, about 2 KB, and a block given by its
+ * owner: 34 KB, two bits a brick, the complex the rest. */
 #ifndef INCODE_INSERTION_H
 #define INCODE_INSERTION_H
 
@@ -29,7 +27,7 @@
  * to tell it from boxes of points: what is told apart holds none of them, up to
  * every rounding; what is not may.
  *
- * Memory: struct incode_region, 112 bytes.  Work: constant. */
+ * Memory: struct incode_region, 112 bytes. */
 
 /* |p - o|^2 - X (p - o) < 0, or X (p - o) > 0, but for the errors of X. */
 struct incode_region {
@@ -148,8 +146,7 @@ static inline bool incode_look_has_reached(const struct incode_look *look,
  * They are the bricks before one and those from another on: some 30 boxes of
  * each level for each of the two.  What these do not tell, look.h does.
  *
- * Memory: struct incode_rest, about 21 KB.  Work: incode_rest_reaches looks at
- * these boxes. */
+ * Memory: struct incode_rest, about 21 KB. */
 
 enum { INCODE_REST_MAX = (INCODE_LEVELS_MAX - 1) * 2 * INCODE_FANOUT };
 
@@ -292,9 +289,7 @@ enum incode_insertion_step incode_insertion_step(struct incode_insertion *n);
 
 /* The stages of an insertion, for the files of this room alone: insertion.c
  * takes points in, finality.c says which cells are final, emission.c emits and
- * releases them.
- *
- * Memory: the insertion's.  Work: a bounded part of the stage a call. */
+ * releases them. */
 
 enum {
     INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */
@@ -349,10 +344,7 @@ static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
  * faces between released tetrahedra and what is not final, which are open, and
  * which vertices have been reached.  All goes out as spilled toggles, so that
  * the front begins with nothing in memory and has each brick's brought back in
- * its turn.
- *
- * Memory: struct incode_handover.  Work: a step looks at some cells, or at the
- * points once for a brick. */
+ * its turn. */
 
 struct incode_handover {
     struct incode_insertion *n;

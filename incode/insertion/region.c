@@ -43,7 +43,7 @@ static void set_ball(struct incode_region *r) {
 }
 
 /* X is kept as whole multiples of S, each wrong by at most S/2 + S/16
- * (incode/complex/sphere.h), which is nine tenths of 5/8 S; the product with S,
+ * (incode/complex/cavity.h), which is nine tenths of 5/8 S; the product with S,
  * a power of two, is exact. */
 bool incode_region_set(struct incode_region *r, const struct incode_complex *x,
                        const struct incode_cell *c) {

@@ -3,13 +3,7 @@
  *   vertex = 64 * brick + slot
  *
  * Every brick is full but the last of each region.  Who has no page of points
- * still knows what lies together.
- *
- * Memory: none.  Work: none.
- *
- *     uint32_t brick = vertex / INCODE_BRICK_POINTS;
- *     uint32_t slot = vertex % INCODE_BRICK_POINTS;
- */
+ * still knows what lies together. */
 #ifndef INCODE_BRICKS_H
 #define INCODE_BRICKS_H
 

@@ -1,12 +1,10 @@
 /* Pages in fixed frames, replaced least recently used first.  A frame is
  * reserved before its page is asked for, so that a reply always has room.
  *
- * Memory: incode_pager_bytes(frames), 1,600 and 16 a frame.  Small nodes ask
- * for a surface's pages again and again where frames are few, so that boxes of
- * leaves are not kept but made where they are wanted.  Work: constant for a
- * page that is there; where one is replaced, a look at the times of use of one
- * group of frames in 32, and of some groups as a rule; for a box of points,
- * these.
+ * Memory: incode_pager_bytes(frames), 1,600 and 16 a frame.  Work: constant
+ * for a page that is there; where one is replaced, a look at the times of use
+ * of one group of frames in 32, and of some groups as a rule; for a box of
+ * points, these.
  *
  * A frame stays as it is until a page is asked for that is not there.  So one
  * may be held across a walk, which returns at the first such page; not across
@@ -139,9 +137,7 @@ bool incode_pager_release(struct incode_pager *pager, bool now);
 
 /* The uniform grid of the paper, index `grid`: cells over the tight box of all
  * points, and the two lists that say which points lie in each, in pages of
- * 384 words: first[cell], and the vertex numbers sorted by cell.
- *
- * Memory: struct incode_grid.  Work: constant; a word may need a page. */
+ * 384 words: first[cell], and the vertex numbers sorted by cell. */
 
 /* The grid: so many cells in x, y and z over the box [lo, hi]. */
 struct incode_grid {

@@ -38,7 +38,7 @@
  * and where that is above 0, none lies in the sphere F = 0.
  *
  * Memory: 1,568 bytes a page, in single precision and less, relative to the
- * page's own origin, everything rounded outward.  Work: constant. */
+ * page's own origin, everything rounded outward. */
 
 enum { INCODE_FANOUT = 32 /* children a box page, at most */ };
 

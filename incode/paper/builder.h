@@ -2,16 +2,8 @@
  * apex of each, and keeps the answers until they are fetched; it knows no list
  * of what is open.  A list that waits for a page lets the next one go on.
  *
- * Memory: struct incode_builder, about 63 KB, and what it is given: the lists,
- * with their answers, and page frames.  Work: a step goes on with one list, as
- * far as a page that is missing, or the units that it is allowed.
- *
- *     incode_builder_init(&builder, memory, bytes, &setup, 2, &source, &pause);
- *     incode_builder_take(&builder, &list);   // while it has room
- *     while (incode_builder_answers(&builder) == NULL)
- *         if (incode_builder_step(&builder, 100) == INCODE_WAITING)
- *             deliver(&builder);   // by incode_maker_page, what was asked for
- */
+ * Memory: struct incode_builder, about 63 KB, and what it is given: the
+ * lists, with their answers, and page frames. */
 #ifndef INCODE_BUILDER_H
 #define INCODE_BUILDER_H
 

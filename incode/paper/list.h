@@ -1,14 +1,7 @@
 /* Lists of faces that a face manager lends, and what a tetrahedron builder
  * answers: the paper's "list of m faces", as they travel.  There are two more
  * kinds, as a manager has no points: which first tetrahedron a vertex has, and
- * how many points there are in some bricks.
- *
- * Memory: the structs, of which as many bytes travel as are in use.  Work:
- * none.
- *
- *     struct incode_list list = {INCODE_LIST_FACES, 1, {{v, b, c}}};
- *     size_t bytes = incode_list_bytes(list.count);
- */
+ * how many points there are in some bricks. */
 #ifndef INCODE_LIST_H
 #define INCODE_LIST_H
 

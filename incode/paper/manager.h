@@ -8,14 +8,7 @@
  * the active face list's: as many faces as fit, and what does not is spilled.
  * Work: a step uses 32 answers at most, or passes or spills a brick; lending a
  * list looks at the bricks of the window, or at all that are touched when the
- * own ones are passed.
- *
- *     incode_manager_init(&manager, memory, bytes, &setup, &outside, &pause);
- *     incode_manager_start(&manager, &job);
- *     while (incode_manager_step(&manager, 100) != INCODE_FINISHED)
- *         if (incode_manager_lend(&manager, 32, &list) > 0)
- *             ask(&list);   // a builder, whose answers come by _take
- */
+ * own ones are passed. */
 #ifndef INCODE_MANAGER_H
 #define INCODE_MANAGER_H
 

@@ -1,10 +1,5 @@
 /* Assertions that stay on in production: an invariant that fails stops the
- * node at once, on any board.
- *
- * Memory: none.  Work: that of the condition.
- *
- *     INCODE_ASSERT(count <= 64);
- */
+ * node at once, on any board. */
 #ifndef INCODE_CHECK_H
 #define INCODE_CHECK_H
 

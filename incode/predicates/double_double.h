@@ -5,11 +5,11 @@
 /* Sums and products of doubles without error: the rounded result and what
  * rounding took away (Knuth; Dekker, Numer. Math. 18:224-242, 1971).
  *
- * Memory: none.  Work: 6 operations a sum; a product 2 by a fused multiply-add,
- * which is exact by definition where the processor has one for doubles, 17 by
- * Dekker's splitting elsewhere (never a library's fma: newlib's on a Cortex-M3
- * is just x * y + z).  Both give the same bits as long as no part of the
- * product falls below 2^-1022 and no factor exceeds 2^995. */
+ * Work: 6 operations a sum; a product 2 by a fused multiply-add, which is
+ * exact by definition where the processor has one for doubles, 17 by Dekker's
+ * splitting elsewhere (never a library's fma: newlib's on a Cortex-M3 is just
+ * x * y + z).  Both give the same bits as long as no part of the product
+ * falls below 2^-1022 and no factor exceeds 2^995. */
 
 #if defined(__FMA__) || defined(__FP_FAST_FMA) ||                              \
     (defined(__ARM_FEATURE_FMA) && defined(__ARM_FP) && (__ARM_FP & 8))

@@ -6,15 +6,7 @@
  * Work is counted in units of about 200 instructions of a Cortex-M7, or 6,000
  * of a processor without doubles: an in_sphere that its filter decides.
  * Between two calls there are INCODE_PAUSE_UNITS, or as many as the last one
- * has asked for, and INCODE_PAUSE_OVER more at the most.
- *
- * Memory: the struct.  Work: two or three instructions, and now and then what
- * the function does.
- *
- *     struct incode_pause pause = {look, context, 0};
- *     for (uint32_t i = 0; i < count; i++, incode_breathe(&pause, 1))
- *         work_on(i);
- */
+ * has asked for, and INCODE_PAUSE_OVER more at the most. */
 #ifndef INCODE_PAUSE_H
 #define INCODE_PAUSE_H
 

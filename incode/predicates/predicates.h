@@ -1,9 +1,7 @@
 /* Exact geometric predicates on finite doubles, with ties broken so that one
  * point set has one Delaunay triangulation, whoever computes it.
  *
- * Memory: no state but the caller's counters; a bounded stack (stated in
- * predicates.c).  Work: bounded for any finite input, denormals and 2^1023
- * included.
+ * Work: bounded for any finite input, denormals and 2^1023 included.
  *
  *     struct incode_tally tally = {0};
  *     if (incode_orient3d(&tally, a, b, c, d) > 0)

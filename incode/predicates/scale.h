@@ -1,13 +1,6 @@
 /* Multiplication by a power of two that brings numbers near 2^60, whatever
  * their exponents: exact, but for what falls below the least double on the way
- * down.
- *
- * Memory: none.  Work: constant.
- *
- *     struct incode_scale s;
- *     if (incode_scale_init(&s, most))
- *         x = x * s.up1 * s.up2;
- */
+ * down. */
 #ifndef INCODE_SCALE_H
 #define INCODE_SCALE_H
 

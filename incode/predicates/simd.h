@@ -2,13 +2,7 @@
  * registers: 64 bytes with AVX-512, 32 with AVX2, 16 with SSE2 and NEON, and a
  * double at a time on a processor without any.  Products and sums stay separate
  * operations (-ffp-contract=off); nothing computed here decides anything
- * without a rigorous error bound beside it.
- *
- * Memory: none.  Work: constant.
- *
- *     incode_vd d = incode_vd_load(lo) - incode_vd_all(v);
- *     uint32_t near = incode_vd_mask(d < incode_vd_all(limit));
- */
+ * without a rigorous error bound beside it. */
 #ifndef INCODE_SIMD_H
 #define INCODE_SIMD_H
 

@@ -8,14 +8,7 @@
  * the query it is -orient3d(p0,p1,p2,p3) < 0: raised, it leaves the sphere.
  * For p_i it is the orient3d with the query in place of p_i.  The largest
  * point whose cofactor is not zero decides; of two, one is not, since the
- * first four points span space.
- *
- * Memory: none.  Work: constant, without a branch to mispredict.
- *
- *     above += INCODE_TIE_ABOVE(0, 1, larger);   // and so for all i < j
- *     cofactor[4] = -1;
- *     sign = incode_tie(above, cofactor);
- */
+ * first four points span space. */
 #ifndef INCODE_TIE_H
 #define INCODE_TIE_H
 

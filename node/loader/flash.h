@@ -94,7 +94,7 @@ bool loader_card_store(void *memory, uint32_t block, const uint8_t *bytes);
  * one that does: with a flash's rules, so that what is written for it is right
  * on a chip.
  *
- * Memory: the caller's, LOADER_RAM_SECTORS sectors.  Work: a byte's a byte. */
+ * Memory: the caller's, LOADER_RAM_SECTORS sectors. */
 
 enum {
     LOADER_RAM_SECTOR = 4096,

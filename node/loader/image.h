@@ -76,9 +76,7 @@ const char *loader_fault_text(enum loader_fault fault);
  * tree; who does not want them passes them over.  A loader that is busy with
  * its flash leaves what comes unread, which holds up the links behind it, and
  * so the host.  Then each is asked what it lacks, and those blocks go again.
- * Whatever is repeated changes nothing.
- *
- * Memory: none.  Work: none.  Layouts as in node/message.h. */
+ * Whatever is repeated changes nothing. */
 
 enum {
     LOADER_BLOCK_BYTES = 1536, /* of an image, the last may have fewer; a whole

@@ -13,8 +13,8 @@
  * verified.  How often a slot is made ready, and how often a false signature is
  * verified, is limited (budget.h).
  *
- * Memory: struct loader_incoming.  Work: a step erases a sector, programs a
- * block, looks at 4 blocks, hashes a slice, or proves a signature. */
+ * Work: a step erases a sector, programs a block, looks at 4 blocks, hashes a
+ * slice, or proves a signature. */
 #ifndef NODE_LOADER_INCOMING_H
 #define NODE_LOADER_INCOMING_H
 

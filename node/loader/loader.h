@@ -1,19 +1,7 @@
 /* The boot loader of a bare board as a node of its cube: it passes on what is
  * for others, says who it is, and takes an image (messages.h) into the slot
  * that is not in use.  It never starts one: a board whose loader has been on
- * its links restarts, so that an epoch is used once.
- *
- * Memory: the board's arena: struct loader, and the windows of the links.
- * Work: a step moves the links' frames, and does one piece of what is under
- * way: erases a sector, programs a block, hashes a slice, or proves a
- * signature.  While the flash is busy, what comes for it is left unread.
- *
- *     struct loader *loader = loader_start(&board, &slots, &why);
- *     while ((event = loader_step(loader)) != NODE_STOPPED)
- *         if (event == NODE_IDLE)
- *             board.idle(board.context, loader_wait_us(loader));
- *     board.reset(board.context, loader_reset_why(loader));
- */
+ * its links restarts, so that an epoch is used once. */
 #ifndef NODE_LOADER_LOADER_H
 #define NODE_LOADER_LOADER_H
 

@@ -23,6 +23,9 @@ static struct loader_records state_records(const struct loader_flash *flash) {
                                    STATE_BYTES};
 }
 
+static uint32_t loader_records_newest(const struct loader_records *records,
+                                      void *body);
+
 static struct loader_state read_state(const struct loader_flash *flash) {
     const struct loader_records records = state_records(flash);
     struct loader_state state = {.slot = LOADER_SLOTS};
@@ -35,6 +38,9 @@ static struct loader_state read_state(const struct loader_flash *flash) {
     }
     return state;
 }
+
+static bool loader_records_append(const struct loader_records *records,
+                                  const void *body, uint32_t *number);
 
 static bool write_state(const struct loader_flash *flash,
                         const struct loader_state *state) {
@@ -413,8 +419,9 @@ static struct sector look(const struct loader_records *records,
     return found;
 }
 
-uint32_t loader_records_newest(const struct loader_records *records,
-                               void *body) {
+/* The body of the newest, and its number; 0: there is none. */
+static uint32_t loader_records_newest(const struct loader_records *records,
+                                      void *body) {
     struct sector found[SECTORS] = {look(records, 0), look(records, 1)};
     const struct loader_flash *flash = records->flash;
     unsigned last = found[1].largest > found[0].largest;
@@ -440,8 +447,8 @@ static bool put(const struct loader_records *records, uint32_t at,
 
 /* The sector that was not the last to be written is erased before it is, so
  * that what an interrupted erasure has left there does not matter. */
-bool loader_records_append(const struct loader_records *records,
-                           const void *body, uint32_t *number) {
+static bool loader_records_append(const struct loader_records *records,
+                                  const void *body, uint32_t *number) {
     const struct loader_flash *flash = records->flash;
     INCODE_ASSERT(records->bytes <= LOADER_RECORD_MAX &&
                   flash->page_bytes % records->bytes == 0);

@@ -10,9 +10,7 @@
  * byte for byte, its header's page written last; the last sectors of a slot are
  * the journal of what is coming (incoming.h).
  *
- * Memory: struct loader_slots; a hash of SIGN_HASH_BYTES on the stack.
- * Work: loader_slots_choose reads the image that it chooses once for its
- * digest, and proves its signature; the others program one record. */
+ * Memory: struct loader_slots; a hash of SIGN_HASH_BYTES on the stack. */
 #ifndef NODE_LOADER_SLOTS_H
 #define NODE_LOADER_SLOTS_H
 
@@ -82,14 +80,6 @@ struct loader_records {
     uint32_t bytes; /* of a record, at most LOADER_RECORD_MAX; it divides a
                        page */
 };
-
-/* The body of the newest, and its number; 0: there is none. */
-uint32_t loader_records_newest(const struct loader_records *records,
-                               void *body);
-
-/* *number: of this one, 1 or more.  False: it could not be written. */
-bool loader_records_append(const struct loader_records *records,
-                           const void *body, uint32_t *number);
 
 /* Where things are in a board's flash, whatever its sectors and pages: see
  * slots.h. */
@@ -250,10 +240,7 @@ bool loader_slots_name(const struct loader_flash *flash,
 
 /* The number of a board's start, which never comes again: records in the first
  * two sectors of its flash, one behind the other, in turns.  A record that was
- * not written whole, as power was lost, is passed over, and its number too.
- *
- * Memory: the flash's.  Work: reads both sectors, programs one record; once a
- * sector is full, erases the other. */
+ * not written whole, as power was lost, is passed over, and its number too. */
 
 enum { LOADER_BOOT_BYTES = 16 /* of a record: it divides a page */ };
 

@@ -72,8 +72,10 @@ static void take_answer(struct node_waves *w,
     w->sum.left += answer.left;
 }
 
-bool node_waves_take(struct node_waves *waves,
-                     const struct cube_message *message) {
+/* NODE_WAVE or its answer.  True: a wave has come, waves->command says what it
+ * is for. */
+static bool node_waves_take(struct node_waves *waves,
+                            const struct cube_message *message) {
     if (message->type == NODE_WAVE) {
         return take_wave(waves, message);
     }

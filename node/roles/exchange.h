@@ -3,14 +3,8 @@
  * told whose bricks are whose, waits until all are ready (waves.h), tells
  * others the tetrahedra that they need, and takes theirs at once.
  *
- * Memory: its state, the outlet, batches for other nodes, then the
- * triangulator.  Work: `work` closes at most NODE_STEPS stars, fewer where the
- * time does not suffice; a message toggles the faces of its tetrahedra.
- *
- *     const struct node_role *role = &node_exchange_role;
- *     role->message(arena, &message, now_us);
- *     moved = role->work(arena, &pace) + role->send(arena);
- */
+ * Work: `work` closes at most NODE_STEPS stars, fewer where the time does not
+ * suffice; a message toggles the faces of its tetrahedra. */
 #ifndef NODE_EXCHANGE_H
 #define NODE_EXCHANGE_H
 

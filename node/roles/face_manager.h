@@ -1,17 +1,7 @@
 /* What is the same in all face managers, whatever carries their lists
  * (carrier.h): jobs from the host, a front that lends its faces
  * (incode/paper/manager.h), results and spilled faces to the host.  A role that
- * has one calls these functions with its own.
- *
- * Memory: the struct, two outboxes, and the rest of what it is given for the
- * active face list.  Work: as much as the pace has it; a step uses answers,
- * passes a brick, and lends a list.
- *
- *     node_face_manager_start(&faces, memory, bytes, &setup, &carrier,
- *                             &counted, &fault);
- *     worked = node_face_manager_work(&faces, &pace);
- *     sent = node_outlet_send(&faces.outlet);
- */
+ * has one calls these functions with its own. */
 #ifndef NODE_FACE_MANAGER_H
 #define NODE_FACE_MANAGER_H
 

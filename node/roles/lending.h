@@ -5,11 +5,7 @@
  * come to all, unasked.
  *
  * Memory: node_lending_bytes of the role's arena: each other node may have
- * asked for NODE_PAGES_LENT_MAX pages and not got them.  As who asks has a
- * frame for each, what is sent is always read, and as nobody waits for a page
- * here but for one that the host has been asked for, nothing deadlocks.  Work:
- * a search among the regions a page, a pass over the queue a call of `send`.
- */
+ * asked for NODE_PAGES_LENT_MAX pages and not got them. */
 #ifndef NODE_LENDING_H
 #define NODE_LENDING_H
 
@@ -25,10 +21,8 @@
 /* Tetrahedra on their way to other nodes, for an exchange: small batches, each
  * for one node, that leave as soon as the link has room.
  *
- * Memory: node_shares_bytes of the role's arena: NODE_SHARE_BATCHES batches of
- * NODE_SHARES_A_BATCH, and the first brick of each node's region.  Where no
- * batch is free, the front waits.  Work: a search among the regions and a pass
- * over the batches, for each node that is told. */
+ * Memory: node_shares_bytes of the role's arena: NODE_SHARE_BATCHES batches
+ * of NODE_SHARES_A_BATCH, and the first brick of each node's region. */
 
 enum { NODE_SHARE_BATCHES = 48, NODE_SHARES_A_BATCH = 32 };
 
@@ -131,8 +125,8 @@ unsigned node_lending_send(struct node_lending *lending,
 
 /* Work that moves while the nodes of an exchange run: who has nothing to do
  * asks the others, one after another, his neighbours first; who has many ready
- * vertices lends a run of them to one that has asked (incode/front/loan.h), and
- * uses what comes back.
+ * vertices lends a run of them to one that has asked (incode/front/exchange.h),
+ * and uses what comes back.
  *
  * A node asks each other node once, and again when it has been lent something
  * and is through with it, so that asks are as few as nodes and loans.  An ask
@@ -146,9 +140,8 @@ unsigned node_lending_send(struct node_lending *lending,
  *
  * Memory: the struct, about 12 KB, with a place for each loan that may be out
  * and what comes back of it, NODE_LOANS_OUT, and for those that are borrowed,
- * NODE_LOANS_IN; and node_loans_bytes of the role's arena, a bit a node for who
- * has asked, who is asked, and whose loan goes back.  Work: a call looks at the
- * places, and at the bits if one is to be found. */
+ * NODE_LOANS_IN; and node_loans_bytes of the role's arena, a bit a node for
+ * who has asked, who is asked, and whose loan goes back. */
 
 enum { NODE_LOANS_OUT = 4, NODE_LOANS_IN = 2 };
 

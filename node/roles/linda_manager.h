@@ -1,14 +1,6 @@
 /* The face manager of the Linda program (figure 8 of the paper): lends its
  * faces as tuples, which builders that it has started by eval take when they
- * like (linda_builder.h), and stops them at the end.
- *
- * Memory: that of a share of the tuple space (share.h), then as a face
- * manager's.  Work: as a face manager's.
- *
- *     const struct node_role *role = &node_linda_manager_role;
- *     if (role->start(arena, bytes, &setup, &counted, &fault))
- *         moved = role->work(arena, &pace) + role->send(arena);
- */
+ * like (linda_builder.h), and stops them at the end. */
 #ifndef NODE_LINDA_MANAGER_H
 #define NODE_LINDA_MANAGER_H
 

@@ -1,12 +1,6 @@
 /* Lists of faces and answers as messages from node to node: the carrier of a
  * manager and its builders in the strategies `master-slaves` and `hybrid`.  The
- * builder with the fewest lists gets the next one.
- *
- * Memory: node_lists_bytes of the role's arena, for what has come and waits: a
- * place for the answers to each list that is out, which is kept before the list
- * leaves, so that whatever comes is read.  Where memory has fewer places than
- * builders may have lists, fewer lists are out.  Work: a look at the builders a
- * list, else constant. */
+ * builder with the fewest lists gets the next one. */
 #ifndef NODE_LISTS_H
 #define NODE_LISTS_H
 

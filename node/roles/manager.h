@@ -2,15 +2,8 @@
  * the faces of its jobs to builders by messages from node to node (lists.h),
  * and sends what comes of it to the host.
  *
- * Memory: its state, a place for the answers to each list that is out, two
- * outboxes, and the active face list, which has the rest.  Work: `work` takes
- * NODE_STEPS steps, fewer where the time does not suffice, and `send` sends
- * what the link takes.
- *
- *     const struct node_role *role = &node_manager_role;
- *     role->message(arena, &message, now_us);
- *     moved = role->work(arena, &pace) + role->send(arena);
- */
+ * Work: `work` takes NODE_STEPS steps, fewer where the time does not suffice,
+ * and `send` sends what the link takes. */
 #ifndef NODE_MANAGER_H
 #define NODE_MANAGER_H
 

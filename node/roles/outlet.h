@@ -1,14 +1,6 @@
 /* What a role with a front sends to the host, and takes back: finished
  * tetrahedra and commits under credit, and spilled faces.  It is the front's
- * outside (incode/front/job.h).
- *
- * Memory: node_outlet_bytes of the role's arena, for messages on their way out.
- * Work: that of copying what it is given.
- *
- *     node_outlet_init(&outlet, memory, bytes, &setup, &counted, &fault);
- *     node_outlet_begin(&outlet, jobs.epoch);
- *     sent = node_outlet_send(&outlet);   // and so in every step
- */
+ * outside (incode/front/job.h). */
 #ifndef NODE_OUTLET_H
 #define NODE_OUTLET_H
 

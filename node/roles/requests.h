@@ -5,13 +5,7 @@
  * A page that was altered (node/page_check.h) is reported, and requested again
  * from the host.
  *
- * Memory: the struct, about 1 KB.  Work: a pass over the pages that are wanted,
- * a call.
- *
- *     node_requests_init(&requests, &setup, NULL, &counted, &fault);
- *     struct incode_page_source source = node_requests_source(&requests);
- *     sent = node_requests_send(&requests);   // and so in every step
- */
+ * Memory: the struct, about 1 KB. */
 #ifndef NODE_REQUESTS_H
 #define NODE_REQUESTS_H
 

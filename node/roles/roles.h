@@ -1,17 +1,7 @@
 /* Roles: what a node does in a generation of the wiring.  A role is a struct
  * of functions; the setup names it by its number, and the node calls nothing
  * else of it.  A new role is a file beside this one, a number in message.h and
- * a row in roles.c.
- *
- * Memory: a role has the node's arena, but for the cube's windows and the node
- * itself; its own state lies at the arena's start, and is what `self` points
- * at.  Roles take turns in it.  Work: every function returns at once; `work`
- * after a bounded time (node/pace.h).
- *
- *     const struct node_role *role = node_role_named(setup.role);
- *     if (role != NULL && role->start(arena, bytes, &setup, &counted, &fault))
- *         moved = role->work(arena, &pace) + role->send(arena);
- */
+ * a row in roles.c. */
 #ifndef NODE_ROLES_H
 #define NODE_ROLES_H
 

@@ -7,15 +7,7 @@
  * their tuples live with the manager, who is the other end of all of them: a
  * list is one message away from its builder, and the manager sees who has taken
  * one and put no answer.  Its store never fills: as many lists are out at a
- * time as it holds of the largest tuple.
- *
- * Memory: node_share_bytes of the role's arena.  Work: that of the calls of the
- * space.
- *
- *     node_share_init(&share, memory, &setup, process, role, &counted, &fault);
- *     struct node_carrier carrier = node_share_carrier(&share, 1, 2, 4);
- *     sent = tuples_step(share.space); // and node_share_take what comes
- */
+ * time as it holds of the largest tuple. */
 #ifndef NODE_SHARE_H
 #define NODE_SHARE_H
 

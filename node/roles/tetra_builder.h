@@ -1,16 +1,7 @@
 /* What is the same in all tetrahedron builders, whatever carries their lists
  * (carrier.h): a maker that answers them (incode/paper/builder.h), and the
  * pages that it asks for.  A role that has one calls these functions with its
- * own.
- *
- * Memory: the struct, the lists at work, and the rest of what it is given for
- * page frames.  Work: as much as the pace has it; a step goes on with a list.
- *
- *     node_tetra_builder_start(&tetra, memory, bytes, &setup, &carrier,
- *                              &counted, &fault);
- *     worked = node_tetra_builder_work(&tetra, &pace);
- *     sent = node_requests_send(&tetra.requests);
- */
+ * own. */
 #ifndef NODE_TETRA_BUILDER_H
 #define NODE_TETRA_BUILDER_H
 

@@ -212,8 +212,8 @@ void node_triangulation_close(struct node_triangulation *t) {
     }
 }
 
-unsigned node_triangulation_work(struct node_triangulation *t,
-                                 struct node_pace *pace) {
+static unsigned node_triangulation_work(struct node_triangulation *t,
+                                        struct node_pace *pace) {
     unsigned worked = node_pace_work(pace, node_triangulation_step, t);
     node_triangulation_close(t);
     t->worked = worked > 0;

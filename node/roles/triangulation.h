@@ -91,8 +91,6 @@ void node_triangulation_close(struct node_triangulation *t);
 
 /* As those of a role (roles.h); map: its first free table and those after it.
  */
-unsigned node_triangulation_work(struct node_triangulation *t,
-                                 struct node_pace *pace);
 unsigned node_triangulation_send(struct node_triangulation *t);
 uint32_t node_triangulation_done(const struct node_triangulation *t);
 void node_triangulation_end(struct node_triangulation *t, uint64_t now_us);

@@ -16,15 +16,7 @@
  * the sums have differed and not changed for NODE_WAVES_UNCHANGED waves and for
  * NODE_WAVES_UNCHANGED_US, which no living link keeps a frame for, it is a
  * fault.  One of the two is not enough: waves are quick where links are, and a
- * node that stands still answers none.
- *
- * Memory: the struct.  Work: constant a call, but for a look at the children.
- *
- *     node_waves_begin(&waves);   // at node 0, when all have their role
- *     if (node_waves_take(&waves, &message) && waves.command == NODE_WAVE_SEED)
- *         incode_front_seed_all(&front);
- *     sent = node_waves_send(&waves, &state, &command);   // in every step
- */
+ * node that stands still answers none. */
 #ifndef NODE_WAVES_H
 #define NODE_WAVES_H
 
@@ -68,11 +60,6 @@ void node_waves_init(struct node_waves *waves,
 
 /* At node 0: the first wave. */
 void node_waves_begin(struct node_waves *waves);
-
-/* NODE_WAVE or its answer.  True: a wave has come, waves->command says what it
- * is for. */
-bool node_waves_take(struct node_waves *waves,
-                     const struct cube_message *message);
 
 /* Passes on what is to be; the number of messages.  At node 0, *command is what
  * the cube is told that this node has to follow as well, or 0. */

@@ -3,14 +3,8 @@
  * host gives credit, commits among them in order; lists that spill go to the
  * host and come back.
  *
- * Memory: its state, two outboxes, then the triangulator.  Work: `work` closes
- * at most NODE_STEPS stars, fewer where the time does not suffice, and `send`
- * sends what the link takes.
- *
- *     const struct node_role *role = &node_worker_role;
- *     role->message(arena, &message, now_us);
- *     moved = role->work(arena, &pace) + role->send(arena);
- */
+ * Work: `work` closes at most NODE_STEPS stars, fewer where the time does not
+ * suffice, and `send` sends what the link takes. */
 #ifndef NODE_WORKER_H
 #define NODE_WORKER_H
 

@@ -4,12 +4,7 @@
  * 1,000 cases of one kind; each case can be made alone.
  *
  * Memory: 8 KB of stack.  Work: bounded; a block of filters takes a Cortex-M3
- * some 10 million instructions, of the exact predicates some 300 million.
- *
- *     uint64_t digest = cases_block(7);
- *     struct record record = record_begin();
- *     cases_case(7, 123, &record);
- */
+ * some 10 million instructions, of the exact predicates some 300 million. */
 #ifndef TESTS_ARITHMETIC_CASES_H
 #define TESTS_ARITHMETIC_CASES_H
 

@@ -2,11 +2,7 @@
  * operation on doubles, so that whoever draws them has the same bits, whatever
  * is wrong with its arithmetic.
  *
- * Memory: none.  Work: constant, some 20 operations on words a coordinate.
- *
- *     struct draw draw = draw_begin(1000 * block + number);
- *     draw_points(&draw, DRAW_PLANE, p);
- */
+ * Work: constant, some 20 operations on words a coordinate. */
 #ifndef TESTS_ARITHMETIC_DRAW_H
 #define TESTS_ARITHMETIC_DRAW_H
 

@@ -5,11 +5,6 @@
  * one word differs have different digests for certain, and others but for one
  * in 2^64: what is compared here is not forged but computed.  That takes 15
  * operations a word on a processor of 32 bits, where SHA-256 takes some 400.
- *
- * Memory: none.  Work: constant.
- *
- *     struct record record = record_begin();
- *     double sum = record_double(&record, "a + b", a + b);
  */
 #ifndef TESTS_ARITHMETIC_RECORD_H
 #define TESTS_ARITHMETIC_RECORD_H

@@ -2,11 +2,7 @@
  * comparisons, conversions, and the sums and products without error that rest
  * on them.
  *
- * Memory: none.  Work: some 60 operations.
- *
- *     struct draw draw = draw_begin(number);
- *     single_case(&draw, number, record);
- */
+ * Work: some 60 operations. */
 #ifndef TESTS_ARITHMETIC_SINGLE_H
 #define TESTS_ARITHMETIC_SINGLE_H
 

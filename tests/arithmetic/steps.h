@@ -1,12 +1,7 @@
 /* Operations on doubles whose results are recorded.  What the predicates write
  * as one expression is one here, so that a compiler that fuses a product into a
  * sum, or keeps a longer number between them, is found; its parts are told
- * beside it where somebody listens, each computed alone.
- *
- * Memory: none.  Work: constant.
- *
- *     double ab = step_cross(record, "ab = ax by - bx ay", ax, by, bx, ay);
- */
+ * beside it where somebody listens, each computed alone. */
 #ifndef TESTS_ARITHMETIC_STEPS_H
 #define TESTS_ARITHMETIC_STEPS_H
 

@@ -6,10 +6,7 @@
  *   hello NUMBER             the same again: who asks is heard
  * An answer ends with the line "end".
  *
- * Memory: 8 KB of stack.  Work: that of the cases asked for.
- *
- *     talk_answer("blocks 0 1099 10", put, context);
- */
+ * Memory: 8 KB of stack. */
 #ifndef TESTS_ARITHMETIC_TALK_H
 #define TESTS_ARITHMETIC_TALK_H
 

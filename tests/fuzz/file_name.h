@@ -1,9 +1,5 @@
 /* A name with one of the extensions that the table of formats reads; packed
- * for the highest quarter of the choices.
- *
- *     char name[FILE_NAME_MAX];
- *     file_name(HOST_READ_POINTS, data[0], name);
- */
+ * for the highest quarter of the choices. */
 #ifndef FUZZ_FILE_NAME_H
 #define FUZZ_FILE_NAME_H
 

@@ -1,11 +1,6 @@
 /* Whether the processor is valgrind's: 30 times slower, and deaf to rounding
  * modes, flushed denormals and 80-bit registers.  And whether the program has
- * the sanitizers in it: 5 times slower.
- *
- * Memory: none.  Work: constant.
- *
- *     long cases = emulated() ? 1000 : SANITIZED ? 5000 : 40000;
- */
+ * the sanitizers in it: 5 times slower. */
 #ifndef TESTS_UNIT_EMULATED_H
 #define TESTS_UNIT_EMULATED_H
 

@@ -2,12 +2,7 @@
  * the apex, nothing but the exact predicates.
  *
  * Memory: a table of 2^18 faces.  Work: O(points * tetrahedra); for up to a few
- * thousand points.
- *
- *     struct host_tetrahedra tets = {0};
- *     reference_delaunay(xyz, n, &tets);
- *     host_tetrahedra_sort(&tets);
- */
+ * thousand points. */
 #ifndef TESTS_REFERENCE_H
 #define TESTS_REFERENCE_H
 

@@ -14,14 +14,7 @@
  * struct mpi_place one pointer a rank.  MPI itself never holds more than twice
  * that a pipe of bytes that nobody asks for: one message in MPI_PIPE_SLOTS is
  * synchronous, and no slot is used again before its message is complete.
- * Work: send and receive handle at most MPI_PIPE_SLOTS messages a call.
- *
- *     if (mpi_place_open(&place) != 0) // after MPI_Init
- *         return -1;
- *     mpi_pipe_open(&pipe, &place, peer, tag); // both ends: one tag
- *     config.pipe = mpi_link_pipe(&pipe);
- *     mpi_sleep(&place, &pipe, 1, NULL, wait_us);
- */
+ * Work: send and receive handle at most MPI_PIPE_SLOTS messages a call. */
 #ifndef TRANSPORT_DRIVERS_MPI_H
 #define TRANSPORT_DRIVERS_MPI_H
 

@@ -1,12 +1,7 @@
 /* What Open MPI's look at the machine (hwloc) is not to do: ask an X server for
  * its graphics cards, which takes seconds where "localhost" is no known name,
  * and write to standard error where there is no /sys.  What the user has set
- * stays.
- *
- * Memory: the environment's.  Work: constant.
- *
- *     mpi_environment(); // before MPI_Init, and before mpirun
- */
+ * stays. */
 #ifndef TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H
 #define TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H
 

@@ -7,13 +7,7 @@
  * its own count where it has one and by the clock where the baud rate is given:
  * a link measures the wire then, and not the kernel's queue.
  *
- * Memory: struct serial_pipe.  Work: at most three system calls a function.
- *
- *     if (serial_raw(fd) != 0)
- *         return -1;
- *     serial_pipe_init(&pipe, fd, 115200);
- *     config.pipe = serial_link_pipe(&pipe);
- */
+ * Work: at most three system calls a function. */
 #ifndef TRANSPORT_DRIVERS_SERIAL_H
 #define TRANSPORT_DRIVERS_SERIAL_H
 

@@ -92,7 +92,10 @@ static void read_name(const char *pid, char *name, size_t size) {
     }
 }
 
-int serial_port_holder(const char *device, char *name, size_t size) {
+/* The process other than this that has a device open: its number and its name,
+ * as far as /proc tells; 0: none that it tells of.  Whoever has the master of a
+ * pseudo-terminal does not count. */
+static int serial_port_holder(const char *device, char *name, size_t size) {
     struct stat about;
     struct dirent *entry;
     int holder = 0;

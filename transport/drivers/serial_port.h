@@ -1,17 +1,7 @@
 /* Serial ports of this machine: found by name, by the serial number of a USB
  * adapter or by where it is plugged in, opened through libserialport, held for
  * this process alone, and opened again when they vanish and come back.
- * Pseudo-terminals, which libserialport refuses, are opened by serial.h.
- *
- * Memory: struct serial_port, and libserialport's while it opens.  Work: a walk
- * through /sys and /proc to open; none of it waits for the wire.
- *
- *     struct serial_port_settings s = {"usb:A50285BI", 921600, true, 1, 1};
- *     if (serial_port_open(&port, &s) != 0)
- *         puts(port.fault);
- *     config.pipe = serial_link_pipe(&port.pipe);
- *     serial_port_close(&port);
- */
+ * Pseudo-terminals, which libserialport refuses, are opened by serial.h. */
 #ifndef TRANSPORT_DRIVERS_SERIAL_PORT_H
 #define TRANSPORT_DRIVERS_SERIAL_PORT_H
 
@@ -49,10 +39,5 @@ void serial_port_close(struct serial_port *port);
 /* Raises or lowers RTS, else DTR, of a port that is open: 0, or -1 and errno;
  * ENODEV: it is not. */
 int serial_port_set(const struct serial_port *port, bool rts, bool high);
-
-/* The process other than this that has a device open: its number and its name,
- * as far as /proc tells; 0: none that it tells of.  Whoever has the master of a
- * pseudo-terminal does not count. */
-int serial_port_holder(const char *device, char *name, size_t size);
 
 #endif

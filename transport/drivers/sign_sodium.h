@@ -1,11 +1,5 @@
 /* The primitives of sign_suite.h from libsodium: on the host, and on boards,
- * whose loaders are linked with a part of it that is built for them.
- *
- * Memory: the caller's of a hash.  Work: libsodium's.
- *
- *     const struct sign_suite *suite = &sign_sodium;
- *     suite->begin(hash);
- */
+ * whose loaders are linked with a part of it that is built for them. */
 #ifndef TRANSPORT_DRIVERS_SIGN_SODIUM_H
 #define TRANSPORT_DRIVERS_SIGN_SODIUM_H
 

@@ -3,13 +3,7 @@
  * and frames, drawn from a seed.  The same calls at the same times give the
  * same bytes at the same times, on every machine.
  *
- * Memory: struct sim_wire, and sim_wire_bytes() that the caller gives.  Work:
- * linear in the bytes, and a step a fault.
- *
- *     sim_wire_init(&wire, memory, &quality, &now_us, seed);
- *     config.pipe = sim_pipe(&wire.end[0]);
- *     now_us = sim_next_us(wire.end[0].in, 0);
- */
+ * Memory: struct sim_wire, and sim_wire_bytes() that the caller gives. */
 #ifndef TRANSPORT_DRIVERS_SIM_H
 #define TRANSPORT_DRIVERS_SIM_H
 

@@ -3,8 +3,7 @@
  *
  * Memory: struct tcp_pipe here, and in the kernel TCP_BUFFER_BYTES asked for
  * each way at each end (the kernel doubles that for its own books, and
- * tcp_buffers tells what it gave).  Work: one system call a function, but for
- * tcp_pair. */
+ * tcp_buffers tells what it gave). */
 #ifndef TRANSPORT_DRIVERS_TCP_H
 #define TRANSPORT_DRIVERS_TCP_H
 
@@ -45,9 +44,7 @@ short tcp_events(const struct tcp_pipe *pipe);
 void tcp_heard(struct tcp_pipe *pipe, short revents);
 
 /* Where a wire between processes meets: an address and port of TCP, or the path
- * of a socket on the same machine.
- *
- * Memory: struct tcp_address.  Work: one pass over the text. */
+ * of a socket on the same machine. */
 
 enum { TCP_PATH_MAX = 107 }; /* bytes of a path, as the kernel has it */
 

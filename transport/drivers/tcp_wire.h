@@ -21,15 +21,7 @@
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
- * connections a call, and looks at each candidate once.
- *
- *     tcp_address_parse(&config.address, "[2001:db8::7]:7000");
- *     if (tcp_wire_open(&wire, &config) != 0)
- *         return -1;
- *     count = tcp_wire_events(&wire, fds);
- *     wait_files(fds, count, tcp_wire_wait_us(&wire), 0);
- *     tcp_wire_heard(&wire, fds, count);
- */
+ * connections a call, and looks at each candidate once. */
 #ifndef TRANSPORT_DRIVERS_TCP_WIRE_H
 #define TRANSPORT_DRIVERS_TCP_WIRE_H
 

@@ -1,10 +1,7 @@
 /* What a socket with a path has and one of TCP has not: a file, and a kernel
  * that says who is at the other end.  Such a wire needs no key: the file is for
  * its owner alone, and each end asks whether the other is the same user, or
- * root.
- *
- * Memory: none.  Work: a few system calls.  unix_file_remove may be called in a
- * signal's handler. */
+ * root. */
 #ifndef TRANSPORT_DRIVERS_UNIX_FILE_H
 #define TRANSPORT_DRIVERS_UNIX_FILE_H
 

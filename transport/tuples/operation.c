@@ -87,8 +87,8 @@ static bool write_tuple(const struct tuples *space, struct tuples_operation *op,
     return size > 0 && !tuple_has_formal(op->tuple);
 }
 
-bool tuples_operation_put(struct tuples *space, unsigned number,
-                          const struct tuple *tuple) {
+static bool tuples_operation_put(struct tuples *space, unsigned number,
+                                 const struct tuple *tuple) {
     struct tuples_operation *op = &space->operations[number];
     if (!write_tuple(space, op, tuple)) {
         return false;

@@ -3,9 +3,8 @@
  * piece.  A record may be held for a request: nobody else gets it until that is
  * decided.
  *
- * Memory: the caller's bytes; a record is named by its offset, until one before
- * it is dropped.  Work: a pass over the records; dropping one moves those
- * behind it. */
+ * Memory: the caller's bytes; a record is named by its offset, until one
+ * before it is dropped. */
 #ifndef TRANSPORT_TUPLES_SPACE_H
 #define TRANSPORT_TUPLES_SPACE_H
 
@@ -55,9 +54,7 @@ uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row);
 void tuples_store_drop(struct tuples_store *store, uint32_t at);
 
 /* What the files of the tuple space share: a message's header, an operation
- * of this place (operation.c), a request of any (request.c), and the store.
- *
- * Memory: see tuples.h.  Work: stated at each function. */
+ * of this place (operation.c), a request of any (request.c), and the store. */
 
 /* TUPLES.md says what each means. */
 enum tuples_kind {
@@ -206,8 +203,6 @@ bool tuples_send(struct tuples *space, uint16_t place,
 /* --- operation.c */
 
 /* The process's own out. */
-bool tuples_operation_put(struct tuples *space, unsigned number,
-                          const struct tuple *tuple);
 bool tuples_operation_take(struct tuples *space, uint16_t source,
                            const struct tuples_header *header,
                            const uint8_t *data, size_t size);

@@ -42,9 +42,6 @@
  * one, and the values of its actuals.  Values are compared as bytes: a double
  * that is not a number matches itself, and -0 does not match 0.
  *
- * Memory: none of its own; fields of bytes stay where they lie.  Work: a pass
- * over the bytes.
- *
  *     struct tuple job = {.count = 2, .field = {TUPLE_UINT32(7)}};
  *     job.field[1] = TUPLE_BYTES(faces, 360);
  *     size_t size = tuple_write(&job, bytes, sizeof bytes); // 0: it is unfit

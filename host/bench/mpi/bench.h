@@ -1,12 +1,6 @@
 /* The row of `incode bench links` for MPI: two ranks of this program, started
  * by the bench with the word HOST_MPI_BENCH, of which rank 0 prints the
- * figures.
- *
- * Memory: a link and a pipe a rank.  Work: some seconds.
- *
- *     if (argc == 2 && strcmp(argv[1], HOST_MPI_BENCH) == 0)
- *         return host_mpi_bench();
- */
+ * figures. */
 #ifndef HOST_MPI_BENCH_H
 #define HOST_MPI_BENCH_H
 

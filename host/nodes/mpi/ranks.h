@@ -5,16 +5,7 @@
  * With the last cube that is due the other ranks leave, and MPI ends: what is
  * done afterwards is not lost with a rank.
  *
- * Memory: CUBE_HOST_PORTS_MAX pipes of 64 KiB.  Work: constant a call,
- * but for check, which looks at every rank of this machine.
- *
- *     MPI_Init(NULL, NULL);
- *     ranks.cubes_due = 1;
- *     if (host_ranks_open(&ranks, &error) == 0 &&
- *         host_ranks_begin(&ranks, nodes, memory, window, &error) == 0)
- *         machine = host_ranks_machine(&ranks); // whose stop ends that cube
- *     host_ranks_close(&ranks, 0);              // and MPI
- */
+ * Memory: CUBE_HOST_PORTS_MAX pipes of 64 KiB. */
 #ifndef HOST_MPI_RANKS_H
 #define HOST_MPI_RANKS_H
 

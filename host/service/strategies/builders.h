@@ -1,11 +1,5 @@
 /* What strategies share that have face managers and tetrahedron builders: which
- * of some nodes is which, and what a user may say of it.
- *
- * Memory: none.  Work: a pass over the nodes.
- *
- *     const struct host_builders group = {first, last, 0, builders, nodes};
- *     host_builders_set_up(&work, &group, node, &setup);
- */
+ * of some nodes is which, and what a user may say of it. */
 #ifndef HOST_BUILDERS_H
 #define HOST_BUILDERS_H
 

@@ -1,11 +1,5 @@
 /* What strategies share whose jobs are bricks of the order: a region a node at
- * first, and after a loss ranges of what is left.
- *
- * Memory: none.  Work: a pass over the points of a range.
- *
- *     while (!work.lost[node] && host_regions_next(&work, node, &job))
- *         (void)host_ledger_open(work.ledger, node, job.first, job.last);
- */
+ * first, and after a loss ranges of what is left. */
 #ifndef HOST_REGIONS_H
 #define HOST_REGIONS_H
 

@@ -1,12 +1,5 @@
 /* The table of strategies, from which options, help, messages, statistics and
- * the simulator have them, and the choice of `auto` among them.
- *
- * Memory: the table.  Work: a pass over it.
- *
- *     strategy = host_strategy_named("spatial");
- *     for (unsigned i = 0; host_strategy_name(i) != NULL; i++)
- *         printf("%s: %s\n", host_strategy_name(i), host_strategy_help(i));
- */
+ * the simulator have them, and the choice of `auto` among them. */
 #ifndef HOST_STRATEGIES_H
 #define HOST_STRATEGIES_H
 

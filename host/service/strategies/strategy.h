@@ -3,14 +3,8 @@
  * to add one, write a file that defines such a struct, and put it into the
  * table of strategies.h.
  *
- * Memory: state_bytes a run, cleared before it and freed after it.  Work: that
- * of the functions; the service calls `next` and `send` whenever it comes to a
- * node, so that they have to return at once.
- *
- *     strategy->set_up(&work, node, &setup);
- *     if (strategy->first(&work, node, &job))
- *         (void)host_ledger_open(work.ledger, node, job.first, job.last);
- */
+ * Work: that of the functions; the service calls `next` and `send` whenever
+ * it comes to a node, so that they have to return at once. */
 #ifndef HOST_STRATEGY_H
 #define HOST_STRATEGY_H
 

@@ -1,11 +1,6 @@
 /* What the relay's wires share: chance from a seed, and the time.
  *
- * Memory: 8 bytes a generator, the caller's.  Work: one multiplication a draw.
- *
- *     uint64_t random = chance_of_seed(7);
- *     unsigned die = (unsigned)(chance_draw(&random) % 6);
- *     uint64_t begun_us = chance_now_us();
- */
+ * Memory: 8 bytes a generator, the caller's. */
 #ifndef TESTS_SYSTEM_RELAY_CHANCE_H
 #define TESTS_SYSTEM_RELAY_CHANCE_H
 

@@ -1,14 +1,7 @@
 /* A bad network: relays TCP connections on loopback, and changes, deletes and
  * delays bytes and closes connections, by chance from a seed.
  *
- * Memory: 128 KB a direction of up to 128 connections, from malloc.  Work: one
- * look a millisecond while something is delayed.
- *
- *     network_open(&settings);
- *     network_add("7000:7100");
- *     network_run(&ended);
- *     network_print();
- */
+ * Memory: 128 KB a direction of up to 128 connections, from malloc. */
 #ifndef TESTS_SYSTEM_RELAY_NETWORK_H
 #define TESTS_SYSTEM_RELAY_NETWORK_H
 

@@ -13,15 +13,7 @@
  * Chance is drawn for each direction of each wire, from the seed and its place
  * alone: the same bytes suffer the same.
  *
- * Memory: some 80 KB, the caller's.  Work: one look is two calls of the system
- * for each direction with bytes on it, with `fifo` three and one more a byte.
- *
- *     uart_wires_init(&wires, &settings);
- *     if (!uart_wires_add(&wires, "/run/cube/0.1,@/run/cube/1.1"))
- *         return 2;
- *     while (!ended)
- *         uart_wires_wait(&wires, uart_wires_carry(&wires, chance_now_us()));
- */
+ * Memory: some 80 KB, the caller's. */
 #ifndef TESTS_SYSTEM_RELAY_UART_H
 #define TESTS_SYSTEM_RELAY_UART_H
 

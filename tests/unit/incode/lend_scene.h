@@ -1,15 +1,7 @@
 /* A face manager and its tetrahedron builders in one process: lists and answers
  * are handed over by chance, late and in any order, pages come straight from
  * the host's order, spilled faces wait in an array, tetrahedra gather in a
- * list.
- *
- * Memory: the set, its tetrahedra, the manager and the builders.  Work: theirs.
- *
- *     struct lend lend = {.builders = 3, .faces = 8, .jobs = 2};
- *     lend_run(&lend, xyz, n);
- *     assert_string_equal(lend.digest.text, expected);
- *     lend_close(&lend);
- */
+ * list. */
 #ifndef TESTS_UNIT_LEND_SCENE_H
 #define TESTS_UNIT_LEND_SCENE_H
 

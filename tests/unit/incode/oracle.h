@@ -1,13 +1,6 @@
 /* A known triangulation that is asked which apex a face has.
  *
- * Memory: 64 bytes a tetrahedron.  Work: one pass to open it; a question looks
- * at a few entries.
- *
- *     struct oracle oracle;
- *     oracle_open(&oracle, &tets, vertices);
- *     uint32_t apex = oracle_apex(&oracle, face);
- *     oracle_close(&oracle);
- */
+ * Memory: 64 bytes a tetrahedron. */
 #ifndef TESTS_UNIT_ORACLE_H
 #define TESTS_UNIT_ORACLE_H
 

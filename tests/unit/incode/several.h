@@ -1,15 +1,6 @@
 /* Several triangulators that share one active face list, on no cube: each a
  * solo.h of its own, and what they tell each other arrives in any order, drawn
- * from a seed.  When all are quiet they try first tetrahedra, once.
- *
- * Memory: an arena each, the set, its tetrahedra.  Work: that of the
- * triangulators.
- *
- *     struct several all = {.solo = {.index = INCODE_KD, .regions = 8}};
- *     several_run(&all, xyz, n);
- *     assert_string_equal(all.solo.digest.text, expected);
- *     several_close(&all);
- */
+ * from a seed.  When all are quiet they try first tetrahedra, once. */
 #ifndef TESTS_UNIT_SEVERAL_H
 #define TESTS_UNIT_SEVERAL_H
 

@@ -1,15 +1,7 @@
 /* A triangulator alone, on no cube: pages come straight from the host's order,
  * spilled faces wait in an array, tetrahedra gather in a list.  By chance its
  * outside refuses, pages come late and in any order, and what the interface
- * promises is checked on the way.
- *
- * Memory: the arena, the set, its tetrahedra.  Work: that of the triangulator.
- *
- *     struct solo solo = {.index = INCODE_GRID, .regions = 8, .chance = 7};
- *     solo_run(&solo, xyz, n);
- *     assert_string_equal(solo.digest.text, expected);
- *     solo_close(&solo);
- */
+ * promises is checked on the way. */
 #ifndef TESTS_UNIT_SOLO_H
 #define TESTS_UNIT_SOLO_H
 

@@ -2,14 +2,7 @@
  * call a function here, and what is copied or cleared counts by its size.  So
  * the number is the same on every machine, however busy, and what a test does
  * itself does not count.  The Makefile names the tests that are linked with
- * incode/ compiled so.
- *
- * Memory: the counter.  Work: one addition a block.
- *
- *     uint64_t before = work_blocks;
- *     sign = incode_orient3d(&tally, a, b, c, d);
- *     uint64_t blocks = work_blocks - before;
- */
+ * incode/ compiled so. */
 #ifndef TESTS_UNIT_WORK_CLOCK_H
 #define TESTS_UNIT_WORK_CLOCK_H
 

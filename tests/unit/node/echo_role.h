@@ -1,10 +1,5 @@
 /* A role of the tests' own, as small as one can be: it sends back each text
- * that it is sent, and its jobs are three steps long.
- *
- * Memory: struct echo.  Work: constant a call.
- *
- *     bool maps = echo_role.map != NULL && echo_role.arena_min != NULL;
- */
+ * that it is sent, and its jobs are three steps long. */
 #ifndef TESTS_ECHO_ROLE_H
 #define TESTS_ECHO_ROLE_H
 

@@ -3,10 +3,7 @@
  * messages, changed in places, in any order.  Whatever it was, the node is
  * there afterwards, and given a right setup and job it gives the right result.
  *
- * Memory: static, some 2 MB.  Work: a few milliseconds a talk.
- *
- *     talk_run(bytes, size);   // aborts where the node fails
- */
+ * Memory: static, some 2 MB. */
 #ifndef TESTS_NODE_TALK_H
 #define TESTS_NODE_TALK_H
 

@@ -1,14 +1,6 @@
 /* Traffic on the simulator's cube in memory: a transport at each place and
  * nothing above it.  Every place writes numbered messages to all others, and
- * what it reads must be those, whole and in order.
- *
- * Memory: a transport for each place, and the wires.  Work: a poll of each
- * place a step.
- *
- *     struct machine *m = build(dimension, &config, &perfect, seed);
- *     run(m, messages_a_pair, most_us);
- *     destroy(m);
- */
+ * what it reads must be those, whole and in order. */
 #ifndef TESTS_UNIT_CUBE_MACHINE_H
 #define TESTS_UNIT_CUBE_MACHINE_H
 

@@ -1,12 +1,5 @@
 /* Two links on one wire, that of the simulator's smallest cube: each end sends
- * a stream of numbered messages, and what it reads must be the other's.
- *
- * Memory: two links and a wire.  Work: a poll of each a step.
- *
- *     struct pair *p = new_pair(&small, &perfect, seed);
- *     run(p, messages, step_us, most_us);
- *     free_pair(p);
- */
+ * a stream of numbered messages, and what it reads must be the other's. */
 #ifndef TESTS_UNIT_LINK_PAIR_H
 #define TESTS_UNIT_LINK_PAIR_H
 

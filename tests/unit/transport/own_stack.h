@@ -1,11 +1,7 @@
 /* A stack of a test's own, to be looked through for what a function has left on
  * it.
  *
- * Memory: STACK_BYTES.  Work: the function's.
- *
- *     run_on_stack(work);
- *     assert_false(holds(stack, sizeof stack, secret, sizeof secret));
- */
+ * Memory: STACK_BYTES. */
 #ifndef TESTS_UNIT_OWN_STACK_H
 #define TESTS_UNIT_OWN_STACK_H
 

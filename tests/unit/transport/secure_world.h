@@ -1,12 +1,5 @@
 /* Two ends of a keyed wire and the pipes between them, for tests of the secure
- * layer.
- *
- * Memory: two pipes of ROOM bytes.  Work: a copy a call.
- *
- *     struct world *w = connected(9, 0);
- *     assert_int_equal(w->lanes[0].end, SECURE_OPENING_BYTES);
- *     free(w);
- */
+ * layer. */
 #ifndef TESTS_UNIT_SECURE_WORLD_H
 #define TESTS_UNIT_SECURE_WORLD_H
 

@@ -1,11 +1,4 @@
 /* The console's engine over the simulator's cube: what it says is kept as text.
- *
- * Memory: the nodes'.  Work: some virtual seconds a line.
- *
- *     begin(3, false);
- *     assert_int_equal(says("ping 0-3"), 0);
- *     assert_non_null(strstr(desk.said, "5 of 5"));
- *     end();
  */
 #ifndef TESTS_UNIT_CONSOLE_SHELL_WORLD_H
 #define TESTS_UNIT_CONSOLE_SHELL_WORLD_H

@@ -1,11 +1,5 @@
 /* A cube in virtual time that a host visits: worlds of any size, and what
- * befalls them between two rounds of the visit.
- *
- * Memory: the nodes'.  Work: some virtual seconds a wait.
- *
- *     pull(1, 0, true);
- *     stay(5000000);
- */
+ * befalls them between two rounds of the visit. */
 #ifndef TESTS_VISIT_WORLD_H
 #define TESTS_VISIT_WORLD_H
 

@@ -2,11 +2,7 @@
  * serial wires and chips that take the time of serial NOR flash, and the real
  * visit that brings them an image.
  *
- * Memory: the boards'.  Work: a pass over the boards each 100 us that pass.
- *
- *     open_world(4, 1);
- *     double seconds = flash(&old);
- */
+ * Work: a pass over the boards each 100 us that pass. */
 #ifndef TESTS_LOADER_BOARDS_H
 #define TESTS_LOADER_BOARDS_H
 

@@ -1,11 +1,5 @@
 /* A visit that is played: boards with a loader, in a time of their own, that
- * are off, restart, lose messages, refuse and fall back.
- *
- * Memory: the boards'.  Work: a message a call.
- *
- *     board[2].deaf = true;
- *     go_down(1, 3000000);
- */
+ * are off, restart, lose messages, refuse and fall back. */
 #ifndef TESTS_PLAYED_BOARDS_H
 #define TESTS_PLAYED_BOARDS_H
 

@@ -1,12 +1,7 @@
 /* Files for the tests of readers, made byte by byte, and what is expected of
  * them.
  *
- * Memory: 64 KiB a file.  Work: that of the reader.
- *
- *     struct bytes b = {.n = 0};
- *     put_text(&b, "-3 -2.5 -2\n");
- *     expect_rows("a.xyz", &b, 1);
- */
+ * Memory: 64 KiB a file. */
 #ifndef TESTS_BYTES_H
 #define TESTS_BYTES_H
 

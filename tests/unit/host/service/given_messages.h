@@ -1,12 +1,5 @@
 /* A service in the midst of its run, with a job at each of four nodes and no
- * cube behind it: tests give it messages one by one.
- *
- * Memory: the service's, and a small order.  Work: a few microseconds.
- *
- *     begin();
- *     status = send(1, NODE_RESULT, data, size, &error);
- *     end();
- */
+ * cube behind it: tests give it messages one by one. */
 #ifndef TESTS_UNIT_GIVEN_MESSAGES_H
 #define TESTS_UNIT_GIVEN_MESSAGES_H
 

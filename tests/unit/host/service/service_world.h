@@ -1,13 +1,6 @@
 /* A service and the simulator's cube of eight nodes, as real boards are: nobody
  * tells the host that a node has started again, stands still or is gone.  What
- * happens, and when, a test says beforehand.
- *
- * Memory: the nodes'.  Work: some virtual seconds a run.
- *
- *     prepare();
- *     world.events[0] = (struct event){.what = CUT, .when = 0.3, .node = 5};
- *     survives(&host_spatial);
- */
+ * happens, and when, a test says beforehand. */
 #ifndef TESTS_UNIT_SERVICE_WORLD_H
 #define TESTS_UNIT_SERVICE_WORLD_H
 

@@ -1,11 +1,5 @@
 /* An order of 3,000 uniform points in two or more regions, for tests of the
- * service that need one and no cube.
- *
- * Memory: that of the order.  Work: a few milliseconds.
- *
- *     struct host_order order = small_order(4);
- *     host_order_free(&order);
- */
+ * service that need one and no cube. */
 #ifndef TESTS_SMALL_ORDER_H
 #define TESTS_SMALL_ORDER_H
 

@@ -1,12 +1,5 @@
 /* Point sets in the order of a run with their Delaunay triangulation, for tests
- * of what judges tetrahedra.
- *
- *     struct fixture f;
- *     struct host_check_report r;
- *     open_set(&f, "uniform", 400, 1);
- *     assert_int_equal(check(&f, HOST_CHECK_TILING, &r), 0);
- *     close_set(&f);
- */
+ * of what judges tetrahedra. */
 #ifndef TESTS_CHECK_WORLD_H
 #define TESTS_CHECK_WORLD_H
 

@@ -1,14 +1,5 @@
 /* What the tests of the horizon share: sets of points in pages, a horizon over
- * them, and what is in a cap by exact or by long arithmetic.
- *
- * Memory: the set and its pages; a failure ends the test.  Work: that of
- * ordering the set.
- *
- *     open_scene(&scene, terrain, 2000);
- *     make_horizon(&scene, brick, 0.5);
- *     full = !split_all(&scene, &cap);
- *     close_scene(&scene);
- */
+ * them, and what is in a cap by exact or by long arithmetic. */
 #ifndef TESTS_HORIZON_SCENE_H
 #define TESTS_HORIZON_SCENE_H
 

@@ -1,12 +1,5 @@
 /* What the cavity of a point is, by exact predicates for every cell there is,
- * and whether a complex tells the same of it.
- *
- * Memory: the cells, twice, while it is checked.  Work: a check looks at every
- * cell.
- *
- *     scene_prove_all(&scene);
- *     count = scene_check_cavity(&scene, p, &listed);
- */
+ * and whether a complex tells the same of it. */
 #ifndef TESTS_UNIT_CAVITY_SCENE_H
 #define TESTS_UNIT_CAVITY_SCENE_H
 

@@ -1,15 +1,7 @@
 /* A complex in memory of its own, between guards, and what must hold of it
  * whenever nobody is at work on it.
  *
- * Memory: what is given, and 9 bytes a cell while it is checked.  Work: a check
- * looks at every cell a few times.
- *
- *     struct scene scene = {.each = true, .seed = 1};
- *     scene_open(&scene, scene_bytes(n));
- *     scene_build(&scene, xyz, row, n);
- *     scene_check(&scene);
- *     scene_close(&scene);
- */
+ * Memory: what is given, and 9 bytes a cell while it is checked. */
 #ifndef TESTS_UNIT_COMPLEX_SCENE_H
 #define TESTS_UNIT_COMPLEX_SCENE_H
 

@@ -3,14 +3,7 @@
  * bricks, and which bricks a cell's sphere holds a point of, by exact
  * predicates.
  *
- * Memory: the set, its pages, and 4 MB for the complex.  Work: that of ordering
- * the set; of telling, all its points for each cell.
- *
- *     points_open(&scene, terrain, 0, 0, 2000);
- *     if (points_build(&scene, before, from))
- *         any = points_touch(&scene, cell, brick);
- *     points_close(&scene);
- */
+ * Memory: the set, its pages, and 4 MB for the complex. */
 #ifndef TESTS_UNIT_POINTS_SCENE_H
 #define TESTS_UNIT_POINTS_SCENE_H
 

@@ -2,10 +2,7 @@
  * reference of tests.  Ties are settled by perturbing the lifts with actual
  * numbers, small enough and far enough apart, not by a rule about signs.
  *
- * Memory: GMP's.  Work: tens of products of a few hundred to 10,000 bits.
- *
- *     int sign = reference_in_sphere(p, true); // p: five points
- */
+ * Work: tens of products of a few hundred to 10,000 bits. */
 #ifndef TESTS_UNIT_EXACT_REFERENCE_H
 #define TESTS_UNIT_EXACT_REFERENCE_H
 

@@ -1,10 +1,5 @@
 /* Points by fives that are hard on predicates: each family is one way in which
- * signs come close to zero, are zero, or leave the range of doubles.
- *
- * Memory: none.  Work: constant.
- *
- *     hard_points(&seed, HARD_PLANE, p);
- */
+ * signs come close to zero, are zero, or leave the range of doubles. */
 #ifndef TESTS_UNIT_HARD_POINTS_H
 #define TESTS_UNIT_HARD_POINTS_H
 

@@ -2,11 +2,7 @@
  * given operation, images for it, and a suite that is quick: for tests of what
  * the loader leaves behind.
  *
- * Memory: CHIP_BYTES a chip.  Work: the flash's, byte by byte.
- *
- *     chip_make(&chip, 4096, 256, 64);
- *     made_make(&made, 3000, 1);
- */
+ * Memory: CHIP_BYTES a chip. */
 #ifndef TESTS_LOADER_CHIP_H
 #define TESTS_LOADER_CHIP_H
 

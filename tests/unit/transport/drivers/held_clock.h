@@ -1,14 +1,7 @@
 /* The clock of a test and of the drivers that it tests, in the place of
  * clock_gettime (the Makefile names the tests that are linked so): it goes with
  * the machine's, but by a millisecond at the most between two looks at it, so
- * that no time passes while the machine has others to run.
- *
- * Memory: two numbers.  Work: a look at the clock.
- *
- *     uint64_t begin = clock_us();
- *     rest(1000);
- *     uint64_t passed_us = clock_us() - begin;
- */
+ * that no time passes while the machine has others to run. */
 #ifndef TESTS_HELD_CLOCK_H
 #define TESTS_HELD_CLOCK_H
 

@@ -1,12 +1,5 @@
 /* Two ends of a wire, a link at each, stepped by turns: what the tests of wires
- * over TCP and at paths share.
- *
- * Memory: that of the links.  Work: each step polls one link.
- *
- *     open_end(&ends[0], 0, &at, key);
- *     open_end(&ends[1], 1, &at, key);
- *     bool good = exchange(ends, 20);
- */
+ * over TCP and at paths share. */
 #ifndef TESTS_WIRE_ENDS_H
 #define TESTS_WIRE_ENDS_H
 

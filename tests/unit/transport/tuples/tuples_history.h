@@ -1,15 +1,7 @@
 /* Several callers of a tuple space at once, each with a few calls, and whether
  * what they saw can be explained: some interleaving of their calls, in which
  * none stands before a call that had ended when it began, has the same results
- * in a plain list (Herlihy and Wing, 1990).
- *
- * Memory: that of tuples_world.h.  Work: each set of calls that can have been
- * made first is looked at once.
- *
- *     struct history h;
- *     play(&h, seed);
- *     bool sound = is_explained(&h);
- */
+ * in a plain list (Herlihy and Wing, 1990). */
 #ifndef TESTS_UNIT_TUPLES_HISTORY_H
 #define TESTS_UNIT_TUPLES_HISTORY_H
 

@@ -1,15 +1,6 @@
 /* Places of a tuple space in one process, and messages between them that come
  * in order between any two, but late, and by links that are often full: all by
- * a seed.
- *
- * Memory: the places' arenas, and messages under way.  Work: a step of each
- * place a round, in an order that is drawn.
- *
- *     struct world *w = new_world(places, &config, seed);
- *     while (tuples_poll(w->space[0], job, &tuple) == TUPLES_PENDING)
- *         turn(w);
- *     free_world(w);
- */
+ * a seed. */
 #ifndef TESTS_UNIT_TUPLES_WORLD_H
 #define TESTS_UNIT_TUPLES_WORLD_H
 

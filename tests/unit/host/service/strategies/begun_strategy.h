@@ -1,12 +1,5 @@
 /* A run of a strategy at its beginning, on four nodes, with no service behind
- * it: tests call the strategy's functions.
- *
- * Memory: a small order and its ledger.  Work: a few milliseconds.
- *
- *     begin(strategy);
- *     said = roles(strategy);
- *     end();
- */
+ * it: tests call the strategy's functions. */
 #ifndef TESTS_UNIT_BEGUN_STRATEGY_H
 #define TESTS_UNIT_BEGUN_STRATEGY_H
 
