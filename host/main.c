@@ -94,9 +94,8 @@ static error_t parse_simple(int key, char *value, struct argp_state *state) {
 static char *list_formats(int key, const char *text, void *input) {
     char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
     (void)input;
-    if (key != KEY_FORMAT_IN && key != KEY_FORMAT_OUT) {
+    if (key != KEY_FORMAT_IN && key != KEY_FORMAT_OUT)
         return (char *)text;
-    }
     host_format_list(key == KEY_FORMAT_IN ? HOST_READ_POINTS
                                           : HOST_WRITE_POINTS,
                      list, sizeof list);
@@ -120,19 +119,16 @@ static int command_run(int argc, char **argv, struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options options = {0};
     int rank = host_launch_rank();
-    if (rank > 0 && host_arguments_try(argc, argv, &options) != 0) {
+    if (rank > 0 && host_arguments_try(argc, argv, &options) != 0)
         return 0; /* rank 0 says what is wrong, and ends with its status */
-    }
-    if (rank <= 0 && host_arguments_run(argc, argv, &options, error) != 0) {
+    if (rank <= 0 && host_arguments_run(argc, argv, &options, error) != 0)
         return error->code;
-    }
     if (options.link->ranks) {
         return rank >= 0 ? host_launch_become(rank, argv, error)
                          : host_launch_mpi(argv, &options, error);
     }
-    if (options.cube != NULL && host_run_on_cube(&options, error) != 0) {
+    if (options.cube != NULL && host_run_on_cube(&options, error) != 0)
         return error->code;
-    }
     return host_run(&options, &result, error);
 }
 
@@ -159,9 +155,8 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
               "torus, terrain (whole heights on a square grid), scales "
               "(coordinates from 2^-1000 to 2^1000), or lines (two that do not "
               "meet). N: 4 to 4294901760 (2^32 - 2^16).",
-              2, &s, error) != 0) {
+              2, &s, error) != 0)
         return error->code;
-    }
     if (host_parse_number(s.argument[0], 0, UINT64_MAX, &n) == 0) {
         return host_fail(error, HOST_USAGE,
                          "gen %s %s: the kind comes before the number; write "
@@ -184,9 +179,8 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
     }
     s.output = s.output == NULL ? "-" : s.output;
     int status = host_gen(s.argument[0], n, s.seed, &points, error);
-    if (status == 0) {
+    if (status == 0)
         host_points_write_as(s.output, s.format, &points, error);
-    }
     host_points_free(&points);
     return host_output_commit(error);
 }
@@ -206,9 +200,8 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
             "every tetrahedron positive, no vertex inside the sphere of a "
             "neighbour, facets in pairs or on the convex hull, every distinct "
             "point a vertex.",
-            2, &s, error) != 0) {
+            2, &s, error) != 0)
         return error->code;
-    }
     int status = host_points_read_as(s.argument[0], s.format, &points, error);
     if (status == 0) {
         host_points_note(s.argument[0], &points);
@@ -217,9 +210,8 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
     if (status == 0) {
         status =
             host_verify(&points, &tets, HOST_CHECK_DELAUNAY, &report, error);
-        if (status == HOST_UNVERIFIED) {
+        if (status == HOST_UNVERIFIED)
             fputs(report.text, stderr);
-        }
     }
     if (status == 0) {
         host_say(stdout,
@@ -241,9 +233,8 @@ static int command_digest(int argc, char **argv, struct host_error *error) {
     if (parse(argc, argv, NULL, "TETS",
               "Prints the digest of a file of tetrahedra: SHA-256 of its rows, "
               "vertices and rows in ascending order.",
-              1, &s, error) != 0) {
+              1, &s, error) != 0)
         return error->code;
-    }
     int status = host_tetrahedra_read(s.argument[0], &tets, NULL, error);
     if (status == 0) {
         host_tetrahedra_sort(&tets);
@@ -263,17 +254,15 @@ static int command_convert(int argc, char **argv, struct host_error *error) {
     if (parse(argc, argv, options, "IN OUT",
               "Converts points to points, or tetrahedra to tetrahedra, by the "
               "files' extensions.",
-              2, &s, error) != 0) {
+              2, &s, error) != 0)
         return error->code;
-    }
     return host_convert(s.argument[0], s.format, s.argument[1], error);
 }
 
 static int command_draw(int argc, char **argv, struct host_error *error) {
     struct host_draw_options options = {0};
-    if (host_draw_arguments(argc, argv, &options, error) != 0) {
+    if (host_draw_arguments(argc, argv, &options, error) != 0)
         return error->code;
-    }
     return host_draw(&options, error);
 }
 
@@ -290,18 +279,16 @@ static int command_key(int argc, char **argv, struct host_error *error) {
             "Makes the key of a cube, 64 random hexadecimal digits, in a new "
             "file that its owner alone can read.  Whoever has a copy can join "
             "the cube: give one to each machine of it, and to nobody else.",
-            1, &s, error) != 0) {
+            1, &s, error) != 0)
         return error->code;
-    }
     return s.sign ? host_sign_key_make(s.argument[0], error)
                   : host_key_make(s.argument[0], error);
 }
 
 static int command_sim(int argc, char **argv, struct host_error *error) {
     struct host_sim_options options = {0};
-    if (host_sim_arguments(argc, argv, &options, error) != 0) {
+    if (host_sim_arguments(argc, argv, &options, error) != 0)
         return error->code;
-    }
     return host_sim_seeds(&options, error);
 }
 
@@ -374,9 +361,8 @@ static char *list_commands(int key, const char *text, void *input) {
     char rows[TEXT_MAX] = "", usage[64], *whole = NULL;
     size_t used = 0;
     (void)input;
-    if (key != ARGP_KEY_HELP_POST_DOC) {
+    if (key != ARGP_KEY_HELP_POST_DOC)
         return (char *)text;
-    }
     for (size_t i = 0; i < COMMANDS; i++) {
         const struct command *c = &commands[i];
         const char *more = strchr(c->help, '\n');
@@ -401,9 +387,8 @@ static const char *command_name(const void *unused, unsigned i) {
 /* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
 static error_t parse_top(int key, char *value, struct argp_state *state) {
     int *command = state->input;
-    if (key != ARGP_KEY_ARG) {
+    if (key != ARGP_KEY_ARG)
         return ARGP_ERR_UNKNOWN;
-    }
     (void)value;
     *command = state->next - 1;
     state->next = state->argc;
@@ -480,9 +465,8 @@ static void finish_stdout(void) {
 static int run(int argc, char **argv, struct host_error *error) {
     int command = 0;
     if (host_options_parse(&top, argc, argv, ARGP_IN_ORDER, &command, error) !=
-        0) {
+        0)
         return error->code;
-    }
     if (command == 0) {
         return host_fail(error, HOST_USAGE,
                          "COMMAND: none is given; allowed: %s",
@@ -505,8 +489,7 @@ int main(int argc, char **argv) {
     (void)atexit(finish_stdout);
     argv[0] = name;
     int status = run(argc, argv, &error);
-    if (status != 0 && error.text[0] != '\0') { /* else it is said */
+    if (status != 0 && error.text[0] != '\0') /* else it is said */
         fprintf(stderr, "incode: %s\n", error.text);
-    }
     return status;
 }

@@ -22,9 +22,8 @@ static int begin(const struct host_run_options *options,
                  struct host_run_result *result, struct host_machine *machine,
                  struct host_error *error) {
     if (host_ranks_begin(&ranks, result->nodes, options->memory,
-                         options->window, error) != 0) {
+                         options->window, error) != 0)
         return error->code;
-    }
     *machine = host_ranks_machine(&ranks);
     result->memory_held = ", besides what Open MPI takes for itself";
     result->socket_send_bytes = MPI_PIPE_SLOTS * MPI_PIPE_BYTES;
@@ -36,9 +35,8 @@ static int run(int argc, char **argv, struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options options = {0};
     if (host_ranks_open(&ranks, error) != 0 ||
-        host_arguments_run(argc, argv, &options, error) != 0) {
+        host_arguments_run(argc, argv, &options, error) != 0)
         return error->code;
-    }
     unsigned nodes = (unsigned)ranks.place.ranks - 1;
     if (options.nodes != 0 && options.nodes != nodes) {
         return host_fail(error, HOST_USAGE,
@@ -60,9 +58,8 @@ int main(int argc, char **argv) {
     prctl(PR_SET_PDEATHSIG, SIGTERM); /* gone with the launcher's daemon */
     mpi_environment();
     MPI_Init(&argc, &argv);
-    if (argc == 2 && strcmp(argv[1], HOST_MPI_BENCH) == 0) {
+    if (argc == 2 && strcmp(argv[1], HOST_MPI_BENCH) == 0)
         return host_mpi_bench();
-    }
     argv[0] = name;
     const char *fault = incode_arithmetic_fault();
     int status = fault == NULL
@@ -73,9 +70,8 @@ int main(int argc, char **argv) {
                                  fault);
     /* The launcher knows how a rank was lost. */
     bool heard = host_launch_report(status, ranks.lost, ranks.terminated);
-    if (status != 0 && !(heard && (ranks.lost != 0 || ranks.terminated))) {
+    if (status != 0 && !(heard && (ranks.lost != 0 || ranks.terminated)))
         (void)fprintf(stderr, "incode: %s\n", error.text);
-    }
     host_ranks_close(&ranks, status);
     return status;
 }

@@ -48,14 +48,12 @@ static void begin_probe(struct node_answers *a,
 static void take_question(struct node_answers *a,
                           const struct cube_message *message) {
     struct node_question_message question;
-    if (message->size != sizeof question) {
+    if (message->size != sizeof question)
         return; /* of another version: the host has no answer then */
-    }
     memcpy(&question, message->data, sizeof question);
     if (question.what != NODE_PROBE) {
-        if (a->asked_count < NODE_ASKED_MAX) {
+        if (a->asked_count < NODE_ASKED_MAX)
             a->asked[a->asked_count++] = question;
-        }
     } else if (!a->probing || a->probe.tag != question.tag) {
         begin_probe(a, &question);
     }
@@ -64,9 +62,8 @@ static void take_question(struct node_answers *a,
 static void take_restart(struct node_answers *a,
                          const struct cube_message *message, uint64_t now_us) {
     struct node_restart_message order;
-    if (message->size != sizeof order) {
+    if (message->size != sizeof order)
         return;
-    }
     memcpy(&order, message->data, sizeof order);
     if (a->restart == 0 &&
         (order.what == NODE_RESTART_PLAIN || order.what == NODE_RESTART_STAY)) {
@@ -79,9 +76,8 @@ static void take_echo(struct node_answers *a,
                       const struct cube_message *message, uint64_t now_us) {
     struct node_echo_message echo;
     if (message->size != sizeof echo ||
-        message->source >= 1u << a->board->identity.dimension) {
+        message->source >= 1u << a->board->identity.dimension)
         return;
-    }
     memcpy(&echo, message->data, sizeof echo);
     if (message->type == NODE_ECHO) {
         if (a->echo_count < NODE_ECHOES_MAX) {
@@ -97,13 +93,12 @@ static void take_echo(struct node_answers *a,
 
 void node_answers_take(struct node_answers *answers,
                        const struct cube_message *message, uint64_t now_us) {
-    if (message->type == NODE_QUESTION && message->source == CUBE_HOST) {
+    if (message->type == NODE_QUESTION && message->source == CUBE_HOST)
         take_question(answers, message);
-    } else if (message->type == NODE_RESTART && message->source == CUBE_HOST) {
+    else if (message->type == NODE_RESTART && message->source == CUBE_HOST)
         take_restart(answers, message, now_us);
-    } else if (message->type == NODE_ECHO || message->type == NODE_ECHOED) {
+    else if (message->type == NODE_ECHO || message->type == NODE_ECHOED)
         take_echo(answers, message, now_us);
-    }
 }
 
 /* --- what is answered ------------------------------------------------------
@@ -115,9 +110,8 @@ static uint32_t least(uint64_t value) {
 
 void node_who_name(uint8_t *field, size_t size, const char *name) {
     size_t length = 0;
-    while (length < size && name[length] != '\0') {
+    while (length < size && name[length] != '\0')
         length++;
-    }
     memset(field, 0, size);
     memcpy(field, name, length);
 }
@@ -135,12 +129,10 @@ static size_t tell_who(const struct node_answers *a,
     who.epoch = board->identity.epoch;
     who.uptime_s = least((now_us - a->start_us) / 1000000);
     who.memory = (uint32_t)(board->arena_bytes + board->fixed_bytes);
-    if (board->who != NULL) {
+    if (board->who != NULL)
         board->who(board->context, &who);
-    }
-    if (teller->who != NULL) {
+    if (teller->who != NULL)
         teller->who(teller->context, &who);
-    }
     memcpy(bytes, &who, sizeof who);
     return sizeof who;
 }
@@ -171,9 +163,8 @@ static void fill_link(const struct node_answers *a, unsigned d,
 unsigned node_answers_links(const struct node_answers *answers,
                             struct node_link_state state[CUBE_LINKS_MAX]) {
     unsigned links = cube_links(answers->counted->cube);
-    for (unsigned d = 0; d < links; d++) {
+    for (unsigned d = 0; d < links; d++)
         fill_link(answers, d, &state[d]);
-    }
     return links;
 }
 
@@ -190,9 +181,8 @@ static size_t tell_top(const struct node_answers *a,
     const struct node_board *board = a->board;
     struct node_top top;
     memset(&top, 0, sizeof top);
-    if (teller->top == NULL) {
+    if (teller->top == NULL)
         return 0;
-    }
     top.memory = (uint32_t)(board->arena_bytes + board->fixed_bytes);
     top.wall_us = now_us - a->start_us;
     top.busy_us = board->busy_us(board->context);
@@ -211,9 +201,8 @@ static size_t tell_memory(const struct node_teller *teller, uint8_t *bytes) {
     struct node_ready_message ready;
     memset(&ready, 0, sizeof ready);
     ready.protocol = NODE_PROTOCOL;
-    if (teller->memory == NULL || !teller->memory(teller->context, &ready)) {
+    if (teller->memory == NULL || !teller->memory(teller->context, &ready))
         return 0;
-    }
     memcpy(bytes, &ready, sizeof ready);
     return sizeof ready;
 }
@@ -222,9 +211,8 @@ static size_t tell_totals(const struct node_answers *a,
                           const struct node_teller *teller, uint8_t *bytes) {
     struct node_finished_message totals;
     memset(&totals, 0, sizeof totals);
-    if (teller->totals == NULL) {
+    if (teller->totals == NULL)
         return 0;
-    }
     teller->totals(teller->context, &totals);
     totals.start = a->board->identity.epoch;
     totals.sent = a->counted->sent;
@@ -237,12 +225,10 @@ static size_t tell_log(const struct node_answers *a,
                        size_t size) {
     const struct node_board *board = a->board;
     size_t used = 0;
-    if (board->log != NULL) {
+    if (board->log != NULL)
         used = board->log(board->context, (char *)bytes, size);
-    }
-    if (teller->log != NULL) {
+    if (teller->log != NULL)
         used += teller->log(teller->context, (char *)bytes + used, size - used);
-    }
     INCODE_ASSERT(used <= size);
     return used;
 }
@@ -275,9 +261,8 @@ static bool answer(struct node_answers *a, const struct node_teller *teller,
                    uint64_t now_us) {
     uint8_t bytes[CUBE_PAYLOAD_MAX];
     struct node_answer_head head = {question->tag, question->what};
-    if (cube_room(a->counted->cube, CUBE_HOST) == 0) {
+    if (cube_room(a->counted->cube, CUBE_HOST) == 0)
         return false;
-    }
     memcpy(bytes, &head, sizeof head);
     size_t size =
         sizeof head + tell(a, teller, question->what, now_us,
@@ -290,10 +275,8 @@ static unsigned send_answers(struct node_answers *a,
                              const struct node_teller *teller,
                              uint64_t now_us) {
     unsigned sent = 0;
-    while (sent < a->asked_count &&
-           answer(a, teller, &a->asked[sent], now_us)) {
+    while (sent < a->asked_count && answer(a, teller, &a->asked[sent], now_us))
         sent++;
-    }
     a->asked_count -= sent;
     memmove(a->asked, a->asked + sent, a->asked_count * sizeof a->asked[0]);
     return sent;
@@ -304,9 +287,8 @@ static unsigned send_echoes(struct node_answers *a) {
     while (sent < a->echo_count) {
         struct node_echo_message echo = {a->echo[sent].tag};
         if (cube_write(a->counted->cube, a->echo[sent].source, NODE_ECHOED,
-                       &echo, sizeof echo) != 0) {
+                       &echo, sizeof echo) != 0)
             break;
-        }
         sent++;
     }
     a->echo_count -= sent;
@@ -342,12 +324,10 @@ static unsigned send_probe(struct node_answers *a, uint64_t now_us) {
 unsigned node_answers_send(struct node_answers *answers,
                            const struct node_teller *teller, uint64_t now_us) {
     unsigned sent = send_echoes(answers);
-    if (answers->asked_count > 0) {
+    if (answers->asked_count > 0)
         sent += send_answers(answers, teller, now_us);
-    }
-    if (answers->probing) {
+    if (answers->probing)
         sent += send_probe(answers, now_us);
-    }
     return sent;
 }
 
@@ -355,9 +335,8 @@ enum node_reset node_answers_restart(const struct node_answers *answers,
                                      uint64_t now_us) {
     uint64_t passed_us = now_us - answers->restart_us;
     if (answers->restart == 0 || passed_us < RESTART_US_MIN ||
-        (passed_us < RESTART_US_MAX && !cube_idle(answers->counted->cube))) {
+        (passed_us < RESTART_US_MAX && !cube_idle(answers->counted->cube)))
         return NODE_RESET_OVER;
-    }
     return answers->restart == NODE_RESTART_STAY ? NODE_RESET_STAY
                                                  : NODE_RESET_AGAIN;
 }
@@ -388,9 +367,8 @@ struct cube_config node_configure(const struct node_identity *identity,
     config.host_ports = identity->host_ports;
     config.dead_us = identity->dead_us;
     if (identity->window == 0 && identity->serial_baud == 0 &&
-        memory >= HOST_WINDOW_FROM) {
+        memory >= HOST_WINDOW_FROM)
         config.host_window = HOST_WINDOW;
-    }
     cube_for_serial(&config, identity->serial_baud);
     return config;
 }

@@ -4,12 +4,10 @@ enum { TRIES = 8 /* a draw is 0 once in 2^32 times */ };
 
 static bool draw(struct secure_source *source, uint32_t *epoch) {
     *epoch = 0;
-    for (int i = 0; i < TRIES && *epoch == 0; i++) {
+    for (int i = 0; i < TRIES && *epoch == 0; i++)
         if (source->random == NULL ||
-            !source->random(source->context, (uint8_t *)epoch, sizeof *epoch)) {
+            !source->random(source->context, (uint8_t *)epoch, sizeof *epoch))
             return false;
-        }
-    }
     return *epoch != 0;
 }
 
@@ -44,9 +42,8 @@ void node_identity_ask(struct learner *learner, uint64_t now_us) {
 bool node_identity_hear(struct learner *learner,
                         struct node_identity *identity) {
     struct learned learned;
-    if (!learner_poll(learner, &learned)) {
+    if (!learner_poll(learner, &learned))
         return false;
-    }
     identity->self = learned.self;
     identity->dimension = learned.dimension;
     identity->host_port = learned.self != 0 &&

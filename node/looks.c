@@ -58,29 +58,25 @@ static void measure(struct node_looks *looks, uint64_t passed_us) {
 
 /* Returns the time afterwards. */
 static uint64_t tend(struct node_looks *looks, uint64_t now_us) {
-    if (now_us - looks->polled_us < TEND_US) {
+    if (now_us - looks->polled_us < TEND_US)
         return now_us;
-    }
     note_poll(looks, now_us);
     (void)cube_tend(looks->cube, now_us);
     return looks->board->now_us(looks->board->context);
 }
 
 void node_looks_between(struct node_looks *looks) {
-    if (looks->tends) {
+    if (looks->tends)
         (void)tend(looks, looks->board->now_us(looks->board->context));
-    }
 }
 
 static uint32_t at_pause(void *context) {
     struct node_looks *looks = context;
-    if (!looks->tends) {
+    if (!looks->tends)
         return INCODE_PAUSE_UNITS_MAX;
-    }
     uint64_t now_us = looks->board->now_us(looks->board->context);
-    if (looks->working) {
+    if (looks->working)
         measure(looks, now_us - looks->paused_us);
-    }
     now_us = tend(looks, now_us);
     looks->working = true;
     looks->paused_us = now_us;
@@ -116,15 +112,13 @@ static bool is_silent(struct node_looks *looks, unsigned d,
 bool node_looks_silent(struct node_looks *looks, uint64_t now_us) {
     uint64_t passed_us = now_us - looks->looked_us;
     uint32_t silent = 0;
-    if (passed_us < LOOK_US) {
+    if (passed_us < LOOK_US)
         return false;
-    }
     looks->looked_us = now_us;
     uint32_t step_us =
         passed_us < 2 * LOOK_US ? (uint32_t)passed_us : 2 * LOOK_US;
-    for (unsigned d = 0; d < cube_links(looks->cube); d++) {
+    for (unsigned d = 0; d < cube_links(looks->cube); d++)
         silent |= (uint32_t)is_silent(looks, d, step_us) << d;
-    }
     bool news = silent != looks->silent;
     looks->silent = silent;
     return news;
@@ -154,9 +148,8 @@ void node_looks_totals(const struct node_looks *looks,
         const struct link_statistics *s = cube_link_statistics(looks->cube, d);
         finished->retransmitted += s->retransmitted;
     }
-    if (board->gauges != NULL) {
+    if (board->gauges != NULL)
         board->gauges(board->context, &gauges);
-    }
     finished->stack_bytes = gauges.stack_bytes;
     finished->stack_high_water = gauges.stack_high_water;
     finished->overruns = gauges.overruns;

@@ -54,9 +54,8 @@ size_t node_arena_needed(const struct node_identity *identity, size_t memory,
     struct cube_config config = node_configure(identity, memory);
     const struct node_role *role = node_role_named(setup->role);
     INCODE_ASSERT(role != NULL);
-    for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+    for (unsigned d = 0; d < CUBE_LINKS_MAX; d++)
         config.pipes[d] = (struct link_pipe){NULL, nowhere, nothing};
-    }
     return node_aligned(sizeof(struct node)) +
            node_aligned(cube_arena_bytes(&config)) +
            role->arena_min(memory, setup);
@@ -70,12 +69,10 @@ struct node *node_start(const struct node_board *board, const char **why) {
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
     INCODE_ASSERT((uintptr_t)board->arena % NODE_ALIGNMENT == 0);
     *why = incode_arithmetic_fault();
-    if (*why == NULL) {
+    if (*why == NULL)
         *why = cube_config_fault(&config);
-    }
-    if (*why != NULL) {
+    if (*why != NULL)
         return NULL;
-    }
     if ((uint64_t)board->arena_bytes + board->fixed_bytes > UINT32_MAX) {
         *why = "a node's memory is below 4 GiB"; /* struct node_map says it */
         return NULL;
@@ -135,9 +132,8 @@ static void take_setup(struct node *n, const struct cube_message *message) {
     n->fault.size = 0;
     n->fault_sent = false;
     if (!node_setup_read(&setup, message, 1u << n->board->identity.dimension,
-                         &n->fault)) {
+                         &n->fault))
         return;
-    }
     const struct node_role *role = node_role_named(setup.role);
     if (role == NULL) {
         node_fault_set(&n->fault, "unknown role #, known are 1..#", setup.role,
@@ -198,9 +194,8 @@ static void serve_message(struct node *n, const struct cube_message *message) {
         node_answers_take(&n->answers, message, n->now_us);
         return;
     }
-    if (is_for_loader(message)) {
+    if (is_for_loader(message))
         return;
-    }
     switch (message->type) {
     case NODE_SETUP:
         take_setup(n, message);
@@ -218,16 +213,14 @@ static void serve_message(struct node *n, const struct cube_message *message) {
     default:
         /* After a fresh start: a message that was sent to the one before.  And
          * who has a fault does not go on with what he has. */
-        if (n->role != NULL && !node_fault_is_set(&n->fault)) {
+        if (n->role != NULL && !node_fault_is_set(&n->fault))
             n->role->message(n->role_arena, message, n->now_us);
-        }
     }
 }
 
 static void take_message(struct node *n, const struct cube_message *message) {
-    if (is_expected(n, message)) {
+    if (is_expected(n, message))
         serve_message(n, message);
-    }
     n->counted.received +=
         message->source == CUBE_HOST && message->type != NODE_STOP;
 }
@@ -240,9 +233,8 @@ static void fill_map(const struct node *n, struct node_map *map) {
     map->cube = (uint32_t)n->cube_bytes;
     map->window = n->window;
     map->node = (uint32_t)node_aligned(sizeof *n);
-    if (n->role != NULL) {
+    if (n->role != NULL)
         n->role->map(n->role_arena, map);
-    }
 }
 
 static bool send_ready(struct node *n) {
@@ -283,9 +275,8 @@ static bool send_pong(struct node *n) {
  * that is done, or 0. */
 static bool send_finished(struct node *n, uint32_t epoch) {
     struct node_finished_message finished = n->before;
-    if (cube_room(n->cube, CUBE_HOST) == 0) {
+    if (cube_room(n->cube, CUBE_HOST) == 0)
         return false;
-    }
     role_totals(n, &finished);
     node_looks_totals(&n->looks, &finished);
     finished.epoch = epoch;
@@ -300,9 +291,8 @@ static bool send_finished(struct node *n, uint32_t epoch) {
  * this one had is of no use, but for what it knows of its work. */
 static void follow_wiring(struct node *n) {
     const struct cube_wiring *wiring = cube_wiring(n->cube);
-    if (wiring_together(wiring, &n->followed)) {
+    if (wiring_together(wiring, &n->followed))
         return;
-    }
     end_role(n);
     n->followed = *wiring;
     n->pinged = n->owes_pong = n->owes_ready = n->owes_report = false;
@@ -355,9 +345,8 @@ static void tell_totals(void *context, struct node_finished_message *totals) {
 
 static size_t tell_log(void *context, char *text, size_t size) {
     const struct node *n = context;
-    if (!node_fault_is_set(&n->fault) || n->fault.size + 1 > size) {
+    if (!node_fault_is_set(&n->fault) || n->fault.size + 1 > size)
         return 0;
-    }
     memcpy(text, n->fault.text, n->fault.size);
     text[n->fault.size] = '\n';
     return n->fault.size + 1;
@@ -397,18 +386,15 @@ static unsigned send_role(struct node *n) {
 /* The farewell is passed on to other nodes first, then said on each link. */
 static bool may_stop(struct node *n) {
     uint64_t end = n->stop_us + FAREWELL_US;
-    if (!n->stopping) {
+    if (!n->stopping)
         return false;
-    }
     if (!n->closing && cube_idle(n->cube)) {
         cube_close(n->cube, end);
         n->closing = true;
     }
-    for (unsigned d = 0; d < cube_links(n->cube) && n->now_us < end; d++) {
-        if (!n->closing || !node_looks_parted(&n->looks, d)) {
+    for (unsigned d = 0; d < cube_links(n->cube) && n->now_us < end; d++)
+        if (!n->closing || !node_looks_parted(&n->looks, d))
             return false;
-        }
-    }
     return true;
 }
 
@@ -445,16 +431,14 @@ unsigned node_receive(struct node *node) {
     unsigned moved = node_looks_poll(&node->looks, node->now_us);
     follow_wiring(node);
     look_at_links(node);
-    for (unsigned d = 0; d < cube_links(node->cube); d++) {
+    for (unsigned d = 0; d < cube_links(node->cube); d++)
         moved += read_link(node, d);
-    }
     return moved;
 }
 
 unsigned node_work(struct node *node) {
-    if (!is_sound(node) || node->owes_pong || node->owes_ready) {
+    if (!is_sound(node) || node->owes_pong || node->owes_ready)
         return 0;
-    }
     node_pace_begin(&node->pace, node->now_us);
     unsigned worked = node->role->work(node->role_arena, &node->pace);
     node->work += worked;
@@ -475,12 +459,10 @@ enum node_event node_send(struct node *node, unsigned moved) {
         moved += node_fault_is_set(&node->fault); /* to be told at once */
     }
     moved += send_answers(node);
-    if (may_stop(node) || node_reset_why(node) != NODE_RESET_OVER) {
+    if (may_stop(node) || node_reset_why(node) != NODE_RESET_OVER)
         return NODE_STOPPED;
-    }
-    if (moved > 0) {
+    if (moved > 0)
         return NODE_BUSY;
-    }
     node_looks_idle(&node->looks);
     return NODE_IDLE;
 }
@@ -497,9 +479,8 @@ enum node_event node_step(struct node *node) {
 
 uint64_t node_wait_us(const struct node *node) {
     uint64_t due = cube_next_due_us(node->cube, node->now_us);
-    if (node->stopping && due > FAREWELL_US) {
+    if (node->stopping && due > FAREWELL_US)
         due = FAREWELL_US;
-    }
     return due < IDLE_MAX_US ? due : IDLE_MAX_US;
 }
 
@@ -519,9 +500,8 @@ uint32_t node_held(const struct node *node) {
 void node_account(const struct node *node,
                   struct node_finished_message *totals) {
     *totals = node->before;
-    if (node->role != NULL) {
+    if (node->role != NULL)
         role_totals(node, totals);
-    }
 }
 
 const struct cube_statistics *node_messages(const struct node *node) {
@@ -531,10 +511,8 @@ const struct cube_statistics *node_messages(const struct node *node) {
 enum node_reset node_run(struct node *node) {
     const struct node_board *board = node->board;
     enum node_event event;
-    while ((event = node_step(node)) != NODE_STOPPED) {
-        if (event == NODE_IDLE) {
+    while ((event = node_step(node)) != NODE_STOPPED)
+        if (event == NODE_IDLE)
             board->idle(board->context, node_wait_us(node));
-        }
-    }
     return node_reset_why(node);
 }

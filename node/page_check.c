@@ -40,16 +40,14 @@ uint64_t node_half_siphash(uint64_t key, const uint32_t *words, size_t count,
     const uint32_t k0 = (uint32_t)key, k1 = (uint32_t)(key >> 32);
     struct sip s = {k0, k1 ^ 0xee, k0 ^ 0x6c796765, k1 ^ 0x74656462};
     uint32_t word, last = (uint32_t)(count * sizeof word + size) << 24;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         s = absorb(s, words[i]);
-    }
     for (; size >= sizeof word; bytes += sizeof word, size -= sizeof word) {
         memcpy(&word, bytes, sizeof word);
         s = absorb(s, word);
     }
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         last |= (uint32_t)bytes[i] << 8 * i;
-    }
     s = absorb(s, last);
     s.v2 ^= 0xee;
     s = rounds(s, 4);
@@ -106,9 +104,8 @@ bool node_page_check_take(struct node_page_check *check,
     page->size = message->size - sizeof head;
     bool right =
         page->tag == tag_of(check->key, page->number, page->bytes, page->size);
-    if (!right) {
+    if (!right)
         node_page_check_report(check, message->source, page->number);
-    }
     return right;
 }
 
@@ -123,9 +120,8 @@ void node_page_check_report(struct node_page_check *check, uint16_t sender,
 unsigned node_page_check_send(struct node_page_check *check) {
     if (!check->owed ||
         node_counted_write(check->counted, CUBE_HOST, NODE_WRONG_PAGE,
-                           &check->wrong, sizeof check->wrong) != 0) {
+                           &check->wrong, sizeof check->wrong) != 0)
         return 0;
-    }
     check->owed = false;
     return 1;
 }

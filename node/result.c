@@ -48,14 +48,12 @@ static void put_single(struct node_result_writer *writer, uint32_t kind,
 }
 
 int node_result_finder(struct node_result_writer *writer, uint16_t node) {
-    if (node == writer->finder) {
+    if (node == writer->finder)
         return 1;
-    }
     if (writer->size_max - writer->size < NODE_RESULT_FINDER_MAX +
                                               NODE_RESULT_STAR_MAX +
-                                              NODE_RESULT_TETRAHEDRON_MAX) {
+                                              NODE_RESULT_TETRAHEDRON_MAX)
         return 0;
-    }
     uint8_t *at = writer->buffer + writer->size;
     bool follows = node >= FINDER_FOLLOWS;
     *at = (uint8_t)(KIND_FINDER | (follows ? FINDER_FOLLOWS : node) << 2);
@@ -68,14 +66,11 @@ int node_result_finder(struct node_result_writer *writer, uint16_t node) {
 size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
                         const uint32_t (*apexes)[3], size_t count) {
     size_t room = writer->size_max - writer->size;
-    if (room < NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX ||
-        count == 0) {
+    if (room < NODE_RESULT_STAR_MAX + NODE_RESULT_TETRAHEDRON_MAX || count == 0)
         return 0;
-    }
     room = (room - NODE_RESULT_STAR_MAX) / NODE_RESULT_TETRAHEDRON_MAX;
-    if (count > room) {
+    if (count > room)
         count = room;
-    }
     put_single(writer, KIND_STAR, vertex - writer->vertex);
     writer->vertex = vertex;
     uint8_t *at = writer->buffer + writer->size;
@@ -92,9 +87,8 @@ size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
 }
 
 int node_result_commit(struct node_result_writer *writer, uint32_t brick) {
-    if (writer->size_max - writer->size < NODE_RESULT_COMMIT_MAX) {
+    if (writer->size_max - writer->size < NODE_RESULT_COMMIT_MAX)
         return 0;
-    }
     put_single(writer, KIND_COMMIT,
                brick - writer->vertex / INCODE_BRICK_POINTS);
     return 1;
@@ -140,12 +134,10 @@ static inline bool row_in_range(const uint32_t row[4], uint32_t vertices) {
 /* Size of the record with this head, or 0 where no record has such a head. */
 static size_t record_size(uint32_t head) {
     size_t first = 2 + (head >> 2 & 3);
-    if ((head & 3) == KIND_TETRAHEDRON) {
+    if ((head & 3) == KIND_TETRAHEDRON)
         return first + 2 + (head >> 4 & 3) + (head >> 6);
-    }
-    if ((head & 3) == KIND_FINDER) {
+    if ((head & 3) == KIND_FINDER)
         return head >> 2 == FINDER_FOLLOWS ? 3 : 1;
-    }
     return head >> 4 == 0 ? first : 0;
 }
 
@@ -156,15 +148,13 @@ static size_t read_slowly(struct node_result_reader *reader, uint32_t row[4],
     uint8_t copy[NODE_RESULT_TETRAHEDRON_MAX + 4] = {0};
     size_t left = (size_t)(reader->end - reader->next);
     size_t size = record_size(*reader->next);
-    if (size == 0 || size > left) {
+    if (size == 0 || size > left)
         return 0;
-    }
     memcpy(copy, reader->next, size);
     uint32_t kind = copy[0] & 3;
     if (kind == KIND_TETRAHEDRON) {
-        if (!reader->in_star) {
+        if (!reader->in_star)
             return 0;
-        }
         (void)get_row(copy, reader->vertex, row);
         *rows_read = 1;
         return row_in_range(row, reader->vertices) ? size : 0;
@@ -209,32 +199,26 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
         size_t rows_read = 0;
         int committed = 0;
         bool good = true;
-        if (*count == rows_max) {
+        if (*count == rows_max)
             return NODE_RESULT_ROWS;
-        }
         if (reader->in_star &&
             reader->end - reader->next > NODE_RESULT_TETRAHEDRON_MAX + 3) {
             *count +=
                 read_fast(reader, rows + *count, rows_max - *count, &good);
-            if (!good) {
+            if (!good)
                 return NODE_RESULT_GARBAGE;
-            }
-            if (*count == rows_max) {
+            if (*count == rows_max)
                 continue;
-            }
         }
-        if (*count > 0 && (*reader->next & 3) == KIND_FINDER) {
+        if (*count > 0 && (*reader->next & 3) == KIND_FINDER)
             return NODE_RESULT_ROWS; /* they have the finder before */
-        }
         size_t size = read_slowly(reader, rows[*count], &rows_read, &committed);
-        if (size == 0) {
+        if (size == 0)
             return NODE_RESULT_GARBAGE;
-        }
         reader->next += size;
         *count += rows_read;
-        if (committed) {
+        if (committed)
             return NODE_RESULT_COMMIT;
-        }
     }
     return NODE_RESULT_END;
 }
@@ -262,9 +246,8 @@ void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size) {
     slot->type = type;
     slot->size = (uint16_t)size;
     box->used++;
-    if (box->used > box->used_max) {
+    if (box->used > box->used_max)
         box->used_max = box->used;
-    }
 }
 
 struct node_outbox_slot *node_outbox_first(const struct node_outbox *box) {
@@ -300,9 +283,8 @@ static void add_statistics(struct incode_statistics *sum,
         higher(sum->memory_high_water, more->memory_high_water);
     memcpy(a, sum, sizeof a);
     memcpy(b, more, sizeof b);
-    for (unsigned i = 0; i < WORDS; i++) {
+    for (unsigned i = 0; i < WORDS; i++)
         a[i] += b[i];
-    }
     memcpy(sum, a, sizeof a);
     sum->afl_max = afl_max;
     sum->memory_high_water = high_water;

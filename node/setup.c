@@ -8,9 +8,8 @@
 void node_fault_set(struct node_fault *fault, const char *words, uint32_t a,
                     uint32_t b) {
     struct cube_text text;
-    if (node_fault_is_set(fault)) {
+    if (node_fault_is_set(fault))
         return;
-    }
     text = cube_text_in(fault->text, sizeof fault->text);
     for (uint32_t figure = a; *words != '\0'; words++) {
         char character[2] = {*words, '\0'};
@@ -30,9 +29,8 @@ bool node_setup_read(struct node_setup_message *setup,
                      const struct cube_message *message, unsigned nodes,
                      struct node_fault *fault) {
     uint32_t protocol = NODE_PROTOCOL;
-    if (message->size >= sizeof protocol) {
+    if (message->size >= sizeof protocol)
         memcpy(&protocol, message->data, sizeof protocol);
-    }
     if (protocol != NODE_PROTOCOL) {
         node_fault_set(fault, "protocol version #, expected #", protocol,
                        NODE_PROTOCOL);
@@ -172,8 +170,7 @@ unsigned node_pace_work(struct node_pace *pace,
             units = 0;
         }
     }
-    if (units > 0) {
+    if (units > 0)
         node_pace_end(pace, units);
-    }
     return worked;
 }

@@ -41,9 +41,8 @@ void link_for_serial(struct link_config *config, uint32_t baud) {
     config->timeout_min_us =
         wait_us < TIMEOUT_MIN_US ? TIMEOUT_MIN_US : wait_us;
     config->timeout_max_us = 4 * config->timeout_min_us;
-    if (config->timeout_max_us < TIMEOUT_MAX_US) {
+    if (config->timeout_max_us < TIMEOUT_MAX_US)
         config->timeout_max_us = TIMEOUT_MAX_US;
-    }
     config->ack_delay_us = 1000;
 }
 
@@ -60,32 +59,24 @@ static_assert(LINK_WINDOW_MAX == 64 && LINK_MESSAGE_MAX == 1616 &&
 
 /* Of a config that is complete. */
 static const char *fault_of(const struct link_config *c) {
-    if (c->pipe.send == NULL || c->pipe.receive == NULL) {
+    if (c->pipe.send == NULL || c->pipe.receive == NULL)
         return "a pipe has no functions";
-    }
-    if (c->epoch == 0) {
+    if (c->epoch == 0)
         return "epoch is 0";
-    }
-    if (c->window < 1 || c->window > LINK_WINDOW_MAX) {
+    if (c->window < 1 || c->window > LINK_WINDOW_MAX)
         return "window is not 1 .. 64 frames";
-    }
-    if (c->message_max > LINK_MESSAGE_MAX) {
+    if (c->message_max > LINK_MESSAGE_MAX)
         return "message_max is above 1616 bytes";
-    }
     if (c->frame_payload % 8 != 0 ||
         c->frame_payload < LINK_FRAME_PAYLOAD_MIN ||
-        c->frame_payload > LINK_FRAME_PAYLOAD_MAX) {
+        c->frame_payload > LINK_FRAME_PAYLOAD_MAX)
         return "frame_payload is no multiple of 8 from 32 to 1616 bytes";
-    }
-    if (link_fragments(c, c->message_max) > c->window) {
+    if (link_fragments(c, c->message_max) > c->window)
         return "window does not hold the frames of a message";
-    }
-    if (c->staging > LINK_WINDOW_MAX) {
+    if (c->staging > LINK_WINDOW_MAX)
         return "staging is above 64 frames";
-    }
-    if (c->timeout_min_us > c->timeout_max_us) {
+    if (c->timeout_min_us > c->timeout_max_us)
         return "timeout_min_us is above timeout_max_us";
-    }
     return NULL;
 }
 
@@ -136,9 +127,8 @@ struct link_config cube_link_config(const struct cube_config *config,
     c.message_max = CUBE_MESSAGE_MAX;
     c.frame_payload = config->frame_payload;
     c.staging = config->staging;
-    if (config->serial_baud != 0) {
+    if (config->serial_baud != 0)
         link_for_serial(&c, config->serial_baud);
-    }
     return c;
 }
 
@@ -149,9 +139,8 @@ unsigned cube_links_of(const struct cube_config *config) {
                    : config->dimension +
                          (config->self < config->host_ports ? 1u : 0u);
     }
-    if (config->self == CUBE_HOST) {
+    if (config->self == CUBE_HOST)
         return config->spare_node != 0 ? 2 : 1;
-    }
     return config->dimension +
            (config->self == 0 || config->host_port ? 1u : 0u);
 }
@@ -159,32 +148,25 @@ unsigned cube_links_of(const struct cube_config *config) {
 /* Who has host ports. */
 static const char *host_port_fault(const struct cube_config *config) {
     unsigned ports = config->host_ports, nodes = 1u << config->dimension;
-    if ((ports & (ports - 1)) != 0 || ports > CUBE_HOST_PORTS_MAX) {
+    if ((ports & (ports - 1)) != 0 || ports > CUBE_HOST_PORTS_MAX)
         return "host_ports is no power of two up to 8";
-    }
-    if (ports > nodes) {
+    if (ports > nodes)
         return "host_ports is above the number of nodes";
-    }
-    if (ports > 1 && config->spare_node != 0) {
+    if (ports > 1 && config->spare_node != 0)
         return "host_ports and spare_node are both given";
-    }
-    if (config->spare_node >= nodes) {
+    if (config->spare_node >= nodes)
         return "spare_node is no node of the cube";
-    }
     if (config->self == CUBE_HOST && config->gateway != 0 &&
-        config->gateway != config->spare_node && config->gateway >= ports) {
+        config->gateway != config->spare_node && config->gateway >= ports)
         return "gateway has no host port";
-    }
     return NULL;
 }
 
 const char *cube_config_fault(const struct cube_config *config) {
-    if (config->dimension > CUBE_DIMENSION_MAX) {
+    if (config->dimension > CUBE_DIMENSION_MAX)
         return "dimension is above 10";
-    }
-    if (config->self != CUBE_HOST && config->self >= 1u << config->dimension) {
+    if (config->self != CUBE_HOST && config->self >= 1u << config->dimension)
         return "self is no node of the cube";
-    }
     const char *fault = host_port_fault(config);
     for (unsigned d = 0; fault == NULL && d < cube_links_of(config); d++) {
         struct link_config c = cube_link_config(config, d);
@@ -195,7 +177,6 @@ const char *cube_config_fault(const struct cube_config *config) {
 
 void cube_for_serial(struct cube_config *config, uint32_t baud) {
     config->serial_baud = baud;
-    if (baud != 0) {
+    if (baud != 0)
         config->window = config->window >= 8 ? 14 : 7;
-    }
 }

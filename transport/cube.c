@@ -36,18 +36,16 @@ static unsigned host_port_of(const struct cube *cube, unsigned node) {
 
 /* The host's link to the host port of a node. */
 static unsigned link_of_host_port(const struct cube *cube, unsigned node) {
-    if (cube->config.host_ports > 1) {
+    if (cube->config.host_ports > 1)
         return node;
-    }
     return cube->count > 1 && node == cube->config.spare_node ? 1 : 0;
 }
 
 /* A host port is a node's last; 0: there is no way. */
 static uint32_t way_to(const struct cube *cube, unsigned dest) {
     unsigned self = cube->config.self;
-    if (is_host(cube)) {
+    if (is_host(cube))
         return (uint32_t)1 << link_of_host_port(cube, host_port_of(cube, dest));
-    }
     if (dest == CUBE_HOST) {
         dest = host_port_of(cube, self);
         if (self == dest) {
@@ -56,9 +54,8 @@ static uint32_t way_to(const struct cube *cube, unsigned dest) {
                        : 0;
         }
     }
-    if (dest == self) {
+    if (dest == self)
         return (uint32_t)1 << LOCAL;
-    }
     unsigned link = routes_way(&cube->routes, self, dest);
     return link == ROUTES_NONE ? 0 : (uint32_t)1 << link;
 }
@@ -74,9 +71,8 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source) {
                          << link_of_host_port(cube, host_port_of(cube, 0));
     }
     uint32_t ways = routes_to_all(&cube->routes, self, root);
-    if (source == CUBE_HOST) {
+    if (source == CUBE_HOST)
         ways &= ~between; /* what differs in these has a host port of its own */
-    }
     return self == source ? ways : ways | (uint32_t)1 << LOCAL;
 }
 
@@ -84,14 +80,12 @@ static uint32_t ways_to_all(const struct cube *cube, unsigned source) {
  * source on any other link is dropped. */
 static unsigned way_from(const struct cube *cube, unsigned source) {
     unsigned self = cube->config.self;
-    if (is_host(cube)) {
+    if (is_host(cube))
         return link_of_host_port(cube, host_port_of(cube, source));
-    }
     if (source == CUBE_HOST) {
         source = host_port_of(cube, self);
-        if (source == self) {
+        if (source == self)
             return cube->config.dimension;
-        }
     }
     return routes_way_from(&cube->routes, self, source);
 }
@@ -104,12 +98,10 @@ static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
     bool dest_known =
         dest < nodes(cube) || dest == CUBE_HOST || dest == CUBE_ALL;
     if (!source_known || !dest_known || source == cube->config.self ||
-        way_from(cube, source) != d) {
+        way_from(cube, source) != d)
         return 0;
-    }
-    if (is_host(cube)) {
+    if (is_host(cube))
         return dest == CUBE_HOST ? (uint32_t)1 << LOCAL : 0;
-    }
     return dest == CUBE_ALL ? ways_to_all(cube, source) : way_to(cube, dest);
 }
 
@@ -120,9 +112,8 @@ static size_t up64(size_t bytes) {
 }
 
 size_t cube_arena_bytes(const struct cube_config *config) {
-    if (cube_config_fault(config) != NULL) {
+    if (cube_config_fault(config) != NULL)
         return 0;
-    }
     size_t bytes =
         up64(sizeof(struct cube)) + up64(routes_bytes(config->dimension));
     for (unsigned d = 0; d < cube_links_of(config); d++) {
@@ -135,9 +126,8 @@ size_t cube_arena_bytes(const struct cube_config *config) {
 struct cube *cube_init(void *arena, size_t bytes,
                        const struct cube_config *config) {
     size_t needed = cube_arena_bytes(config);
-    if (needed == 0 || bytes < needed) {
+    if (needed == 0 || bytes < needed)
         return NULL;
-    }
     struct cube *cube = arena;
     uint8_t *rest = (uint8_t *)arena + up64(sizeof *cube);
     memset(cube, 0, sizeof *cube);
@@ -149,9 +139,8 @@ struct cube *cube_init(void *arena, size_t bytes,
     for (unsigned d = 0; d < cube->count; d++) {
         struct link_config c = cube_link_config(config, d);
         cube->links[d] = link_init(rest, link_bytes(&c), &c);
-        if (cube->links[d] == NULL) {
+        if (cube->links[d] == NULL)
             return NULL;
-        }
         rest += up64(link_bytes(&c));
     }
     cube_gossip_start(cube);
@@ -176,13 +165,11 @@ static bool look_at(struct cube *cube, unsigned d) {
         const uint8_t *head = a->message.data;
         unsigned stamp =
             a->message.size >= HEAD ? bytes_get16(head + STAMP) : cube->stamp;
-        if (cube->wiring.generation == 0) {
+        if (cube->wiring.generation == 0)
             return false;
-        }
         if (stamp != cube->stamp) {
-            if (!outdated(cube, d, a->message.sequence)) {
+            if (!outdated(cube, d, a->message.sequence))
                 return false;
-            }
             cube->statistics.outdated++;
             link_release(cube->links[d]);
             continue;
@@ -235,21 +222,18 @@ void cube_drop_all(struct cube *cube) {
 static bool may_pass_on(struct cube *cube, unsigned out, size_t size) {
     const struct link *link = cube->links[out];
     uint32_t bit = (uint32_t)1 << out;
-    if (cube->tending) {
+    if (cube->tending)
         return link_room(link, CUBE_MESSAGE_MAX) > 1;
-    }
-    if (link_room(link, size) == 0) {
+    if (link_room(link, size) == 0)
         return false;
-    }
     bool last = link_room_behind(link, size, CUBE_MESSAGE_MAX) == 0;
     if (last && (cube->kept_back & bit) != 0) {
         /* Its turn comes with the next poll, or with an acknowledgement. */
         cube->again |= link_room(link, CUBE_MESSAGE_MAX) > 0;
         return false;
     }
-    if (last) {
+    if (last)
         cube->kept_back |= bit;
-    }
     return true;
 }
 
@@ -302,17 +286,15 @@ static int pass_on_all(struct cube *cube) {
 int cube_poll(struct cube *cube, uint64_t now_us) {
     int count = 0;
     cube->again = false;
-    for (unsigned d = 0; d < cube->count; d++) {
+    for (unsigned d = 0; d < cube->count; d++)
         count += link_poll_receive(cube->links[d], now_us);
-    }
     cube_gossip(cube, now_us);
     uint32_t kept_before = cube->kept_back;
     count += pass_on_all(cube);
     for (unsigned d = 0; d < cube->count; d++) {
         /* Kept back for one poll with room, no longer. */
-        if (link_room(cube->links[d], CUBE_MESSAGE_MAX) > 0) {
+        if (link_room(cube->links[d], CUBE_MESSAGE_MAX) > 0)
             cube->kept_back &= ~(kept_before & (uint32_t)1 << d);
-        }
         count += link_poll_send(cube->links[d], now_us);
     }
     return count;
@@ -320,16 +302,14 @@ int cube_poll(struct cube *cube, uint64_t now_us) {
 
 int cube_tend(struct cube *cube, uint64_t now_us) {
     int count = 0;
-    for (unsigned d = 0; d < cube->count; d++) {
+    for (unsigned d = 0; d < cube->count; d++)
         count += link_tend_receive(cube->links[d], now_us);
-    }
     cube_note_comings(cube, now_us);
     cube->tending = true;
     count += pass_on_all(cube);
     cube->tending = false;
-    for (unsigned d = 0; d < cube->count; d++) {
+    for (unsigned d = 0; d < cube->count; d++)
         count += link_poll_send(cube->links[d], now_us);
-    }
     return count;
 }
 
@@ -346,9 +326,8 @@ static unsigned room_on(const struct cube *cube, uint32_t ways, size_t size) {
     unsigned room = cube->wiring.generation != 0 ? LINK_WINDOW_MAX : 0;
     for (unsigned d = 0; d < cube->count; d++) {
         unsigned here = link_room(cube->links[d], size);
-        if ((ways & (uint32_t)1 << d) != 0 && here < room) {
+        if ((ways & (uint32_t)1 << d) != 0 && here < room)
             room = here;
-        }
     }
     return room;
 }
@@ -367,9 +346,8 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                           (uint8_t)(cube->stamp >> 8)};
     LINK_ASSERT(size <= CUBE_PAYLOAD_MAX);
     cube->statistics.unreachable += ways == 0 && dest != CUBE_ALL;
-    if (room_on(cube, ways, HEAD + size) == 0) {
+    if (room_on(cube, ways, HEAD + size) == 0)
         return CUBE_AGAIN;
-    }
     for (unsigned d = 0; d < cube->count; d++) {
         if ((ways & (uint32_t)1 << d) != 0) {
             int status = link_write(cube->links[d], head, HEAD, data, size);
@@ -390,9 +368,8 @@ bool cube_read_from(struct cube *cube, unsigned d,
     LINK_ASSERT(cube->held == CUBE_LINKS_MAX && d < cube->count);
     pass_on_from(cube, d);
     const struct cube_arrival *a = &cube->arrivals[d];
-    if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0) {
+    if (!a->there || (a->ways & (uint32_t)1 << LOCAL) == 0)
         return false;
-    }
     const uint8_t *head = a->message.data;
     message->source = bytes_get16(head + 2);
     message->type = head[4];
@@ -406,9 +383,8 @@ bool cube_read(struct cube *cube, struct cube_message *message) {
     for (unsigned i = 0; i < cube->count; i++) {
         unsigned d = cube->turn + i;
         if (cube_read_from(cube, d < cube->count ? d : d - cube->count,
-                           message)) {
+                           message))
             return true;
-        }
     }
     return false;
 }
@@ -425,9 +401,8 @@ void cube_release(struct cube *cube) {
     cube->held = CUBE_LINKS_MAX;
     cube->statistics.read++;
     a->ways &= ~((uint32_t)1 << LOCAL);
-    if (a->ways == 0) {
+    if (a->ways == 0)
         done_with(cube, d);
-    }
 }
 
 /* --- state --------------------------------------------------------------- */
@@ -461,17 +436,15 @@ bool cube_idle(const struct cube *cube) {
         const struct cube_arrival *a = &cube->arrivals[d];
         bool under_way = a->there && (a->ways & ~((uint32_t)1 << LOCAL)) != 0;
         bool idle = link_idle(cube->links[d]) || cube_link_is_dead(cube, d);
-        if (under_way || !idle) {
+        if (under_way || !idle)
             return false;
-        }
     }
     return true;
 }
 
 void cube_close(struct cube *cube, uint64_t deadline_us) {
-    for (unsigned d = 0; d < cube->count; d++) {
+    for (unsigned d = 0; d < cube->count; d++)
         link_close(cube->links[d], deadline_us);
-    }
 }
 
 uint64_t cube_next_due_us(const struct cube *cube, uint64_t now_us) {

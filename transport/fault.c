@@ -52,9 +52,8 @@ void cube_wrong_text(const struct cube_wrong *wrong,
 
 bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES]) {
     text[0] = '\0';
-    if (cube->wiring.wrong_count == 0) {
+    if (cube->wiring.wrong_count == 0)
         return false;
-    }
     cube_wrong_text(&cube->wiring.wrong[0], &cube->config, text);
     return true;
 }

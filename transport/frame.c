@@ -97,12 +97,10 @@ static inline uint32_t after_byte(unsigned check, uint32_t crc) {
 static inline uint32_t by_table(unsigned check, uint32_t crc,
                                 const uint8_t *bytes, size_t size) {
     const uint8_t *p = bytes;
-    for (; size >= 4; size -= 4, p += 4) {
+    for (; size >= 4; size -= 4, p += 4)
         crc = after_word(check, crc ^ bytes_get32(p));
-    }
-    for (; size > 0; size--) {
+    for (; size > 0; size--)
         crc = after_byte(check, crc ^ *p++);
-    }
     return crc;
 }
 
@@ -120,9 +118,8 @@ uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size) {
         memcpy(&w, p, sizeof w);
         c = __builtin_ia32_crc32di(c, w);
     }
-    for (; size > 0; size--) {
+    for (; size > 0; size--)
         c = __builtin_ia32_crc32qi((uint32_t)c, *p++);
-    }
     return ~(uint32_t)c;
 }
 #else
@@ -139,13 +136,11 @@ size_t frame_find_zero(const uint8_t *bytes, size_t size) {
     size_t i = 0;
     for (; size - i >= WORD; i += WORD) {
         word marks = zero_marks(load_word(bytes + i));
-        if (marks != 0) {
+        if (marks != 0)
             return i + FIRST_ZERO(marks);
-        }
     }
-    while (i < size && bytes[i] != 0) {
+    while (i < size && bytes[i] != 0)
         i++;
-    }
     return i;
 }
 
@@ -168,9 +163,8 @@ static void put_bytes(struct writer *w, const uint8_t *in, size_t size) {
         size--;
         if (*in != 0) {
             *w->out++ = *in++;
-            if (++w->run == RUN_MAX) {
+            if (++w->run == RUN_MAX)
                 end_run(w, RUN_MAX + 1);
-            }
         } else {
             in++;
             end_run(w, w->run + 1);
@@ -188,9 +182,8 @@ static void put_words(struct writer *w, const uint8_t *in, size_t size) {
         word bytes = load_word(in), marks = zero_marks(bytes);
         unsigned step = RUN_MAX - run < WORD ? RUN_MAX - run : WORD;
         memcpy(out, in, WORD);
-        if (step < WORD) {
+        if (step < WORD)
             marks &= ((word)1 << 8 * step) - 1;
-        }
         if (marks == 0) {
             run += step;
         } else {
@@ -249,14 +242,12 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
     LINK_ASSERT(header->kind < 16 && header->flags < 16);
     pack_header(head, header);
     uint32_t crc = frame_crc32c(0, head, sizeof head);
-    if (header->size > 0) {
+    if (header->size > 0)
         crc = frame_crc32c(crc, payload, header->size);
-    }
     bytes_put32(tail, crc);
     put_words(&w, head, sizeof head);
-    if (header->size > 0) {
+    if (header->size > 0)
         put_words(&w, payload, header->size);
-    }
     put_bytes(&w, tail, sizeof tail);
     /* A run of 254 that ends the frame leaves an empty run behind it: its code
      * of 1 is right (no zero follows the last run) and keeps one rule. */
@@ -274,21 +265,18 @@ enum { BLOCK = 16 };
 static inline void copy_run(uint8_t *out, const uint8_t *in, size_t run,
                             size_t spare) {
     size_t i = 0;
-    for (; i < run && spare - i >= BLOCK; i += BLOCK) {
+    for (; i < run && spare - i >= BLOCK; i += BLOCK)
         memcpy(out + i, in + i, BLOCK);
-    }
-    for (; i < run; i++) {
+    for (; i < run; i++)
         out[i] = in[i];
-    }
 }
 
 /* Decodes exactly `size` bytes; 0, or -1 where the frame ends before. */
 static int take_bytes(struct frame_reader *r, uint8_t *out, size_t size) {
     while (size > 0) {
         if (r->run == 0) {
-            if (r->in == r->end) {
+            if (r->in == r->end)
                 return -1;
-            }
             unsigned code = *r->in++, due = r->zero_due;
             r->run = code - 1;
             r->zero_due = code <= RUN_MAX;
@@ -300,9 +288,8 @@ static int take_bytes(struct frame_reader *r, uint8_t *out, size_t size) {
         }
         size_t left = (size_t)(r->end - r->in);
         size_t run = r->run < size ? r->run : size;
-        if (run > left) {
+        if (run > left)
             return -1;
-        }
         copy_run(out, r->in, run, size < left ? size : left);
         r->in += run;
         r->run -= (unsigned)run;
@@ -316,13 +303,11 @@ enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
                              size_t size, struct frame_header *header) {
     uint8_t head[FRAME_HEADER];
     *reader = (struct frame_reader){in, in + size, 0, 0, 0};
-    if (take_bytes(reader, head, sizeof head) != 0) {
+    if (take_bytes(reader, head, sizeof head) != 0)
         return FRAME_BAD_CODE;
-    }
     unsigned check = bytes_get16(head + 12);
-    if (frame_crc16(head, FRAME_HEADER - 2) != check) {
+    if (frame_crc16(head, FRAME_HEADER - 2) != check)
         return FRAME_BAD_HEADER;
-    }
     unpack_header(header, head);
     reader->crc = frame_crc32c(0, head, sizeof head);
     return FRAME_GOOD;
@@ -332,17 +317,14 @@ enum frame_result frame_take(struct frame_reader *reader,
                              const struct frame_header *header, void *payload) {
     uint8_t tail[FRAME_TRAILER];
     if (take_bytes(reader, payload, header->size) != 0 ||
-        take_bytes(reader, tail, sizeof tail) != 0) {
+        take_bytes(reader, tail, sizeof tail) != 0)
         return FRAME_BAD_CODE;
-    }
     /* What is left may only be the empty run after one of 254. */
     if (reader->run == 0 && !reader->zero_due &&
-        reader->end - reader->in == 1 && *reader->in == 1) {
+        reader->end - reader->in == 1 && *reader->in == 1)
         reader->in++;
-    }
-    if (reader->run != 0 || reader->in != reader->end) {
+    if (reader->run != 0 || reader->in != reader->end)
         return FRAME_BAD_CODE;
-    }
     uint32_t crc = frame_crc32c(reader->crc, payload, header->size);
     return crc == bytes_get32(tail) ? FRAME_GOOD : FRAME_BAD_CRC;
 }

@@ -35,9 +35,8 @@ static void spread(struct cube *cube) {
 
 static void begin_generation(struct cube *cube) {
     cube->stamp = wiring_stamp(&cube->wiring);
-    for (unsigned d = 0; d < cube->count; d++) {
+    for (unsigned d = 0; d < cube->count; d++)
         cube->neighbours[d].together = false;
-    }
     routes_find(&cube->routes, &cube->wiring);
     cube_drop_all(cube);
 }
@@ -59,9 +58,8 @@ void cube_renew(struct cube *cube, const struct cube_wiring *next) {
         is_host(cube) && next->dead_count <= CUBE_DEAD_MAX &&
         (next->gateway == 0 || next->gateway == cube->config.spare_node));
     cube->wiring = *next;
-    if (!wiring_after(next->generation, present)) {
+    if (!wiring_after(next->generation, present))
         cube->wiring.generation = wiring_next(present);
-    }
     cube->wiring.host_epoch = cube->config.epoch;
     cube->wiring.wrong_count = 0;
     wiring_settle(&cube->wiring, cube->config.dimension);
@@ -82,24 +80,21 @@ static void outdo(struct cube *cube, const struct cube_wiring *theirs) {
 static void hear(struct cube *cube, const struct cube_wiring *theirs) {
     bool together = wiring_together(&cube->wiring, theirs);
     if (is_host(cube) && !together) {
-        if (!wiring_after(cube->wiring.generation, theirs->generation)) {
+        if (!wiring_after(cube->wiring.generation, theirs->generation))
             outdo(cube, theirs);
-        }
         return;
     }
     if (wiring_merge(&cube->wiring, theirs, cube->config.dimension)) {
-        if (!together) {
+        if (!together)
             begin_generation(cube);
-        }
         spread(cube);
     }
 }
 
 void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence) {
     struct cube_neighbour *n = &cube->neighbours[d];
-    if (!n->together || (int16_t)(sequence - n->since) > 0) {
+    if (!n->together || (int16_t)(sequence - n->since) > 0)
         n->since = sequence;
-    }
     n->together = true;
 }
 
@@ -113,13 +108,11 @@ static void take_datagram(struct cube *cube, unsigned d,
         return;
     }
     hear(cube, &theirs);
-    if (wiring_together(&theirs, &cube->wiring)) {
+    if (wiring_together(&theirs, &cube->wiring))
         cube_is_together(cube, d, datagram->sequence);
-    }
     cube->neighbours[d].agreed = wiring_same(&theirs, &cube->wiring);
-    if (ask && cube->neighbours[d].agreed) {
+    if (ask && cube->neighbours[d].agreed)
         tell(cube, d, now_us, false);
-    }
 }
 
 /* --- what this end finds itself ------------------------------------------ */
@@ -154,9 +147,8 @@ static bool look_for_dead(struct cube *cube, unsigned d, uint64_t passed_us) {
         n->quiet_us = 0;
         return false;
     }
-    if (n->quiet_us < count_us) {
+    if (n->quiet_us < count_us)
         n->quiet_us += passed_us < most_us ? (uint32_t)passed_us : most_us;
-    }
     return limit_us != 0 && n->quiet_us >= limit_us &&
            wiring_add_dead(&cube->wiring, name_of(cube, d),
                            cube->config.dimension);
@@ -173,17 +165,15 @@ static bool look_for_wrong(struct cube *cube, unsigned d) {
 static void look(struct cube *cube, uint64_t now_us) {
     uint64_t passed_us = now_us - cube->looked_us;
     bool news = false;
-    if (passed_us < CUBE_GOSSIP_US) {
+    if (passed_us < CUBE_GOSSIP_US)
         return;
-    }
     cube->looked_us = now_us;
     for (unsigned d = 0; d < cube->count; d++) {
         news |= look_for_dead(cube, d, passed_us);
         news |= look_for_wrong(cube, d);
     }
-    if (news) {
+    if (news)
         spread(cube);
-    }
 }
 
 bool cube_link_is_dead(const struct cube *cube, unsigned d) {
@@ -222,16 +212,13 @@ void cube_gossip(struct cube *cube, uint64_t now_us) {
     cube->now_us = now_us;
     look(cube, now_us);
     cube_note_comings(cube, now_us);
-    for (unsigned d = 0; d < cube->count; d++) {
-        if (link_take_datagram(cube->links[d], &datagram, &ask)) {
+    for (unsigned d = 0; d < cube->count; d++)
+        if (link_take_datagram(cube->links[d], &datagram, &ask))
             take_datagram(cube, d, &datagram, ask, now_us);
-        }
-    }
     for (unsigned d = 0; d < cube->count; d++) {
         struct cube_neighbour *n = &cube->neighbours[d];
-        if (lags(cube, d) && now_us - n->told_us >= CUBE_GOSSIP_US) {
+        if (lags(cube, d) && now_us - n->told_us >= CUBE_GOSSIP_US)
             tell(cube, d, now_us, true);
-        }
     }
 }
 
@@ -241,9 +228,8 @@ uint64_t cube_gossip_due_us(const struct cube *cube, uint64_t now_us) {
         const struct cube_neighbour *n = &cube->neighbours[d];
         uint64_t passed = now_us - n->told_us;
         uint64_t left = passed < CUBE_GOSSIP_US ? CUBE_GOSSIP_US - passed : 0;
-        if (lags(cube, d) && left < due) {
+        if (lags(cube, d) && left < due)
             due = left;
-        }
     }
     return due;
 }
@@ -285,9 +271,8 @@ void learner_init_ports(struct learner *learner, const struct link_pipe *pipes,
 static void push(struct learner *learner, unsigned d) {
     const struct link_pipe *pipe = &learner->pipes[d];
     unsigned left = learner->heard[d].ask_left;
-    if (left == 0) {
+    if (left == 0)
         return;
-    }
     int taken = pipe->send(pipe->context,
                            learner->ask + (learner->ask_size - left), left);
     LINK_ASSERT(taken <= (int)left);
@@ -305,21 +290,18 @@ void learner_ask(struct learner *learner, uint64_t now_us) {
     }
     for (unsigned d = 0; d < learner->links; d++) {
         if (due && learner->heard[d].ask_left == 0 &&
-            learner->pipes[d].send != NULL) {
+            learner->pipes[d].send != NULL)
             learner->heard[d].ask_left = (uint8_t)learner->ask_size;
-        }
         push(learner, d);
     }
 }
 
 /* Whether such a wire may be in a cube of that dimension. */
 static bool sensible(const struct learned *l, unsigned expected_link) {
-    if (l->dimension > CUBE_DIMENSION_MAX || l->self >= 1u << l->dimension) {
+    if (l->dimension > CUBE_DIMENSION_MAX || l->self >= 1u << l->dimension)
         return false;
-    }
-    if (l->teacher == CUBE_HOST) {
+    if (l->teacher == CUBE_HOST)
         return expected_link == l->dimension;
-    }
     return expected_link < l->dimension &&
            l->teacher == (l->self ^ 1u << expected_link);
 }
@@ -339,13 +321,11 @@ static bool fits(const struct learner *learner, const struct learned *l) {
 /* What another greeting says of who was found already. */
 static void hear_more(struct learner *learner, const struct learned *more) {
     struct learned *known = &learner->known;
-    if (more->self != known->self || more->dimension != known->dimension) {
+    if (more->self != known->self || more->dimension != known->dimension)
         return;
-    }
     known->host_port |= more->host_port;
-    if (more->epoch > known->epoch) {
+    if (more->epoch > known->epoch)
         known->epoch = more->epoch;
-    }
     learner->settled |= 1u << more->link;
 }
 
@@ -353,21 +333,18 @@ static void take_hello(struct learner *learner, unsigned d,
                        const uint8_t *hello) {
     struct learned l;
     unsigned expected = hello[6];
-    if (hello[0] != LINK_VERSION || hello[7] == 0) {
+    if (hello[0] != LINK_VERSION || hello[7] == 0)
         return;
-    }
     l.teacher = bytes_get16(hello + 2);
     l.self = bytes_get16(hello + 4);
     l.dimension = (uint8_t)(hello[7] - 1);
     l.link = (uint8_t)d;
     l.host_port = l.teacher == CUBE_HOST && l.self != 0;
     l.epoch = bytes_get32(hello + 12);
-    if (!sensible(&l, expected)) {
+    if (!sensible(&l, expected))
         return;
-    }
-    if (learner->ports && l.teacher == CUBE_HOST) {
+    if (learner->ports && l.teacher == CUBE_HOST)
         expected = learner->host_link;
-    }
     if (expected != d) {
         learner->misplaced++;
         learner->misplaced_link = (uint8_t)d;
@@ -389,14 +366,12 @@ static void take_frame(struct learner *learner, unsigned d,
                        const uint8_t *bytes, size_t size) {
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
-    if (!frame_decode(bytes, size, &header, hello, sizeof hello)) {
+    if (!frame_decode(bytes, size, &header, hello, sizeof hello))
         return;
-    }
-    if (header.kind == LINK_HELLO && header.size == LINK_HELLO_SIZE) {
+    if (header.kind == LINK_HELLO && header.size == LINK_HELLO_SIZE)
         take_hello(learner, d, hello);
-    } else if (header.kind == LINK_ACK && header.session == 0) {
+    else if (header.kind == LINK_ACK && header.session == 0)
         learner->settled |= 1u << d;
-    }
 }
 
 /* Whether no more is to be waited for. */
@@ -405,12 +380,10 @@ static bool is_complete(const struct learner *learner) {
     bool host = learner->host_link < CUBE_LINKS_MAX;
     uint32_t own = (1u << known->dimension) - 1;
     if (!learner->found || !learner->ports || learner->asks == 0 ||
-        learner->waited >= LEARN_ASKS) {
+        learner->waited >= LEARN_ASKS)
         return learner->found;
-    }
-    if (host && (known->self == 0 || learner->waited < LEARN_HOST_ASKS)) {
+    if (host && (known->self == 0 || learner->waited < LEARN_HOST_ASKS))
         own |= 1u << learner->host_link;
-    }
     return (learner->settled & own) == own;
 }
 
@@ -420,16 +393,14 @@ static void learn_hear(struct learner *learner, unsigned d) {
     uint8_t *bytes = learner->heard[d].bytes;
     unsigned size = learner->heard[d].size, begin = 0;
     int got = pipe->receive(pipe->context, bytes + size, LEARN_BYTES - size);
-    if (got <= 0) {
+    if (got <= 0)
         return;
-    }
     LINK_ASSERT((unsigned)got <= LEARN_BYTES - size);
     size += (unsigned)got;
     for (unsigned i = 0; i < size && !is_complete(learner); i++) {
         if (bytes[i] == 0) {
-            if (!learner->heard[d].skipping && i > begin) {
+            if (!learner->heard[d].skipping && i > begin)
                 take_frame(learner, d, bytes + begin, i - begin);
-            }
             learner->heard[d].skipping = false;
             begin = i + 1;
         }
@@ -444,9 +415,8 @@ static void learn_hear(struct learner *learner, unsigned d) {
 }
 
 bool learner_poll(struct learner *learner, struct learned *learned) {
-    for (unsigned d = 0; d < learner->links && !is_complete(learner); d++) {
+    for (unsigned d = 0; d < learner->links && !is_complete(learner); d++)
         learn_hear(learner, d);
-    }
     if (is_complete(learner)) {
         *learned = learner->known;
         return true;

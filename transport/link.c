@@ -27,9 +27,8 @@ static size_t receive_bytes(const struct link_config *c) {
 
 size_t link_bytes(const struct link_config *config) {
     struct link_config c = link_complete(config);
-    if (link_config_fault(config) != NULL) {
+    if (link_config_fault(config) != NULL)
         return 0;
-    }
     return up8(sizeof(struct link)) +
            up8(c.window * sizeof(struct link_send_slot)) +
            up8(c.window * sizeof(struct link_receive_slot)) +
@@ -47,9 +46,8 @@ struct link *link_init(void *memory, size_t bytes,
                        const struct link_config *config) {
     struct link_config c = link_complete(config);
     size_t needed = link_bytes(config);
-    if (needed == 0 || bytes < needed || (uintptr_t)memory % 8 != 0) {
+    if (needed == 0 || bytes < needed || (uintptr_t)memory % 8 != 0)
         return NULL;
-    }
     uint8_t *rest = memory;
     struct link *link = carve(&rest, sizeof *link);
     memset(link, 0, sizeof *link);
@@ -119,9 +117,8 @@ int link_write(struct link *link, const void *head, size_t head_size,
     struct link_sender *s = &link->send;
     size_t left = head_size + size;
     LINK_ASSERT(left <= link->config.message_max);
-    if (link_room(link, left) == 0) {
+    if (link_room(link, left) == 0)
         return LINK_AGAIN;
-    }
     link->statistics.messages_sent++;
     link->statistics.payload_sent += left;
     bool more = true;
@@ -139,9 +136,8 @@ int link_write(struct link *link, const void *head, size_t head_size,
         slot->state = LINK_WAITING;
         s->end++;
     }
-    if (link_used(link) > link->statistics.send_high_water) {
+    if (link_used(link) > link->statistics.send_high_water)
         link->statistics.send_high_water = link_used(link);
-    }
     return 0;
 }
 
@@ -149,9 +145,8 @@ bool link_read(struct link *link, struct link_message *message) {
     struct link_receiver *r = &link->receive;
     size_t stride = link->config.frame_payload;
     unsigned window = link->config.window, at = r->head, count = 1;
-    if (r->complete == 0) {
+    if (r->complete == 0)
         return false;
-    }
     message->size = r->slots[at].size;
     message->sequence = (uint16_t)(r->next - r->ready);
     while (r->slots[at].more) {
@@ -174,9 +169,8 @@ void link_release(struct link *link) {
     struct link_receiver *r = &link->receive;
     LINK_ASSERT(r->held > 0 && r->held <= r->complete);
     if (r->unreported == 0 &&
-        r->reported == (uint16_t)(r->next + link_credit(link))) {
+        r->reported == (uint16_t)(r->next + link_credit(link)))
         r->unreported_us = link->now_us;
-    }
     link->statistics.messages_received++;
     for (; r->held > 0; r->held--) {
         struct link_receive_slot *slot = &r->slots[r->head];
@@ -219,9 +213,8 @@ void link_put_datagram(struct link *link, const void *bytes, size_t size,
 bool link_take_datagram(struct link *link, struct link_message *datagram,
                         bool *ask) {
     struct link_datagrams *n = &link->datagrams;
-    if (!n->heard) {
+    if (!n->heard)
         return false;
-    }
     n->heard = false;
     datagram->data = n->in;
     datagram->size = n->in_size;
@@ -234,18 +227,16 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
 
 /* What a frame's session means for the two windows. */
 static void enter(struct link *link, enum link_session session) {
-    if (session == LINK_FOREIGN || session == LINK_PRESENT) {
+    if (session == LINK_FOREIGN || session == LINK_PRESENT)
         return;
-    }
     if (session == LINK_RESUMED) {
         link_send_resume(link);
     } else {
         uint8_t credit = link->candidate.credit;
-        if (session == LINK_RESTARTED) {
+        if (session == LINK_RESTARTED)
             link_send_reset(link, credit);
-        } else {
+        else
             link->send.limit = (uint16_t)(link->send.first + credit);
-        }
         link_receive_reset(link, (uint16_t)link->peer_epoch);
     }
     link->receive.ack_now = true;
@@ -255,9 +246,8 @@ static void enter(struct link *link, enum link_session session) {
 
 static void on_frame(struct link *link, struct link_frame *frame) {
     const struct frame_header *header = &frame->header;
-    if (link->tending && header->kind == LINK_BYE) {
+    if (link->tending && header->kind == LINK_BYE)
         return;
-    }
     if (header->kind != LINK_HELLO) {
         enum link_session session = link_accept_session(link, header->session);
         if (session == LINK_FOREIGN) {
@@ -274,11 +264,10 @@ static void on_frame(struct link *link, struct link_frame *frame) {
         link->receive.ack_now |= session != LINK_FOREIGN;
         enter(link, session);
     } else if (event != LINK_NOTHING) {
-        if (event == LINK_TOO_LONG) {
+        if (event == LINK_TOO_LONG)
             link_refuse_sizes(link);
-        } else if (event == LINK_FAREWELL) {
+        else if (event == LINK_FAREWELL)
             link_on_bye(link, header);
-        }
         link_on_acknowledge(link, header, frame->sack);
     }
 }
@@ -305,12 +294,10 @@ static int take_frames(struct link *link, int most) {
     int count = 0;
     while (count < most) {
         enum link_search found = link_find_frame(link, &frame);
-        if (found == LINK_NO_FRAME) {
+        if (found == LINK_NO_FRAME)
             break;
-        }
-        if (found == LINK_FOUND) {
+        if (found == LINK_FOUND)
             on_frame(link, &frame);
-        }
         count++;
     }
     return count;
@@ -319,9 +306,8 @@ static int take_frames(struct link *link, int most) {
 int link_poll_receive(struct link *link, uint64_t now_us) {
     int most = link->config.window + 2;
     link->now_us = now_us;
-    if (link->closing && link->closed) {
+    if (link->closing && link->closed)
         return 0;
-    }
     int count = take_frames(link, most);
     for (int calls = 0; calls < link->config.window && count < most; calls++) {
         enum link_fill fill = link_fill(link);
@@ -331,9 +317,8 @@ int link_poll_receive(struct link *link, uint64_t now_us) {
         }
         pipe_works(link);
         count += take_frames(link, most - count);
-        if (fill == LINK_FILL_SOME) {
+        if (fill == LINK_FILL_SOME)
             break;
-        }
     }
     return count;
 }
@@ -348,9 +333,8 @@ int link_tend_receive(struct link *link, uint64_t now_us) {
 /* One frame more, the most urgent; false: nothing to say. */
 static bool stage_one(struct link *link) {
     uint8_t hello[LINK_HELLO_SIZE];
-    if (!link_hello_due(link)) {
+    if (!link_hello_due(link))
         return link_stage_frame(link);
-    }
     link_make_hello(link, hello);
     link_stage_hello(link, hello);
     return true;
@@ -359,9 +343,8 @@ static bool stage_one(struct link *link) {
 /* Gives the pipe what is staged; false: it does not take all. */
 static bool flush(struct link *link) {
     enum link_flush status = link_flush(link);
-    if (status == LINK_FLUSH_CLOSED) {
+    if (status == LINK_FLUSH_CLOSED)
         pipe_lost(link);
-    }
     return status == LINK_FLUSH_DONE;
 }
 
@@ -374,18 +357,15 @@ int link_poll_send(struct link *link, uint64_t now_us) {
         link_forget_staged(link);
     }
     if (!link->pipe_up || (link->closing && link_has_parted(link)) ||
-        !flush(link)) {
+        !flush(link))
         return 0;
-    }
     link_run_timer(link);
     while (count < most) {
         int before = count;
-        while (count < most && link_staging_room(link) && stage_one(link)) {
+        while (count < most && link_staging_room(link) && stage_one(link))
             count++;
-        }
-        if (!flush(link) || count == before) {
+        if (!flush(link) || count == before)
             break;
-        }
     }
     return count;
 }
@@ -408,21 +388,16 @@ bool link_idle(const struct link *link) {
 }
 
 enum link_state link_state(const struct link *link) {
-    if (link->closed) {
+    if (link->closed)
         return link_has_parted(link) ? LINK_CLOSED : LINK_CLOSING;
-    }
-    if (link_refuses(link)) {
+    if (link_refuses(link))
         return LINK_REFUSED;
-    }
-    if (link->closing) {
+    if (link->closing)
         return LINK_CLOSING;
-    }
-    if (!link->pipe_up) {
+    if (!link->pipe_up)
         return LINK_DOWN;
-    }
-    if (!link->up) {
+    if (!link->up)
         return LINK_OPENING;
-    }
     return link->now_us - link->heard_us > link->config.silence_us ? LINK_SILENT
                                                                    : LINK_UP;
 }
@@ -448,32 +423,27 @@ uint64_t link_next_due_us(const struct link *link, uint64_t now_us) {
     const struct link_config *c = &link->config;
     const struct link_receiver *r = &link->receive;
     uint64_t due = c->keep_alive_us;
-    if (link->in.pending) {
+    if (link->in.pending)
         return 0;
-    }
-    if (link->stalled || (link->closed && !link->bye_due)) {
+    if (link->stalled || (link->closed && !link->bye_due))
         return due;
-    }
     if (!link->pipe_up || !link->up) {
         return link->pipe_up ? until(link->hello_us, c->hello_us, now_us)
                              : c->hello_us;
     }
     if (link_may_send(link) || link_ack_due(link) || link_hello_due(link) ||
-        link->datagrams.due) {
+        link->datagrams.due)
         return 0;
-    }
     due = until(link->sent_us, c->keep_alive_us, now_us);
     if (link->send.first != link->send.end) {
         due = least(due,
                     until(link->send.timer_us, link_timeout_us(link), now_us));
     }
     if (r->unreported > 0 ||
-        r->reported != (uint16_t)(r->next + link_credit(link))) {
+        r->reported != (uint16_t)(r->next + link_credit(link)))
         due = least(due, until(r->unreported_us, c->ack_delay_us, now_us));
-    }
-    if (link->candidate.epoch != 0) {
+    if (link->candidate.epoch != 0)
         due = least(due, until(link->hello_us, c->hello_us, now_us));
-    }
     if (link->closing) {
         uint64_t left =
             link->deadline_us > now_us ? link->deadline_us - now_us : 0;

@@ -8,9 +8,8 @@ void link_receive_reset(struct link *link, uint16_t first) {
     struct link_receiver *r = &link->receive;
     r->ready = r->complete;
     r->early = 0;
-    for (unsigned i = 0; i < link_credit(link); i++) {
+    for (unsigned i = 0; i < link_credit(link); i++)
         r->slots[link_slot_of(link, i)].full = false;
-    }
     r->next = first;
     r->reported = (uint16_t)(first + link_credit(link));
     r->unreported = 0;
@@ -32,14 +31,12 @@ static bool accept_next(struct link *link) {
     unsigned before = (unsigned)r->ready - r->complete;
     size_t size = (size_t)before * link->config.frame_payload + slot->size;
     if (size > link->config.message_max ||
-        (slot->more && before + 1u >= link->fragments_max)) {
+        (slot->more && before + 1u >= link->fragments_max))
         return false;
-    }
     r->next++;
     r->ready++;
-    if (!slot->more) {
+    if (!slot->more)
         r->complete = r->ready;
-    }
     return true;
 }
 
@@ -52,18 +49,16 @@ static bool advance(struct link *link) {
         r->early--;
         fits = accept_next(link);
     }
-    if (r->ready + r->early > link->statistics.receive_high_water) {
+    if (r->ready + r->early > link->statistics.receive_high_water)
         link->statistics.receive_high_water = (uint32_t)(r->ready + r->early);
-    }
     return fits;
 }
 
 /* False: as above. */
 static bool stored(struct link *link, unsigned offset) {
     struct link_receiver *r = &link->receive;
-    if (r->unreported++ == 0) {
+    if (r->unreported++ == 0)
         r->unreported_us = link->now_us;
-    }
     if (offset > 0) {
         r->early++;
         r->ack_now = true;
@@ -88,9 +83,8 @@ static enum frame_result take_data(struct link *link, struct link_frame *frame,
         r->ack_now = true;
         return FRAME_GOOD;
     }
-    if (header->size > payload_max || (more && header->size != payload_max)) {
+    if (header->size > payload_max || (more && header->size != payload_max))
         return FRAME_BAD_CODE;
-    }
     unsigned at = link_slot_of(link, offset);
     struct link_receive_slot *slot = &r->slots[at];
     if (slot->full && offset > 0) {
@@ -137,27 +131,23 @@ static enum frame_result take_control(struct link *link,
                                       struct link_frame *frame,
                                       enum link_event *event) {
     const struct frame_header *header = &frame->header;
-    if (!size_fits(header->kind, header->size)) {
+    if (!size_fits(header->kind, header->size))
         return FRAME_BAD_CODE;
-    }
     enum frame_result result =
         frame_take(&frame->reader, header, frame->payload);
-    if (result != FRAME_GOOD) {
+    if (result != FRAME_GOOD)
         return result;
-    }
     link->statistics.frames_received++;
     *event = header->kind == LINK_HELLO ? LINK_GREETED : LINK_ACKNOWLEDGED;
     if (header->kind == LINK_STATE) {
         on_datagram(link, frame);
     } else if (header->kind != LINK_HELLO) {
-        for (unsigned i = 0; i < header->size; i++) {
+        for (unsigned i = 0; i < header->size; i++)
             frame->sack |= (uint64_t)frame->payload[i] << 8 * i;
-        }
         link->receive.ack_now |= (header->flags & LINK_ASK) != 0;
     }
-    if (header->kind == LINK_BYE) {
+    if (header->kind == LINK_BYE)
         *event = LINK_FAREWELL;
-    }
     return FRAME_GOOD;
 }
 
@@ -171,11 +161,10 @@ static void count_result(struct link *link, enum frame_result result) {
 enum link_event link_take_frame(struct link *link, struct link_frame *frame) {
     enum link_event event = LINK_NOTHING;
     frame->sack = 0;
-    if (frame->header.kind != LINK_DATA) {
+    if (frame->header.kind != LINK_DATA)
         count_result(link, take_control(link, frame, &event));
-    } else if (link->up) {
+    else if (link->up)
         count_result(link, take_data(link, frame, &event));
-    }
     return event;
 }
 
@@ -209,9 +198,8 @@ static void make_room(struct link *link) {
     struct link_bytes_in *in = &link->in;
     size_t frame_max = link_frame_bytes(&link->config);
     size_t left = in->end - in->begin;
-    if (in->pending) {
+    if (in->pending)
         return;
-    }
     if (in->skipping || left > frame_max) {
         link->statistics.resynchronised += !in->skipping;
         in->skipping = true;
@@ -233,9 +221,8 @@ enum link_fill link_fill(struct link *link) {
     make_room(link);
     size_t room = link->buffer_bytes - in->end;
     int got = pipe->receive(pipe->context, in->bytes + in->end, room);
-    if (got < 0) {
+    if (got < 0)
         return LINK_FILL_CLOSED;
-    }
     LINK_ASSERT((size_t)got <= room);
     link->statistics.bytes_received += (unsigned)got;
     in->end += (size_t)got;
@@ -306,21 +293,17 @@ static uint32_t session_to(const struct link *link, uint32_t peer_epoch) {
 static enum link_refusal fits(const struct link *link, const uint8_t *hello) {
     const struct link_config *c = &link->config;
     unsigned window = bytes_get16(hello + 16);
-    if (hello[0] != LINK_VERSION) {
+    if (hello[0] != LINK_VERSION)
         return LINK_WRONG_VERSION;
-    }
     if (bytes_get16(hello + 2) != c->peer_node || hello[1] != c->peer_port ||
-        bytes_get16(hello + 4) != c->node || hello[6] != c->port) {
+        bytes_get16(hello + 4) != c->node || hello[6] != c->port)
         return LINK_WRONG_WIRE;
-    }
-    if (hello[7] != 0 && c->greeting != 0 && hello[7] != c->greeting) {
+    if (hello[7] != 0 && c->greeting != 0 && hello[7] != c->greeting)
         return LINK_WRONG_GREETING;
-    }
     if (bytes_get16(hello + 18) != c->frame_payload ||
         bytes_get16(hello + 20) != c->message_max ||
-        window < link->fragments_max || window > LINK_WINDOW_MAX) {
+        window < link->fragments_max || window > LINK_WINDOW_MAX)
         return LINK_WRONG_SIZES;
-    }
     return LINK_FITS;
 }
 
@@ -352,9 +335,8 @@ static void describe_peer(struct link *link, const uint8_t *hello) {
         link->told_us = link->now_us;
     }
     peer->refusal = fits(link, hello);
-    if (peer->refusal == LINK_FITS && in_use) {
+    if (peer->refusal == LINK_FITS && in_use)
         peer->refusal = LINK_IN_USE;
-    }
 }
 
 /* Whether another epoch greets while the present peer is alive. */
@@ -382,20 +364,17 @@ static enum link_session start_session(struct link *link) {
 }
 
 enum link_session link_accept_session(struct link *link, uint32_t session) {
-    if (link_refuses(link)) {
+    if (link_refuses(link))
         return LINK_FOREIGN;
-    }
     if (link->peer_epoch != 0 && session == link->session_in) {
-        if (link->up || link->closed) {
+        if (link->up || link->closed)
             return LINK_PRESENT;
-        }
         link->statistics.resumed++;
         link->up = true;
         return LINK_RESUMED;
     }
-    if (link->candidate.epoch != 0 && session == link->candidate.session_in) {
+    if (link->candidate.epoch != 0 && session == link->candidate.session_in)
         return start_session(link);
-    }
     return LINK_FOREIGN;
 }
 
@@ -403,18 +382,16 @@ enum link_session link_on_hello(struct link *link,
                                 const struct frame_header *header,
                                 const uint8_t hello[LINK_HELLO_SIZE]) {
     uint32_t epoch = bytes_get32(hello + 8), mine = bytes_get32(hello + 12);
-    if (epoch == 0 || link->closing) {
+    if (epoch == 0 || link->closing)
         return LINK_FOREIGN;
-    }
     if (intrudes(link, epoch)) {
         link->intruder = epoch;
         link->hello_now = true;
         return LINK_FOREIGN;
     }
     link->heard_us = link->now_us;
-    if (epoch == link->peer_epoch) {
+    if (epoch == link->peer_epoch)
         link->kept_us = link->now_us;
-    }
     describe_peer(link, hello);
     if (link_refuses(link)) {
         link->up = false;
@@ -436,9 +413,8 @@ enum link_session link_on_hello(struct link *link,
 }
 
 void link_greet(struct link *link) {
-    if (link->now_us - link->hello_us >= link->config.hello_us) {
+    if (link->now_us - link->hello_us >= link->config.hello_us)
         link->hello_now = true;
-    }
 }
 
 bool link_hello_due(const struct link *link) {
@@ -455,9 +431,8 @@ void link_make_hello(struct link *link, uint8_t hello[LINK_HELLO_SIZE]) {
     link->hello_us = link->now_us;
     link->hello_now = false;
     link->intruder = 0;
-    if (c->epoch != 0 && c->hellos_left-- == 0) {
+    if (c->epoch != 0 && c->hellos_left-- == 0)
         c->epoch = 0;
-    }
 }
 
 void link_refuse_sizes(struct link *link) {

@@ -39,9 +39,8 @@ static void measure(struct link *link, uint32_t rtt) {
     s->rtt_max_us = rtt > s->rtt_max_us ? rtt : s->rtt_max_us;
     uint64_t timeout = (uint64_t)s->rtt_us + 4 * (uint64_t)*variation +
                        link->config.ack_delay_us;
-    if (timeout < link->config.timeout_min_us) {
+    if (timeout < link->config.timeout_min_us)
         timeout = link->config.timeout_min_us;
-    }
     uint64_t most = (uint64_t)MEASURED_MAX * link->config.timeout_max_us;
     most = most < UINT32_MAX ? most : UINT32_MAX;
     s->timeout_us = (uint32_t)(timeout < most ? timeout : most);
@@ -61,16 +60,14 @@ static void slot_arrived(struct link *link, struct link_send_slot *slot,
     slot->state = LINK_ARRIVED;
     news->any = true;
     if (!slot->again) {
-        if (!news->sampled || elapsed < news->rtt_us) {
+        if (!news->sampled || elapsed < news->rtt_us)
             news->rtt_us = elapsed;
-        }
         news->sampled = true;
     } else if (elapsed < link->statistics.rtt_min_us) {
         return; /* that was an earlier transmission of it */
     }
-    if (!news->ordered || (int32_t)(slot->order - news->order) > 0) {
+    if (!news->ordered || (int32_t)(slot->order - news->order) > 0)
         news->order = slot->order;
-    }
     news->ordered = true;
 }
 
@@ -91,11 +88,10 @@ static void mark_lost(struct link *link, uint32_t order) {
 static void free_first(struct link *link, struct news *news) {
     struct link_sender *s = &link->send;
     struct link_send_slot *slot = &s->slots[s->head];
-    if (slot->state == LINK_ARRIVED) {
+    if (slot->state == LINK_ARRIVED)
         s->arrived--;
-    } else {
+    else
         slot_arrived(link, slot, news);
-    }
     s->head = (uint16_t)link_sent_slot(link, 1);
     s->first++;
 }
@@ -119,21 +115,18 @@ void link_on_acknowledge(struct link *link, const struct frame_header *header,
     unsigned freed = (uint16_t)(header->acknowledge - s->first);
     uint16_t limit = (uint16_t)(header->acknowledge + header->credit);
     struct news news = {false, false, false, 0, 0};
-    if (freed > in_flight(link) || header->credit > LINK_WINDOW_MAX) {
+    if (freed > in_flight(link) || header->credit > LINK_WINDOW_MAX)
         return; /* repeated by the pipe, or not for us */
-    }
     bool again = false;
     for (unsigned i = 0; i < freed; i++) {
         again |= s->slots[s->head].again;
         free_first(link, &news);
     }
     mark_acknowledged(link, header->acknowledge, sack, &news);
-    if (news.ordered && (sack != 0 || again || s->arrived > 0)) {
+    if (news.ordered && (sack != 0 || again || s->arrived > 0))
         mark_lost(link, news.order);
-    }
-    if (news.sampled) {
+    if (news.sampled)
         measure(link, news.rtt_us);
-    }
     if ((int16_t)(limit - s->limit) > 0) {
         s->limit = limit;
         news.any = true;
@@ -183,9 +176,8 @@ bool link_ack_due(const struct link *link) {
     unsigned half = window > 1 ? window / 2 : 1;
     uint16_t limit = (uint16_t)(r->next + link_credit(link));
     unsigned gained = (uint16_t)(limit - r->reported);
-    if (!link->up) {
+    if (!link->up)
         return false;
-    }
     return r->ack_now || gained >= half ||
            (r->unreported >= half && window < link->config.window) ||
            ((r->unreported > 0 || gained > 0) &&
@@ -228,23 +220,19 @@ static void stage(struct link *link, unsigned kind, unsigned flags,
 static uint64_t sack_of(const struct link *link) {
     uint64_t bits = 0;
     unsigned credit = link_credit(link);
-    if (link->receive.early == 0) {
+    if (link->receive.early == 0)
         return 0;
-    }
-    for (unsigned i = 1; i < credit; i++) {
-        if (link->receive.slots[link_slot_of(link, i)].full) {
+    for (unsigned i = 1; i < credit; i++)
+        if (link->receive.slots[link_slot_of(link, i)].full)
             bits |= (uint64_t)1 << (i - 1);
-        }
-    }
     return bits;
 }
 
 static void stage_ack(struct link *link, unsigned flags) {
     uint8_t bytes[LINK_SACK_SIZE];
     uint64_t sack = sack_of(link);
-    for (unsigned i = 0; i < sizeof bytes; i++) {
+    for (unsigned i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)(sack >> 8 * i);
-    }
     stage(link, LINK_ACK, flags, link->send.next, bytes,
           sack != 0 ? sizeof bytes : 0);
     link->receive.ack_now = false;
@@ -278,9 +266,8 @@ static void stage_again(struct link *link) {
 static void stage_next(struct link *link) {
     struct link_sender *s = &link->send;
     unsigned offset = in_flight(link);
-    if (offset == 0) {
+    if (offset == 0)
         s->timer_us = link->now_us;
-    }
     s->slots[link_sent_slot(link, offset)].again = false;
     s->inside = (s->slots[link_sent_slot(link, offset)].flags & LINK_MORE) != 0;
     stage_slot(link, offset);
@@ -326,16 +313,14 @@ void link_run_timer(struct link *link) {
     bool waits = in_flight(link) > 0;
     bool starves = !waits && s->next != s->end && !may_send_next(link);
     link->statistics.starved += s->next != s->end && !may_send_next(link);
-    if (!link->up || (!waits && !starves) || s->lost > 0) {
+    if (!link->up || (!waits && !starves) || s->lost > 0)
         return;
-    }
     if (link->out.end > link->out.begin) {
         s->timer_us = link->now_us; /* it has not left yet */
         return;
     }
-    if (link->now_us - s->timer_us < link_timeout_us(link)) {
+    if (link->now_us - s->timer_us < link_timeout_us(link))
         return;
-    }
     if (waits) {
         timeout(link);
     } else {
@@ -343,9 +328,8 @@ void link_run_timer(struct link *link) {
         link->statistics.probes_sent++;
     }
     s->timer_us = link->now_us;
-    if (s->backoff < BACKOFF_MAX) {
+    if (s->backoff < BACKOFF_MAX)
         s->backoff++;
-    }
 }
 
 /* --- bytes --------------------------------------------------------------- */
@@ -362,9 +346,8 @@ enum link_flush link_flush(struct link *link) {
     while (out->begin < out->end) {
         size_t left = out->end - out->begin;
         int taken = pipe->send(pipe->context, out->bytes + out->begin, left);
-        if (taken < 0) {
+        if (taken < 0)
             return LINK_FLUSH_CLOSED;
-        }
         LINK_ASSERT((size_t)taken <= left);
         out->begin += (size_t)taken;
         link->statistics.bytes_sent += (unsigned)taken;
@@ -405,19 +388,17 @@ bool link_stage_frame(struct link *link) {
         link->bye_due = false;
         return true;
     }
-    if (!link->up) {
+    if (!link->up)
         return false;
-    }
-    if (link->datagrams.due) {
+    if (link->datagrams.due)
         stage_datagram(link);
-    } else if (link->receive.ack_now && link->receive.early > 0) {
+    else if (link->receive.ack_now && link->receive.early > 0)
         stage_ack(link, 0);
-    } else if (link->send.lost > 0) {
+    else if (link->send.lost > 0)
         stage_again(link);
-    } else if (may_send_next(link)) {
+    else if (may_send_next(link))
         stage_next(link);
-    } else {
+    else
         return stage_control(link);
-    }
     return true;
 }

@@ -13,16 +13,14 @@ static_assert(WIRING_BYTES_MAX <= (int)LINK_DATAGRAM_MAX,
 /* --- bytes --------------------------------------------------------------- */
 
 static void put(uint8_t **at, uint32_t value, unsigned bytes) {
-    for (unsigned i = 0; i < bytes; i++) {
+    for (unsigned i = 0; i < bytes; i++)
         *(*at)++ = (uint8_t)(value >> 8 * i);
-    }
 }
 
 static uint32_t get(const uint8_t **at, unsigned bytes) {
     uint32_t value = 0;
-    for (unsigned i = 0; i < bytes; i++) {
+    for (unsigned i = 0; i < bytes; i++)
         value |= (uint32_t) * (*at)++ << 8 * i;
-    }
     return value;
 }
 
@@ -72,9 +70,8 @@ bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b) {
 bool wiring_after(uint32_t b, uint32_t a) {
     const uint32_t half = UINT32_C(1) << 31;
     uint32_t ahead = b - a;
-    if (a == 0 || b == 0) {
+    if (a == 0 || b == 0)
         return b != 0;
-    }
     return ahead == half ? b > a : ahead != 0 && ahead < half;
 }
 
@@ -106,9 +103,8 @@ bool wiring_is_dead(const struct cube_wiring *wiring, unsigned count,
         const struct cube_dead *d = &wiring->dead[i];
         if (d->dimension == CUBE_WHOLE_NODE
                 ? d->node == node || d->node == other
-                : d->node == lower && d->dimension == link) {
+                : d->node == lower && d->dimension == link)
             return true;
-        }
     }
     return false;
 }
@@ -116,33 +112,28 @@ bool wiring_is_dead(const struct cube_wiring *wiring, unsigned count,
 static bool node_is_dead(const struct cube_wiring *wiring, unsigned node) {
     for (unsigned i = 0; i < wiring->dead_count; i++) {
         const struct cube_dead *d = &wiring->dead[i];
-        if (d->dimension == CUBE_WHOLE_NODE && d->node == node) {
+        if (d->dimension == CUBE_WHOLE_NODE && d->node == node)
             return true;
-        }
     }
     return false;
 }
 
 bool wiring_add_dead(struct cube_wiring *wiring, struct cube_dead dead,
                      unsigned dimension) {
-    if (dead.dimension != CUBE_WHOLE_NODE && dead.dimension < dimension) {
+    if (dead.dimension != CUBE_WHOLE_NODE && dead.dimension < dimension)
         dead.node = (uint16_t)(dead.node & ~(1u << dead.dimension));
-    }
     if (dead.dimension == CUBE_WHOLE_NODE
             ? node_is_dead(wiring, dead.node)
             : wiring_is_dead(wiring, wiring->settled, dead.node, dead.dimension,
-                             dimension)) {
+                             dimension))
         return false;
-    }
     unsigned at = wiring->settled, count = wiring->dead_count;
     uint32_t rank = rank_of_dead(&dead);
-    while (at < count && rank_of_dead(&wiring->dead[at]) < rank) {
+    while (at < count && rank_of_dead(&wiring->dead[at]) < rank)
         at++;
-    }
     if (at == CUBE_DEAD_MAX ||
-        (at < count && rank_of_dead(&wiring->dead[at]) == rank)) {
+        (at < count && rank_of_dead(&wiring->dead[at]) == rank))
         return false;
-    }
     count -= count == CUBE_DEAD_MAX;
     memmove(&wiring->dead[at + 1], &wiring->dead[at],
             (count - at) * sizeof dead);
@@ -154,13 +145,11 @@ bool wiring_add_dead(struct cube_wiring *wiring, struct cube_dead dead,
 bool wiring_add_wrong(struct cube_wiring *wiring, struct cube_wrong wrong) {
     unsigned at = 0, count = wiring->wrong_count;
     uint64_t rank = rank_of_wrong(&wrong);
-    while (at < count && rank_of_wrong(&wiring->wrong[at]) < rank) {
+    while (at < count && rank_of_wrong(&wiring->wrong[at]) < rank)
         at++;
-    }
     if (at == CUBE_WRONG_MAX ||
-        (at < count && rank_of_wrong(&wiring->wrong[at]) == rank)) {
+        (at < count && rank_of_wrong(&wiring->wrong[at]) == rank))
         return false;
-    }
     count -= count == CUBE_WRONG_MAX;
     memmove(&wiring->wrong[at + 1], &wiring->wrong[at],
             (count - at) * sizeof wrong);
@@ -172,19 +161,16 @@ bool wiring_add_wrong(struct cube_wiring *wiring, struct cube_wrong wrong) {
 bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
                   unsigned dimension) {
     bool changed = false;
-    if (wiring_newer(mine, theirs)) {
+    if (wiring_newer(mine, theirs))
         return false;
-    }
     if (wiring_newer(theirs, mine)) {
         *mine = *theirs;
         return true;
     }
-    for (unsigned i = 0; i < theirs->dead_count; i++) {
+    for (unsigned i = 0; i < theirs->dead_count; i++)
         changed |= wiring_add_dead(mine, theirs->dead[i], dimension);
-    }
-    for (unsigned i = 0; i < theirs->wrong_count; i++) {
+    for (unsigned i = 0; i < theirs->wrong_count; i++)
         changed |= wiring_add_wrong(mine, theirs->wrong[i]);
-    }
     return changed;
 }
 
@@ -213,12 +199,10 @@ static bool in_order(const struct cube_wiring *wiring, unsigned dimension) {
     struct cube_wiring again = *wiring;
     again.dead_count = again.settled;
     again.wrong_count = 0;
-    for (unsigned i = wiring->settled; i < wiring->dead_count; i++) {
+    for (unsigned i = wiring->settled; i < wiring->dead_count; i++)
         (void)wiring_add_dead(&again, wiring->dead[i], dimension);
-    }
-    for (unsigned i = 0; i < wiring->wrong_count; i++) {
+    for (unsigned i = 0; i < wiring->wrong_count; i++)
         (void)wiring_add_wrong(&again, wiring->wrong[i]);
-    }
     return wiring_same(&again, wiring);
 }
 
@@ -226,9 +210,8 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
                    size_t size, unsigned dimension) {
     const uint8_t *at = bytes;
     memset(wiring, 0, sizeof *wiring);
-    if (size < WIRING_HEAD) {
+    if (size < WIRING_HEAD)
         return false;
-    }
     wiring->generation = get(&at, 4);
     wiring->host_epoch = get(&at, 4);
     wiring->gateway = (uint16_t)get(&at, 2);
@@ -240,9 +223,8 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
         wiring->settled > wiring->dead_count ||
         wiring->wrong_count > CUBE_WRONG_MAX ||
         size !=
-            WIRING_HEAD + 3u * wiring->dead_count + 7u * wiring->wrong_count) {
+            WIRING_HEAD + 3u * wiring->dead_count + 7u * wiring->wrong_count)
         return false;
-    }
     for (unsigned i = 0; i < wiring->dead_count; i++) {
         wiring->dead[i].node = (uint16_t)get(&at, 2);
         wiring->dead[i].dimension = (uint8_t)get(&at, 1);
@@ -264,9 +246,8 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
 static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
                            unsigned dimension) {
     bool all = dimension > 0 && node != wiring->gateway;
-    for (unsigned d = 0; d < dimension; d++) {
+    for (unsigned d = 0; d < dimension; d++)
         all &= wiring_is_dead(wiring, wiring->dead_count, node, d, dimension);
-    }
     return all;
 }
 
@@ -278,20 +259,16 @@ void wiring_settle(struct cube_wiring *wiring, unsigned dimension) {
         unsigned d = wiring->dead[i].dimension;
         for (unsigned end = 0; end < 2; end++) {
             if (d == CUBE_WHOLE_NODE ||
-                all_links_dead(&whole, node.node, dimension)) {
+                all_links_dead(&whole, node.node, dimension))
                 (void)wiring_add_dead(&settled, node, dimension);
-            }
-            if (d != CUBE_WHOLE_NODE && d < dimension) {
+            if (d != CUBE_WHOLE_NODE && d < dimension)
                 node.node = (uint16_t)(node.node ^ 1u << d);
-            }
         }
     }
     settled.settled = settled.dead_count;
-    for (unsigned i = 0; i < wiring->dead_count; i++) {
-        if (wiring->dead[i].dimension != CUBE_WHOLE_NODE) {
+    for (unsigned i = 0; i < wiring->dead_count; i++)
+        if (wiring->dead[i].dimension != CUBE_WHOLE_NODE)
             (void)wiring_add_dead(&settled, wiring->dead[i], dimension);
-        }
-    }
     settled.settled = settled.dead_count;
     *wiring = settled;
 }
@@ -335,11 +312,10 @@ static unsigned place_of(const struct routes *routes, unsigned node) {
     unsigned low = 0, high = routes->altered_count;
     while (low < high) {
         unsigned middle = (low + high) / 2;
-        if (routes->altered[middle].node < node) {
+        if (routes->altered[middle].node < node)
             low = middle + 1;
-        } else {
+        else
             high = middle;
-        }
     }
     return low;
 }
@@ -351,9 +327,8 @@ static unsigned usual_parent(const struct routes *routes, unsigned node) {
 
 static unsigned parent_of(const struct routes *routes, unsigned node) {
     unsigned place = place_of(routes, node);
-    if (place < routes->altered_count && routes->altered[place].node == node) {
+    if (place < routes->altered_count && routes->altered[place].node == node)
         return routes->altered[place].parent;
-    }
     return usual_parent(routes, node);
 }
 
@@ -389,23 +364,19 @@ static bool link_is_dead(const struct routes *routes, unsigned node,
 
 static bool routes_node_is_dead(const struct routes *routes, unsigned node) {
     const struct cube_wiring *w = &routes->wiring;
-    for (unsigned i = 0; i < w->dead_count; i++) {
-        if (w->dead[i].dimension == CUBE_WHOLE_NODE &&
-            w->dead[i].node == node) {
+    for (unsigned i = 0; i < w->dead_count; i++)
+        if (w->dead[i].dimension == CUBE_WHOLE_NODE && w->dead[i].node == node)
             return true;
-        }
-    }
     return false;
 }
 
 /* The lower end of the tree's link between two neighbours hangs free. */
 static void set_free(struct routes *routes, unsigned node, unsigned link) {
     unsigned other = node ^ 1u << link;
-    if (usual_parent(routes, node) == other) {
+    if (usual_parent(routes, node) == other)
         set_parent(routes, node, ROUTES_NONE);
-    } else if (usual_parent(routes, other) == node) {
+    else if (usual_parent(routes, other) == node)
         set_parent(routes, other, ROUTES_NONE);
-    }
 }
 
 /* --- the tree ------------------------------------------------------------ */
@@ -424,14 +395,12 @@ static void tie(struct routes *routes, unsigned node, unsigned parent) {
 static bool try_to_tie(struct routes *routes, unsigned root) {
     unsigned gateway = routes->wiring.gateway;
     unsigned nodes = 1u << lowest_bit(root ^ gateway);
-    if (routes_node_is_dead(routes, root)) {
+    if (routes_node_is_dead(routes, root))
         return false;
-    }
     for (unsigned i = 0; i < nodes; i++) {
         unsigned node = root ^ i;
-        if (root_of(routes, node) != root) {
+        if (root_of(routes, node) != root)
             continue;
-        }
         for (unsigned d = 0; d < routes->dimension; d++) {
             unsigned other = node ^ 1u << d;
             if (!link_is_dead(routes, node, d) &&
@@ -453,9 +422,8 @@ static void tie_all(struct routes *routes) {
         while (place < routes->altered_count) {
             const struct routes_altered *a = &routes->altered[place];
             unsigned node = a->node;
-            if (a->parent == ROUTES_NONE && node != routes->wiring.gateway) {
+            if (a->parent == ROUTES_NONE && node != routes->wiring.gateway)
                 more |= try_to_tie(routes, node);
-            }
             place = place_of(routes, node + 1);
         }
     }
@@ -466,11 +434,9 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring) {
     *w = *wiring;
     w->dead_count = 0;
     routes->altered_count = 0;
-    for (unsigned i = 0; i < wiring->settled; i++) {
-        if (wiring->dead[i].dimension != routes->dimension) {
+    for (unsigned i = 0; i < wiring->settled; i++)
+        if (wiring->dead[i].dimension != routes->dimension)
             w->dead[w->dead_count++] = wiring->dead[i];
-        }
-    }
     routes->tree = w->dead_count > 0;
     for (unsigned i = 0; i < w->dead_count; i++) {
         unsigned node = w->dead[i].node, link = w->dead[i].dimension;
@@ -478,12 +444,10 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring) {
             set_free(routes, node, link);
             continue;
         }
-        if (node != w->gateway) {
+        if (node != w->gateway)
             set_parent(routes, node, ROUTES_NONE);
-        }
-        for (unsigned d = 0; d < routes->dimension; d++) {
+        for (unsigned d = 0; d < routes->dimension; d++)
             set_free(routes, node, d);
-        }
     }
     tie_all(routes);
 }
@@ -496,12 +460,10 @@ bool routes_reach(const struct routes *routes, unsigned node) {
 
 unsigned routes_way(const struct routes *routes, unsigned self, unsigned dest) {
     LINK_ASSERT(self != dest);
-    if (!routes->tree) {
+    if (!routes->tree)
         return lowest_bit(self ^ dest);
-    }
-    if (!routes_reach(routes, dest) || !routes_reach(routes, self)) {
+    if (!routes_reach(routes, dest) || !routes_reach(routes, self))
         return ROUTES_NONE;
-    }
     unsigned node = dest, parent = parent_of(routes, node);
     while (parent != ROUTES_NONE && parent != self) {
         node = parent;
@@ -535,16 +497,14 @@ static uint32_t binomial(const struct routes *routes, unsigned relative) {
 uint32_t routes_to_all(const struct routes *routes, unsigned self,
                        unsigned root) {
     uint32_t ways = 0;
-    if (!routes->tree) {
+    if (!routes->tree)
         return binomial(routes, self ^ root);
-    }
     for (unsigned d = 0; d < routes->dimension && routes_reach(routes, self);
          d++) {
         unsigned other = self ^ 1u << d;
         if (parent_of(routes, self) == other ||
-            (parent_of(routes, other) == self)) {
+            (parent_of(routes, other) == self))
             ways |= (uint32_t)1 << d;
-        }
     }
     return ways;
 }

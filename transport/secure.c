@@ -33,9 +33,8 @@ bool secure_seed_draw(struct secure_source *source,
         source->random != NULL &&
         source->random(source->context, drawn + RANDOM, SECURE_KEY_BYTES);
     memset(seed, 0, sizeof *seed);
-    if (!random && source->boot == 0) {
+    if (!random && source->boot == 0)
         return false;
-    }
     LINK_ASSERT(source->draws < UINT64_MAX);
     memcpy(drawn, label, sizeof label);
     memcpy(drawn + DEVICE, source->device, SECURE_DEVICE_BYTES);
@@ -110,9 +109,8 @@ static void make_tag(uint8_t tag[SECURE_TAG_BYTES],
 /* In a time that says nothing of the bytes. */
 static bool is_same(const uint8_t *a, const uint8_t *b, size_t size) {
     unsigned bits = 0;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         bits |= a[i] ^ b[i];
-    }
     return bits == 0;
 }
 
@@ -138,9 +136,8 @@ void secure_shake_init(struct secure_shake *shake,
     memcpy(greeting + NONCE, seed->nonce, SECURE_NONCE_BYTES);
     make_tag(greeting + TAG, self, greeting);
     shake->out_end = SECURE_GREETING_BYTES;
-    if (self->caller) {
+    if (self->caller)
         put_point(shake);
-    }
 }
 
 /* What is wrong with what has come of a greeting. */
@@ -153,12 +150,10 @@ static enum secure_fault hear_greeting(struct secure_shake *shake) {
         return link_greets(shake->in, shake->in_end) ? SECURE_NO_KEY
                                                      : SECURE_NO_GREETING;
     }
-    if (memcmp(shake->in, mark, have) != 0) {
+    if (memcmp(shake->in, mark, have) != 0)
         return SECURE_OTHER_VERSION;
-    }
-    if (shake->in_end < SECURE_GREETING_BYTES) {
+    if (shake->in_end < SECURE_GREETING_BYTES)
         return SECURE_SOUND;
-    }
     make_tag(tag, &shake->self, shake->in);
     shake->greeted = is_same(tag, shake->in + TAG, sizeof tag) &&
                      shake->in[ROLE] == (shake->self.caller ? 'l' : 'c');
@@ -192,12 +187,10 @@ static bool derive(struct secure_shake *shake) {
  * empty record. */
 static enum secure_fault take_point(struct secure_shake *shake) {
     uint8_t *proof = shake->out + SECURE_POINT_END;
-    if (!shake->self.caller) {
+    if (!shake->self.caller)
         put_point(shake);
-    }
-    if (!derive(shake)) {
+    if (!derive(shake))
         return SECURE_OTHER_KEY;
-    }
     put_head(proof, 0, shake->keys.out_count);
     shake->self.suite->seal(proof + SECURE_HEAD_BYTES, proof, 0, proof,
                             shake->keys.out_count++, shake->keys.out);
@@ -217,9 +210,8 @@ static enum secure_fault take_proof(struct secure_shake *shake) {
 
 static enum secure_fault send_opening(struct secure_shake *shake,
                                       const struct link_pipe *pipe) {
-    if (shake->out_begin == shake->out_end) {
+    if (shake->out_begin == shake->out_end)
         return SECURE_SOUND;
-    }
     int sent = pipe->send(pipe->context, shake->out + shake->out_begin,
                           shake->out_end - shake->out_begin);
     shake->out_begin += sent > 0 ? (size_t)sent : 0;
@@ -231,21 +223,17 @@ static enum secure_fault receive_opening(struct secure_shake *shake,
     size_t want = shake->derived   ? SECURE_OPENING_BYTES
                   : shake->greeted ? SECURE_POINT_END
                                    : SECURE_GREETING_BYTES;
-    if (shake->proven) {
+    if (shake->proven)
         return SECURE_SOUND;
-    }
     int got = pipe->receive(pipe->context, shake->in + shake->in_end,
                             want - shake->in_end);
     shake->in_end += got > 0 ? (size_t)got : 0;
-    if (got <= 0) {
+    if (got <= 0)
         return got < 0 ? SECURE_GONE : SECURE_SOUND;
-    }
-    if (!shake->greeted) {
+    if (!shake->greeted)
         return hear_greeting(shake);
-    }
-    if (shake->in_end < want) {
+    if (shake->in_end < want)
         return SECURE_SOUND;
-    }
     return shake->derived ? take_proof(shake) : take_point(shake);
 }
 
@@ -254,20 +242,17 @@ static enum secure_fault exchange(struct secure_shake *shake,
     /* Greeting, point and proof may have come together. */
     for (int i = 0; i < 3; i++) {
         enum secure_fault fault = send_opening(shake, pipe);
-        if (fault == SECURE_SOUND) {
+        if (fault == SECURE_SOUND)
             fault = receive_opening(shake, pipe);
-        }
-        if (fault != SECURE_SOUND) {
+        if (fault != SECURE_SOUND)
             return fault;
-        }
     }
     return send_opening(shake, pipe);
 }
 
 int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe) {
-    if (shake->fault == SECURE_SOUND) {
+    if (shake->fault == SECURE_SOUND)
         shake->fault = exchange(shake, pipe);
-    }
     if (shake->fault != SECURE_SOUND) {
         secure_shake_end(shake);
         return -1;
@@ -337,9 +322,8 @@ static bool flush(struct secure_records *r) {
     if (r->out_begin < r->out_end) {
         int sent = r->pipe.send(r->pipe.context, r->out + r->out_begin,
                                 r->out_end - r->out_begin);
-        if (sent < 0) {
+        if (sent < 0)
             return false;
-        }
         r->out_begin += (size_t)sent;
     }
     return true;
@@ -350,9 +334,8 @@ static bool flush(struct secure_records *r) {
 static int records_send(void *context, const uint8_t *bytes, size_t size) {
     struct secure_records *r = context;
     size_t done = 0;
-    if (r->failed || !flush(r)) {
+    if (r->failed || !flush(r))
         return fail(r);
-    }
     while (done < size && r->out_begin == r->out_end) {
         size_t part =
             size - done < SECURE_RECORD_MAX ? size - done : SECURE_RECORD_MAX;
@@ -363,9 +346,8 @@ static int records_send(void *context, const uint8_t *bytes, size_t size) {
         r->out_begin = 0;
         r->out_end = SECURE_HEAD_BYTES + part + SECURE_TAG_BYTES;
         done += part;
-        if (!flush(r)) {
+        if (!flush(r))
             return fail(r);
-        }
     }
     return (int)done;
 }
@@ -375,9 +357,8 @@ static int records_send(void *context, const uint8_t *bytes, size_t size) {
 static size_t find_head(const struct secure_records *r, size_t at) {
     while (at + SECURE_HEAD_BYTES <= r->in_end &&
            (head_size(r->in + at) == SIZE_MAX ||
-            head_ahead(r->in + at, r->keys.in_count) >= SECURE_AHEAD_MAX)) {
+            head_ahead(r->in + at, r->keys.in_count) >= SECURE_AHEAD_MAX))
         at++;
-    }
     return at;
 }
 
@@ -438,12 +419,10 @@ static bool open_record(struct secure_records *r, size_t size) {
  */
 static size_t missing(const struct secure_records *r) {
     size_t whole = SECURE_HEAD_BYTES;
-    if (r->in_end >= SECURE_HEAD_BYTES) {
+    if (r->in_end >= SECURE_HEAD_BYTES)
         whole += head_size(r->in) + SECURE_TAG_BYTES;
-    }
-    if (r->in_end < whole && r->lost > 0) {
+    if (r->in_end < whole && r->lost > 0)
         whole = sizeof r->in;
-    }
     return whole > r->in_end ? whole - r->in_end : 0;
 }
 
@@ -455,21 +434,17 @@ static int take_record(struct secure_records *r, bool reads) {
         skip(r, 0);
         size_t want = missing(r);
         if (want == 0) {
-            if (open_record(r, head_size(r->in))) {
+            if (open_record(r, head_size(r->in)))
                 return 1;
-            }
             continue;
         }
-        if (dry && is_cut(r)) {
+        if (dry && is_cut(r))
             continue;
-        }
-        if (dry) {
+        if (dry)
             return 0;
-        }
         int got = r->pipe.receive(r->pipe.context, r->in + r->in_end, want);
-        if (got < 0) {
+        if (got < 0)
             return got;
-        }
         r->in_end += (size_t)got;
         dry = (size_t)got < want;
     }
@@ -480,13 +455,11 @@ static int records_receive(void *context, uint8_t *bytes, size_t size) {
     struct secure_records *r = context;
     size_t done = 0, have = 1;
     int status = 1;
-    if (r->failed || !flush(r)) {
+    if (r->failed || !flush(r))
         return fail(r);
-    }
     while (status > 0 && have > 0) {
-        if (r->plain_begin == r->plain_end) {
+        if (r->plain_begin == r->plain_end)
             status = take_record(r, done == 0);
-        }
         have = r->plain_end - r->plain_begin;
         have = have < size - done ? have : size - done;
         memcpy(bytes + done, r->plain + r->plain_begin, have);

@@ -10,9 +10,8 @@ struct cube_text cube_text_in(char *data, size_t bytes_max) {
 }
 
 void cube_text_put(struct cube_text *text, const char *words) {
-    while (*words != '\0' && text->size < text->size_max) {
+    while (*words != '\0' && text->size < text->size_max)
         text->data[text->size++] = *words++;
-    }
     text->data[text->size] = '\0';
 }
 
@@ -45,14 +44,12 @@ size_t cube_text_shown(const char *words) {
                   : at[0] < 0xf0 ? 2
                   : at[0] < 0xf8 ? 3
                                  : 4;
-    if (more == 4) {
+    if (more == 4)
         return 0;
-    }
     uint32_t code = more == 0 ? at[0] : at[0] & (0x3fu >> more);
     for (size_t i = 1; i <= more; i++) {
-        if ((at[i] & 0xc0) != 0x80) { /* the final 0 as well */
+        if ((at[i] & 0xc0) != 0x80) /* the final 0 as well */
             return 0;
-        }
         code = code << 6 | (at[i] & 0x3f);
     }
     bool valid = code >= least[more] && code <= 0x10ffff &&
@@ -68,9 +65,8 @@ void cube_text_printable(struct cube_text *text, const char *words) {
                                 digits[byte & 15]};
         size_t shown = cube_text_shown(words);
         size_t bytes = shown > 0 ? shown : sizeof escape;
-        if (bytes > text->size_max - text->size) {
+        if (bytes > text->size_max - text->size)
             break;
-        }
         memcpy(text->data + text->size, shown > 0 ? words : escape, bytes);
         text->size += bytes;
         words += shown > 0 ? shown : 1;

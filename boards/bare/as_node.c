@@ -81,11 +81,9 @@ static size_t tell_log(void *context, char *text, size_t size) {
     cube_text_put(&words, "started after ");
     put_start(&words, bare);
     put_faults(&words, bare);
-    for (size_t i = 0; i < words.size && used < size; i++) {
-        if (room[i] != '\r') {
+    for (size_t i = 0; i < words.size && used < size; i++)
+        if (room[i] != '\r')
             text[used++] = room[i];
-        }
-    }
     return used;
 }
 
@@ -102,11 +100,9 @@ static uint64_t busy_us(void *context) {
 }
 
 static bool anything(void) {
-    for (unsigned i = 0; i <= board_facts.ports; i++) {
-        if (bare_uart_ready(&bare_uart[i])) {
+    for (unsigned i = 0; i <= board_facts.ports; i++)
+        if (bare_uart_ready(&bare_uart[i]))
             return true;
-        }
-    }
     return false;
 }
 
@@ -115,9 +111,8 @@ void bare_node_idle(struct bare_node *bare, uint64_t wait_us) {
     board_feed();
     while (!anything() && now - begun_us < wait_us) {
         uint32_t before = board_lock();
-        if (!anything()) {
+        if (!anything())
             board_wait(wait_us - (now - begun_us));
-        }
         board_unlock(before);
         board_feed();
         now = board_now_us();
@@ -207,9 +202,8 @@ bare_node_tell_start(const struct bare_node *bare) {
     cube_text_put(&text, " started, version " NODE_VERSION ", after ");
     put_start(&text, bare);
     put_memory(&text);
-    if (bare->reason.faults > 0) {
+    if (bare->reason.faults > 0)
         put_faults(&text, bare);
-    }
     bare_console_begin();
     bare_console_put(room);
     bare_console_end();
@@ -233,9 +227,8 @@ void bare_node_fill_in(struct bare_node *bare) {
     struct cube_text device =
         cube_text_in((char *)board->source.device, sizeof board->source.device);
     cube_text_put(&device, board_facts.name);
-    for (unsigned d = 0; d < board_facts.ports; d++) {
+    for (unsigned d = 0; d < board_facts.ports; d++)
         board->pipes[d] = bare_uart_pipe(d + 1);
-    }
     (void)node_identity_epoch(&board->identity, &board->source);
 }
 
@@ -248,26 +241,21 @@ void bare_node_learn(struct bare_node *bare) {
     while (!node_identity_hear(&bare->learner, identity)) {
         node_identity_ask(&bare->learner, board_now_us());
         bare_node_console(bare);
-        if (bare->waits != NULL) {
+        if (bare->waits != NULL)
             bare->waits();
-        }
         bare_node_idle(bare, LOOK_US);
     }
     bare->known = true;
-    if (identity->epoch == 0) {
+    if (identity->epoch == 0)
         (void)node_identity_epoch_behind(&bare->learner, identity);
-    }
-    for (unsigned d = identity->dimension; d <= board_facts.ports; d++) {
+    for (unsigned d = identity->dimension; d <= board_facts.ports; d++)
         memset(&board->pipes[d], 0, sizeof board->pipes[d]);
-    }
-    for (unsigned d = identity->dimension; d < board_facts.ports; d++) {
+    for (unsigned d = identity->dimension; d < board_facts.ports; d++)
         bare_uart_leave(d + 1);
-    }
-    if (identity->self == 0 || identity->host_port) {
+    if (identity->self == 0 || identity->host_port)
         board->pipes[identity->dimension] = host;
-    } else {
+    else
         bare_uart_leave(0);
-    }
 }
 
 /* --- what it is asked ------------------------------------------------------
@@ -284,9 +272,8 @@ static void answer_help(const struct bare_node *bare, struct cube_text *text) {
 
 static bool is_known(const uint8_t *bytes, size_t size) {
     uint8_t all = 0;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         all |= bytes[i];
-    }
     return all != 0;
 }
 
@@ -351,9 +338,8 @@ static void put_link(struct cube_text *text, const struct bare_node *bare,
 static void answer_links(const struct bare_node *bare, struct cube_text *text) {
     struct node_link_state state[CUBE_LINKS_MAX];
     unsigned links = bare->links == NULL ? 0 : bare->links(state);
-    for (unsigned d = 0; d < links; d++) {
+    for (unsigned d = 0; d < links; d++)
         put_link(text, bare, d, &state[d]);
-    }
     if (links == 0) {
         cube_text_put(text, "no neighbour has said yet which node it is; wire "
                             "its UARTs 1 .. to those of others\r\n");
@@ -396,9 +382,8 @@ static __attribute__((noinline)) void answer(struct bare_node *bare,
     struct cube_text text = cube_text_in(room, sizeof room);
     unsigned i = *line == '\0' ? 1 : 0; /* Enter alone: who is there? */
     while (*line != '\0' && i < sizeof words / sizeof words[0] &&
-           !same(line, words[i].word)) {
+           !same(line, words[i].word))
         i++;
-    }
     cube_text_put(&text, "\r\n");
     if (i < sizeof words / sizeof words[0]) {
         words[i].answer(bare, &text);
@@ -412,10 +397,8 @@ static __attribute__((noinline)) void answer(struct bare_node *bare,
 void bare_node_console(struct bare_node *bare) {
     char line[BARE_SHELL_LINE + 1];
     loader_budget_pass(bare->budget, board_now_us());
-    if (bare_uart[0].unused) {
+    if (bare_uart[0].unused)
         bare_shell_alone(&bare->shell);
-    }
-    if (bare_shell_line(&bare->shell, line, board_now_us())) {
+    if (bare_shell_line(&bare->shell, line, board_now_us()))
         answer(bare, line);
-    }
 }

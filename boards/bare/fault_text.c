@@ -10,9 +10,8 @@ void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits) {
     unsigned n = 2;
     for (unsigned i = 16; i-- > 0;) {
         unsigned digit = (unsigned)(number >> (4 * i) & 15);
-        if (n > 2 || digit != 0 || i < digits) {
+        if (n > 2 || digit != 0 || i < digits)
             all[n++] = "0123456789abcdef"[digit];
-        }
     }
     all[n] = '\0';
     cube_text_put(text, all);
@@ -21,13 +20,12 @@ void bare_text_hex(struct cube_text *text, uint64_t number, unsigned digits) {
 void bare_text_place(struct cube_text *text, uint64_t address, size_t below) {
     uint64_t lowest = (uintptr_t)bare_node_stack;
     uint64_t bytes = board_facts.data_bytes;
-    if (address < lowest && lowest - address <= below) {
+    if (address < lowest && lowest - address <= below)
         cube_text_put(text, "a stack overflow");
-    } else if (address >= lowest + bytes && address < lowest + 2 * bytes) {
+    else if (address >= lowest + bytes && address < lowest + 2 * bytes)
         cube_text_put(text, "an access behind the board's data memory");
-    } else {
+    else
         cube_text_put(text, "an access to what is not there");
-    }
     cube_text_put(text, ", address ");
     bare_text_hex(text, address, 8);
 }

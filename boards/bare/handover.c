@@ -28,9 +28,8 @@ void bare_handover_give(const struct bare_handover *handover) {
 }
 
 bool bare_handover_take(struct bare_handover *handover) {
-    if (kept.magic != GIVEN || kept.crc != sum()) {
+    if (kept.magic != GIVEN || kept.crc != sum())
         return false;
-    }
     kept.magic = TAKEN;
     *handover = kept;
     handover->loader[sizeof handover->loader - 1] = '\0';

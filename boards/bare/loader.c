@@ -52,14 +52,12 @@ static void start(unsigned slot) {
     const struct loader_flash *flash = rules.flash;
     /* NOLINTNEXTLINE(performance-no-int-to-ptr) */
     void *to = (void *)(uintptr_t)board_facts.image_at;
-    if (!loader_slots_try(&slots)) {
+    if (!loader_slots_try(&slots))
         return;
-    }
     flash->read(flash->context, loader_slots_code(&slots, slot), to,
                 slots.image[slot].bytes);
-    if (!loader_look_copy(&look, &slots, slot, to)) {
+    if (!loader_look_copy(&look, &slots, slot, to))
         return;
-    }
     board_feed();
     bare_handover_give(&bare.handover);
     board_launch(board_facts.image_at);
@@ -85,9 +83,8 @@ static void begin(void) {
     bare_node_may_start(&bare);
     unsigned slot = loader_slots_start(&slots, &rules, ended_badly, &bare.boot);
     describe(slot);
-    if (slot < LOADER_SLOTS && bare.reason.kind != BARE_STAY) {
+    if (slot < LOADER_SLOTS && bare.reason.kind != BARE_STAY)
         start(slot);
-    }
     bare_node_fill_in(&bare);
     bare_node_tell_start(&bare);
 }
@@ -97,17 +94,15 @@ _Noreturn void bare_main(void) {
     begin();
     bare_node_learn(&bare);
     loader = loader_start(&bare.board, &slots, &why);
-    if (loader == NULL) {
+    if (loader == NULL)
         bare_fault(why, NULL, 0, 0);
-    }
     bare.links = links;
     for (enum node_event event = NODE_BUSY; event != NODE_STOPPED;) {
         event = loader_step(loader);
         board_feed();
         bare_node_console(&bare);
-        if (event == NODE_IDLE) {
+        if (event == NODE_IDLE)
             bare_node_idle(&bare, loader_wait_us(loader));
-        }
     }
     bare_node_restart(loader_reset_why(loader) == NODE_RESET_STAY ? BARE_STAY
                                                                   : BARE_BOOT);

@@ -22,9 +22,8 @@ static int aligned_alike(const void *a, const void *b) {
 /* By words that are whole at `to`; those at `from` need not be, as processors
  * load them all the same, or the compiler puts them together. */
 static void forwards(uint8_t *to, const uint8_t *from, size_t size) {
-    for (; size > 0 && (uintptr_t)to % WORD != 0; size--) {
+    for (; size > 0 && (uintptr_t)to % WORD != 0; size--)
         *to++ = *from++;
-    }
     for (; size >= 4 * WORD; size -= 4 * WORD) {
         word *w = (void *)to;
         const struct loose *v = (const void *)from;
@@ -38,27 +37,24 @@ static void forwards(uint8_t *to, const uint8_t *from, size_t size) {
         to += WORD;
         from += WORD;
     }
-    for (; size > 0; size--) {
+    for (; size > 0; size--)
         *to++ = *from++;
-    }
 }
 
 static void backwards(uint8_t *to, const uint8_t *from, size_t size) {
     to += size;
     from += size;
     if (aligned_alike(to, from)) {
-        for (; size > 0 && (uintptr_t)to % WORD != 0; size--) {
+        for (; size > 0 && (uintptr_t)to % WORD != 0; size--)
             *--to = *--from;
-        }
         for (; size >= WORD; size -= WORD) {
             to -= WORD;
             from -= WORD;
             *(word *)(void *)to = *(const word *)(const void *)from;
         }
     }
-    for (; size > 0; size--) {
+    for (; size > 0; size--)
         *--to = *--from;
-    }
 }
 
 void *memcpy(void *to, const void *from, size_t size) {
@@ -67,20 +63,18 @@ void *memcpy(void *to, const void *from, size_t size) {
 }
 
 void *memmove(void *to, const void *from, size_t size) {
-    if ((uintptr_t)to - (uintptr_t)from < size) {
+    if ((uintptr_t)to - (uintptr_t)from < size)
         backwards(to, from, size);
-    } else {
+    else
         forwards(to, from, size);
-    }
     return to;
 }
 
 void *memset(void *to, int value, size_t size) {
     uint8_t *p = to;
     word all = (word)-1 / 255 * (uint8_t)value;
-    for (; size > 0 && (uintptr_t)p % WORD != 0; size--) {
+    for (; size > 0 && (uintptr_t)p % WORD != 0; size--)
         *p++ = (uint8_t)value;
-    }
     for (; size >= 4 * WORD; size -= 4 * WORD) {
         word *w = (void *)p;
         w[0] = all, w[1] = all, w[2] = all, w[3] = all;
@@ -90,9 +84,8 @@ void *memset(void *to, int value, size_t size) {
         *(word *)(void *)p = all;
         p += WORD;
     }
-    for (; size > 0; size--) {
+    for (; size > 0; size--)
         *p++ = (uint8_t)value;
-    }
     return to;
 }
 
@@ -106,10 +99,8 @@ int memcmp(const void *a, const void *b, size_t size) {
             q += WORD;
         }
     }
-    for (; size > 0; size--, p++, q++) {
-        if (*p != *q) {
+    for (; size > 0; size--, p++, q++)
+        if (*p != *q)
             return *p - *q;
-        }
-    }
     return 0;
 }

@@ -28,9 +28,8 @@ static void begin(void) {
     } else {
         bare.reason = bare_reason_take();
         bare_node_may_start(&bare);
-        if (board_facts.flash != NULL) {
+        if (board_facts.flash != NULL)
             (void)loader_boots_next(board_facts.flash, &bare.boot);
-        }
     }
     bare_node_fill_in(&bare);
     bare.board.identity.dead_us = DEAD_US;
@@ -40,9 +39,8 @@ static void begin(void) {
 /* A neighbour has been met: the image is good enough to be told another, and
  * starts from now on whatever happens. */
 static void confirm(void) {
-    if (!loader_slots_confirm(board_facts.flash, &up)) {
+    if (!loader_slots_confirm(board_facts.flash, &up))
         bare_fault("the flash takes no record of this image", NULL, 0, 0);
-    }
     unconfirmed = false;
 }
 
@@ -63,22 +61,19 @@ _Noreturn void bare_main(void) {
     bare.waits = wait_unwired;
     bare_node_learn(&bare);
     node = node_start(&bare.board, &why);
-    if (node == NULL) {
+    if (node == NULL)
         bare_fault(why, NULL, 0, 0);
-    }
     bare.links = links;
     for (enum node_event event = NODE_BUSY; event != NODE_STOPPED;) {
         event = node_step(node);
         board_feed();
         bare_node_console(&bare);
-        if (unconfirmed && node_has_met(node)) {
+        if (unconfirmed && node_has_met(node))
             confirm();
-        } else if (unconfirmed) {
+        else if (unconfirmed)
             wait_unwired();
-        }
-        if (event == NODE_IDLE) {
+        if (event == NODE_IDLE)
             bare_node_idle(&bare, node_wait_us(node));
-        }
     }
     bare_node_end(node_reset_why(node));
 }

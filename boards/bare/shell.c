@@ -44,9 +44,8 @@ static void end_line(struct bare_shell *s, unsigned size) {
  * frame's first byte: what follows tells, or that nothing does. */
 static bool may_be_line(const struct bare_shell *s) {
     uint8_t last = s->held[s->held_size - 1];
-    if (s->held_size == 1) {
+    if (s->held_size == 1)
         return is_letter(last) || is_end(last);
-    }
     return s->held_size == 2 ? is_letter(s->held[0]) && is_letter(last)
                              : last >= ' ' && last <= '~';
 }
@@ -68,9 +67,8 @@ static void hear(struct bare_shell *s, uint8_t byte) {
     bool second = s->ended && byte == '\n'; /* of CR and LF */
     s->ended = false;
     if (second || (s->held_size == 1 && is_end(s->held[0]) && is_end(byte))) {
-        if (!second) {
+        if (!second)
             end_line(s, 0);
-        }
         return;
     }
     if (s->held_size > 1 && (byte == BACKSPACE || byte == DELETE)) {
@@ -96,12 +94,10 @@ static int read_some(struct bare_shell *s) {
     uint8_t bytes[BARE_SHELL_BYTES];
     int got = s->beneath.receive(s->beneath.context, bytes, sizeof bytes);
     s->passed_size = s->passed_taken = 0;
-    if (got > 0) {
+    if (got > 0)
         s->heard_us = board_now_us();
-    }
-    for (int i = 0; i < got; i++) {
+    for (int i = 0; i < got; i++)
         hear(s, bytes[i]);
-    }
     return got;
 }
 
@@ -109,9 +105,8 @@ static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bare_shell *s = context;
     size_t given = 0;
     while (given < size) {
-        if (s->passed_taken == s->passed_size && read_some(s) <= 0) {
+        if (s->passed_taken == s->passed_size && read_some(s) <= 0)
             break;
-        }
         size_t left = s->passed_size - s->passed_taken;
         size_t now = left < size - given ? left : size - given;
         memcpy(bytes + given, s->passed + s->passed_taken, now);
@@ -138,18 +133,16 @@ static void say_on(struct bare_shell *s) {
             s->beneath.context, (const uint8_t *)s->said + s->said_sent, left);
         s->said_sent += taken > 0 ? (unsigned)taken : 0;
     }
-    if (s->said_sent == s->said_size) {
+    if (s->said_sent == s->said_size)
         s->said_size = s->said_sent = 0;
-    }
 }
 
 static int send(void *context, const uint8_t *bytes, size_t size) {
     struct bare_shell *s = context;
     int taken = (int)size;
     say_on(s);
-    if (s->said_size > 0 && !s->within) {
+    if (s->said_size > 0 && !s->within)
         return 0; /* first that */
-    }
     if (board_now_us() >= s->hush_us) {
         taken = s->beneath.send(s->beneath.context, bytes, size);
         s->within = taken > 0 ? bytes[taken - 1] != 0 : s->within;
@@ -176,9 +169,8 @@ bool bare_shell_line(struct bare_shell *shell, char line[BARE_SHELL_LINE + 1],
             BARE_SHELL_BETWEEN; /* its end was lost, or its begin was noise */
     }
     say_on(s);
-    if (s->lines == s->lines_taken || s->said_size > 0) {
+    if (s->lines == s->lines_taken || s->said_size > 0)
         return false;
-    }
     memcpy(line, s->line[s->lines_taken++ % BARE_SHELL_LINES],
            sizeof s->line[0]);
     return true;
@@ -187,14 +179,12 @@ bool bare_shell_line(struct bare_shell *shell, char line[BARE_SHELL_LINE + 1],
 void bare_shell_say(struct bare_shell *shell, const char *text) {
     struct bare_shell *s = shell;
     unsigned at = s->said_size;
-    if (at + 3 > BARE_SHELL_TEXT) {
+    if (at + 3 > BARE_SHELL_TEXT)
         return;
-    }
     s->said[at++] = '\0';
     s->said[at++] = (char)BARE_CONSOLE_MARK;
-    while (*text != '\0' && at < BARE_SHELL_TEXT - 1) {
+    while (*text != '\0' && at < BARE_SHELL_TEXT - 1)
         s->said[at++] = *text++;
-    }
     s->said[at++] = '\0';
     s->said_size = at;
 }

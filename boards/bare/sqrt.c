@@ -35,17 +35,14 @@ double sqrt(double x) {
     memcpy(&bits, &x, sizeof bits);
     int exponent = (int)(bits >> FRACTION & 2047);
     uint64_t m = bits & ((UINT64_C(1) << FRACTION) - 1);
-    if (bits << 1 == 0 || (exponent == 2047 && bits >> 63 == 0)) {
+    if (bits << 1 == 0 || (exponent == 2047 && bits >> 63 == 0))
         return x; /* zeros; infinity and a NaN */
-    }
-    if (bits >> 63 != 0 || exponent == 2047) {
+    if (bits >> 63 != 0 || exponent == 2047)
         return from_bits(UINT64_C(0x7ff8) << 48);
-    }
     if (exponent == 0) { /* subnormal */
         exponent = 1;
-        for (; m >> FRACTION == 0; m <<= 1) {
+        for (; m >> FRACTION == 0; m <<= 1)
             exponent--;
-        }
     } else {
         m |= UINT64_C(1) << FRACTION;
     }

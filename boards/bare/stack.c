@@ -5,9 +5,8 @@
 
 size_t bare_stack_used(const uint32_t *lowest, size_t bytes) {
     size_t painted = 0;
-    while (painted < bytes / sizeof *lowest && lowest[painted] == BARE_PAINT) {
+    while (painted < bytes / sizeof *lowest && lowest[painted] == BARE_PAINT)
         painted++;
-    }
     return bytes - painted * sizeof *lowest;
 }
 

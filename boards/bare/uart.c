@@ -70,9 +70,8 @@ static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bare_uart *uart = context;
     uint32_t ends = uart->ends;
     size_t held = bare_ring_held(&uart->receive);
-    if (size >= held) { /* else there may be an end in what stays */
+    if (size >= held) /* else there may be an end in what stays */
         uart->ends_taken = ends;
-    }
     return (int)bare_ring_read(&uart->receive, bytes, size);
 }
 
@@ -86,18 +85,15 @@ void bare_uart_leave(unsigned uart) {
 
 uint32_t bare_uarts_overruns(void) {
     uint32_t sum = 0;
-    for (unsigned i = 0; i < BARE_UARTS_MAX; i++) {
+    for (unsigned i = 0; i < BARE_UARTS_MAX; i++)
         sum += bare_uart[i].unused ? 0 : bare_uart[i].overruns;
-    }
     return sum;
 }
 
 static bool all_sent(void) {
-    for (unsigned i = 0; i <= board_facts.ports; i++) {
-        if (bare_ring_held(&bare_uart[i].send) > 0) {
+    for (unsigned i = 0; i <= board_facts.ports; i++)
+        if (bare_ring_held(&bare_uart[i].send) > 0)
             return false;
-        }
-    }
     return true;
 }
 

@@ -42,9 +42,8 @@ static inline uint32_t bare_ring_room(const struct bare_ring *ring) {
  * processor, so that it is the compiler alone that must keep the order. */
 BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte) {
     uint32_t put = ring->put;
-    if (put - ring->taken > ring->mask) {
+    if (put - ring->taken > ring->mask)
         return false;
-    }
     ring->bytes[put & ring->mask] = byte;
     atomic_signal_fence(memory_order_release);
     ring->put = put + 1;
@@ -53,9 +52,8 @@ BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte) {
 
 BARE_INLINE bool bare_ring_take(struct bare_ring *ring, uint8_t *byte) {
     uint32_t taken = ring->taken;
-    if (ring->put == taken) {
+    if (ring->put == taken)
         return false;
-    }
     atomic_signal_fence(memory_order_acquire);
     *byte = ring->bytes[taken & ring->mask];
     atomic_signal_fence(memory_order_release);
@@ -95,9 +93,8 @@ void bare_uarts_init(void);
 
 /* For a board's handlers. */
 BARE_INLINE void bare_uart_put(struct bare_uart *uart, uint8_t byte) {
-    if (!bare_ring_put(&uart->receive, byte)) {
+    if (!bare_ring_put(&uart->receive, byte))
         uart->overruns++;
-    }
     uart->ends += byte == 0;
 }
 

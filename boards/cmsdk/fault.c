@@ -30,9 +30,8 @@ void board_restart(void) {
     see_off();
     cortex_barrier();
     cmsdk_at(CORTEX_SCB)[AIRCR] = RESET;
-    for (;;) {
+    for (;;)
         cortex_barrier();
-    }
 }
 
 static bool sound(const uint32_t *frame, uint32_t status) {

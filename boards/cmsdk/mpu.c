@@ -42,9 +42,8 @@ void cmsdk_mpu_start(void) {
     volatile uint32_t *mpu = cmsdk_at(CORTEX_MPU);
     bool loader = (uintptr_t)bare_code_room == board_facts.image_at;
     uint32_t n = 0;
-    for (; n < sizeof regions / sizeof regions[0]; n++) {
+    for (; n < sizeof regions / sizeof regions[0]; n++)
         set(n, regions[n]);
-    }
     set(n++, (struct region){(uint32_t)(uintptr_t)board_facts.flash->context,
                              FLASH});
     if (loader) {

@@ -24,9 +24,8 @@ static const uint8_t interrupt[BARE_UARTS_MAX] = {0, 2, 4, 18, 20};
 BARE_INLINE void receive(unsigned i) {
     volatile uint32_t *uart = cmsdk_at(base[i]);
     uart[INT] = INT_RECEIVE;
-    for (int n = 0; n < BARE_BYTES_A_CALL && (uart[STATE] & RXFULL) != 0; n++) {
+    for (int n = 0; n < BARE_BYTES_A_CALL && (uart[STATE] & RXFULL) != 0; n++)
         bare_uart_put(&bare_uart[i], (uint8_t)uart[DATA]);
-    }
     if ((uart[STATE] & RXOVER) != 0) {
         uart[STATE] = RXOVER;
         bare_uart[i].overruns++;
@@ -39,9 +38,8 @@ BARE_INLINE void send(unsigned i) {
     uart[INT] = INT_SEND;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[STATE] & TXFULL) == 0 &&
                     bare_ring_take(&bare_uart[i].send, &byte);
-         n++) {
+         n++)
         uart[DATA] = byte;
-    }
 }
 
 #define HANDLERS(i)                                                            \
@@ -69,11 +67,9 @@ void board_uart_send(unsigned i) {
 bool board_console_put(uint8_t byte) {
     volatile uint32_t *uart = cmsdk_at(base[0]);
     uint64_t begun_us = board_now_us();
-    while ((uart[STATE] & TXFULL) != 0) {
-        if (board_now_us() - begun_us > CONSOLE_US) {
+    while ((uart[STATE] & TXFULL) != 0)
+        if (board_now_us() - begun_us > CONSOLE_US)
             return false;
-        }
-    }
     uart[DATA] = byte;
     return true;
 }

@@ -93,9 +93,8 @@ static bool open_wires(struct linux_board *linux_board,
                        struct linux_fault *fault) {
     struct linux_guard guard = {.source = source};
     if (options->key != NULL) {
-        if (!read_key(options->key, linux_board->key, fault)) {
+        if (!read_key(options->key, linux_board->key, fault))
             return false;
-        }
         guard.key = linux_board->key;
     }
     for (unsigned i = 0; i < options->wires_count; i++) {
@@ -105,9 +104,8 @@ static bool open_wires(struct linux_board *linux_board,
         guard.insecure = (options->insecure >> i & 1) != 0;
         if (!linux_wire_open(&linux_board->wire[i],
                              strchr(options->wire[i], '=') + 1, &guard, &net[i],
-                             fault)) {
+                             fault))
             return false;
-        }
     }
     linux_wires_end_with(linux_board->wire, options->wires_count);
     return true;
@@ -119,9 +117,8 @@ static void start_alone(struct linux_options *options,
                         struct secure_source *source, char **argv) {
     struct node_identity identity = {.epoch = 0};
     linux_board->again = argv;
-    if (options->epoch == 0 && node_identity_epoch(&identity, source)) {
+    if (options->epoch == 0 && node_identity_epoch(&identity, source))
         options->epoch = identity.epoch;
-    }
 #ifndef INCODE_SANITIZED
     struct rlimit stack = {options->stack, options->stack};
     struct rlimit data = {options->memory - options->stack,
@@ -148,11 +145,9 @@ static void tell_of_greeting(const struct learner *learner, bool *told) {
  * is no greeting to who decides by the first bytes whether to let one in. */
 static void ask_terminals(const struct linux_board *board,
                           struct learner *learner) {
-    for (unsigned i = 0; i < board->links_count; i++) {
-        if (board->wire[i].kind != LINUX_TERMINAL) {
+    for (unsigned i = 0; i < board->links_count; i++)
+        if (board->wire[i].kind != LINUX_TERMINAL)
             learner->pipes[i].send = NULL;
-        }
-    }
 }
 
 /* Waits until a neighbour has said who this node is. */
@@ -197,9 +192,8 @@ static struct node_identity identity_of(const struct linux_options *options) {
 }
 
 static void fill_in(struct node_board *board, struct linux_board *linux_board) {
-    for (unsigned i = 0; i < linux_board->links_count; i++) {
+    for (unsigned i = 0; i < linux_board->links_count; i++)
         board->pipes[i] = linux_wire_pipe(&linux_board->wire[i]);
-    }
     board->context = linux_board;
     board->now_us = now_us;
     board->busy_us = busy_us;
@@ -220,16 +214,14 @@ static const char *take_memory(struct node_board *board,
     fixed = SANITIZED_STATIC + stack;
 #endif
     wires = (wires + PROCESS_PAGE - 1) / PROCESS_PAGE * PROCESS_PAGE;
-    if (memory < fixed + wires + PROCESS_PAGE) {
+    if (memory < fixed + wires + PROCESS_PAGE)
         return "does not hold the program's own data and the wires";
-    }
     size_t bytes = (memory - fixed) / PROCESS_PAGE * PROCESS_PAGE;
     board->arena = process_arena(bytes);
     board->arena_bytes = bytes - wires;
     board->fixed_bytes = fixed + wires;
-    if (board->arena == NULL) {
+    if (board->arena == NULL)
         return "the kernel does not grant it";
-    }
     *net = (void *)((uint8_t *)board->arena + board->arena_bytes);
     return NULL;
 }
@@ -244,13 +236,11 @@ static int prepare(char **argv, struct linux_options *options,
                    struct linux_board *linux_board, struct node_board *board) {
     struct linux_fault fault = {0};
     struct tcp_wire *net = NULL;
-    if (!linux_options_read(argv + 1, options, &fault)) {
+    if (!linux_options_read(argv + 1, options, &fault))
         return complain(fault, 2);
-    }
     board->source.random = tcp_random;
-    if (options->wires_count > 0 && options->memory > options->stack) {
+    if (options->wires_count > 0 && options->memory > options->stack)
         start_alone(options, linux_board, &board->source, argv);
-    }
     const char *why = take_memory(board, options, &net);
     if (why != NULL) {
         return complain((struct linux_fault){.where = "--memory",
@@ -261,16 +251,13 @@ static int prepare(char **argv, struct linux_options *options,
     linux_board->links_count = options->links_count + options->wires_count;
     linux_board->awake_us = options->awake;
     if (options->wires_count > 0 &&
-        !open_wires(linux_board, options, &board->source, net, &fault)) {
+        !open_wires(linux_board, options, &board->source, net, &fault))
         return complain(fault, 2);
-    }
-    for (unsigned i = 0; i < options->links_count; i++) {
+    for (unsigned i = 0; i < options->links_count; i++)
         linux_wire_inherit(&linux_board->wire[i], options->links[i]);
-    }
     fill_in(board, linux_board);
-    if (options->node == LINUX_UNNAMED) {
+    if (options->node == LINUX_UNNAMED)
         learn(board, options);
-    }
     name_wires(linux_board, options);
     board->identity = identity_of(options);
     return 0;
@@ -285,13 +272,11 @@ int main(int argc, char **argv) {
     /* Without this a restarted node would be listed by its file's name in
      * /proc. */
     (void)prctl(PR_SET_NAME, "incode-node");
-    if (argc == 2 && linux_options_answer(argv[1])) {
+    if (argc == 2 && linux_options_answer(argv[1]))
         return 0;
-    }
     int status = prepare(argv, &options, &linux_board, &board);
-    if (status != 0) {
+    if (status != 0)
         return status;
-    }
     struct node *node = node_start(&board, &why);
     if (node == NULL) {
         return complain((struct linux_fault){.where = "this node",

@@ -74,9 +74,8 @@ bool linux_options_answer(const char *argument) {
 static bool read_number(const char **text, uint64_t *value) {
     const char *at = *text;
     *value = 0;
-    while (*at >= '0' && *at <= '9' && *value < UINT64_MAX / 100) {
+    while (*at >= '0' && *at <= '9' && *value < UINT64_MAX / 100)
         *value = 10 * *value + (uint64_t)(*at++ - '0');
-    }
     bool good = at != *text;
     *text = at;
     return good;
@@ -87,9 +86,8 @@ static const char *read_links(const char *text, struct linux_options *options) {
     while (*text != '\0') {
         if (options->links_count == CUBE_LINKS_MAX ||
             !read_number(&text, &fd) || fd > INT16_MAX ||
-            (*text != ',' && *text != '\0')) {
+            (*text != ',' && *text != '\0'))
             return "not open files as in 5,6,7";
-        }
         options->links[options->links_count++] = (int)fd;
         text += *text == ',';
     }
@@ -99,15 +97,12 @@ static const char *read_links(const char *text, struct linux_options *options) {
 static const char *read_wire(const char *text, struct linux_options *options) {
     const char *at = text;
     uint64_t link;
-    if (!read_number(&at, &link) || *at != '=') {
+    if (!read_number(&at, &link) || *at != '=')
         return "not as in 2=call:10.0.0.1:7001";
-    }
-    if (link >= CUBE_LINKS_MAX) {
+    if (link >= CUBE_LINKS_MAX)
         return "no such link";
-    }
-    if (options->wire[link] != NULL) {
+    if (options->wire[link] != NULL)
         return "that link has a wire already";
-    }
     options->wire[link] = text;
     options->wires_count++;
     return NULL;
@@ -118,9 +113,8 @@ static const char *read_insecure(const char *text,
     uint64_t link;
     while (*text != '\0') {
         if (!read_number(&text, &link) || link >= CUBE_LINKS_MAX ||
-            (*text != ',' && *text != '\0')) {
+            (*text != ',' && *text != '\0'))
             return "not links as in 0,2";
-        }
         options->insecure |= 1u << link;
         text += *text == ',';
     }
@@ -158,19 +152,16 @@ static const char *read_one(const char *name, const char *text,
                                                      : NULL;
         }
     }
-    if (strcmp(name, "--links") == 0) {
+    if (strcmp(name, "--links") == 0)
         return read_links(text, options);
-    }
-    if (strcmp(name, "--wire") == 0) {
+    if (strcmp(name, "--wire") == 0)
         return read_wire(text, options);
-    }
     if (strcmp(name, "--board") == 0) {
         return strcmp(text, "linux") == 0 ? NULL
                                           : "another board's program starts it";
     }
-    if (strcmp(name, "--insecure") == 0) {
+    if (strcmp(name, "--insecure") == 0)
         return read_insecure(text, options);
-    }
     if (strcmp(name, "--key") == 0) {
         options->key = text;
         return NULL;
@@ -187,18 +178,14 @@ static bool wires_fit(const struct linux_options *options) {
                           : 0);
     if (options->node == LINUX_UNNAMED) {
         links = options->links_count + options->wires_count;
-        if (links == 0) {
+        if (links == 0)
             return false; /* nobody could say who it is */
-        }
     }
-    if (options->wires_count == 0) {
+    if (options->wires_count == 0)
         return options->links_count == links;
-    }
-    for (unsigned i = 0; i < links; i++) {
-        if (options->wire[i] == NULL) {
+    for (unsigned i = 0; i < links; i++)
+        if (options->wire[i] == NULL)
             return false;
-        }
-    }
     return options->links_count == 0 && options->wires_count == links;
 }
 
@@ -235,9 +222,8 @@ bool linux_options_read(char **argv, struct linux_options *options,
             continue;
         }
         fault->what = "wants a value";
-        if (argv[1] == NULL) {
+        if (argv[1] == NULL)
             return false;
-        }
         fault->what = read_one(argv[0], argv[1], options);
         if (fault->what != NULL) {
             fault->value = fault->what == no_such ? NULL : argv[1];
@@ -254,9 +240,8 @@ bool linux_options_read(char **argv, struct linux_options *options,
     fault->what = "not one for each link: those to neighbours, and to the host "
                   "from node 0 and with --host-port 1";
     fault->next = "incode cube FILE prints those of a cube";
-    if (!wires_fit(options)) {
+    if (!wires_fit(options))
         return false;
-    }
     fault->where = "--insecure";
     fault->what = "does nothing for a link that does not go over TCP";
     fault->next = "leave it out, or name links with call: or listen:";

@@ -16,11 +16,10 @@ enum { LOOK_US = 500000 };
 void linux_wire_inherit(struct linux_wire *wire, int fd) {
     memset(wire, 0, sizeof *wire);
     wire->kind = isatty(fd) == 1 ? LINUX_TERMINAL : LINUX_SOCKET;
-    if (wire->kind == LINUX_TERMINAL) {
+    if (wire->kind == LINUX_TERMINAL)
         serial_pipe_init(&wire->serial, fd, 0);
-    } else {
+    else
         tcp_pipe_init(&wire->tcp, fd);
-    }
 }
 
 /* --- wires that the node opens itself ------------------------------------- */
@@ -29,9 +28,8 @@ static bool open_socket(struct linux_wire *wire,
                         const struct tcp_wire_config *config,
                         struct linux_fault *fault) {
     wire->kind = LINUX_NET;
-    if (tcp_wire_open(wire->net, config) == 0) {
+    if (tcp_wire_open(wire->net, config) == 0)
         return true;
-    }
     bool file = tcp_address_path(&config->address) != NULL;
     fault->what = "cannot listen there";
     fault->reason = errno;
@@ -99,9 +97,8 @@ static void recover(void *context) {
     uint64_t now_us = process_clock_us(CLOCK_MONOTONIC);
     serial_close(wire->serial.fd);
     wire->serial.fd = -1;
-    if (now_us - wire->look_us < LOOK_US) {
+    if (now_us - wire->look_us < LOOK_US)
         return;
-    }
     wire->look_us = now_us;
     int fd = serial_open(wire->device, wire->baud, wire->rts_cts);
     wire->reason = fd < 0 ? errno : 0;
@@ -121,14 +118,12 @@ static bool read_serial(struct linux_wire *wire, const char *text) {
     size -= wire->rts_cts ? strlen(flow) : 0;
     size_t digits = 0;
     while (digits < size && text[size - digits - 1] >= '0' &&
-           text[size - digits - 1] <= '9') {
+           text[size - digits - 1] <= '9')
         digits++;
-    }
     size -= digits;
     if (digits == 0 || size < 2 || text[size - 1] != ':' ||
-        size > sizeof wire->device) {
+        size > sizeof wire->device)
         return false;
-    }
     wire->baud = (uint32_t)strtoul(text + size, NULL, 10);
     memcpy(wire->device, text, size - 1);
     return true;
@@ -172,21 +167,16 @@ bool linux_wire_open(struct linux_wire *wire, const char *text,
     wire->ends =
         (struct secure_ends){{SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN},
                              {SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN}};
-    if ((at = behind(text, "listen:")) != NULL) {
+    if ((at = behind(text, "listen:")) != NULL)
         return open_net(wire, at, true, guard, fault);
-    }
-    if ((at = behind(text, "call:")) != NULL) {
+    if ((at = behind(text, "call:")) != NULL)
         return open_net(wire, at, false, guard, fault);
-    }
-    if ((at = behind(text, "unix-listen:")) != NULL) {
+    if ((at = behind(text, "unix-listen:")) != NULL)
         return open_path(wire, at, true, fault);
-    }
-    if ((at = behind(text, "unix-call:")) != NULL) {
+    if ((at = behind(text, "unix-call:")) != NULL)
         return open_path(wire, at, false, fault);
-    }
-    if ((at = behind(text, "serial:")) != NULL) {
+    if ((at = behind(text, "serial:")) != NULL)
         return open_serial(wire, at, fault);
-    }
     fault->what =
         "not one of listen:, call:, unix-listen:, unix-call: and serial:";
     return false;
@@ -205,11 +195,9 @@ static unsigned ending_count;
 
 /* What is called here may be called in a handler. */
 static void end(int signal_number) {
-    for (unsigned i = 0; i < ending_count; i++) {
-        if (ending[i].kind == LINUX_NET) {
+    for (unsigned i = 0; i < ending_count; i++)
+        if (ending[i].kind == LINUX_NET)
             tcp_wire_close(ending[i].net);
-        }
-    }
     (void)raise(signal_number);
 }
 
@@ -219,9 +207,8 @@ void linux_wires_end_with(const struct linux_wire *wires, unsigned count) {
                                .sa_flags = (int)SA_RESETHAND};
     ending = wires;
     ending_count = count;
-    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++) {
+    for (size_t i = 0; i < sizeof signals / sizeof signals[0]; i++)
         (void)sigaction(signals[i], &action, NULL);
-    }
 }
 
 struct link_pipe linux_wire_pipe(struct linux_wire *wire) {
@@ -232,9 +219,8 @@ struct link_pipe linux_wire_pipe(struct linux_wire *wire) {
 
 /* Adds what to wait for: the number of entries. */
 static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds) {
-    if (wire->kind == LINUX_NET) {
+    if (wire->kind == LINUX_NET)
         return tcp_wire_events(wire->net, fds);
-    }
     bool serial = wire->kind == LINUX_TERMINAL;
     fds->fd = serial ? wire->serial.fd : wire->tcp.fd;
     fds->events =
@@ -244,11 +230,10 @@ static unsigned add_events(const struct linux_wire *wire, struct pollfd *fds) {
 
 static void hear(struct linux_wire *wire, const struct pollfd *fds,
                  unsigned count) {
-    if (wire->kind == LINUX_NET) {
+    if (wire->kind == LINUX_NET)
         tcp_wire_heard(wire->net, fds, count);
-    } else if (wire->kind == LINUX_SOCKET && count > 0) {
+    else if (wire->kind == LINUX_SOCKET && count > 0)
         tcp_heard(&wire->tcp, fds->revents);
-    }
 }
 
 /* Once, and of another key at the end that calls: whoever calls the other may
@@ -265,9 +250,8 @@ static void tell_of_key(struct linux_wire *wire) {
             .what = "is called by one who has a key, and this node has none",
             .next = "give both ends the same key file, here with --key"});
     }
-    if (!calls || wire->told || wire->net->pause_us <= 2 * TCP_PAUSE_MIN_US) {
+    if (!calls || wire->told || wire->net->pause_us <= 2 * TCP_PAUSE_MIN_US)
         return;
-    }
     struct tcp_wire_doubt doubt = tcp_wire_doubt(wire->net);
     if (doubt.what != NULL) {
         wire->told = true;
@@ -296,12 +280,10 @@ void linux_wires_idle(struct linux_wire *wires, unsigned count,
     for (unsigned i = 0; i < count; i++) {
         const struct linux_wire *wire = &wires[i];
         if (wire->kind == LINUX_TERMINAL &&
-            serial_wait_us(&wire->serial) < wait_us) {
+            serial_wait_us(&wire->serial) < wait_us)
             wait_us = serial_wait_us(&wire->serial);
-        }
-        if (wire->kind == LINUX_NET && tcp_wire_wait_us(wire->net) < wait_us) {
+        if (wire->kind == LINUX_NET && tcp_wire_wait_us(wire->net) < wait_us)
             wait_us = tcp_wire_wait_us(wire->net);
-        }
         first[i] = used;
         used += add_events(wire, fds + used);
     }

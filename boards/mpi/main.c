@@ -90,9 +90,8 @@ static bool heard(struct mpi_board *b) {
 }
 
 static struct mpi_order take_order(struct mpi_board *b) {
-    while (!heard(b)) {
+    while (!heard(b))
         mpi_sleep(&b->place, NULL, 0, &b->heard, 1000000);
-    }
     MPI_Wait(&b->heard, MPI_STATUS_IGNORE);
     struct mpi_order order = b->next;
     listen_for_order(b);
@@ -121,9 +120,8 @@ static void equip(struct mpi_board *b, const struct mpi_order *order,
     b->links =
         order->dimension + (self < order->host_ports || self == 0 ? 1u : 0u);
     b->pipes = calloc(CUBE_LINKS_MAX, sizeof *b->pipes);
-    if (board->arena == NULL || b->pipes == NULL) {
+    if (board->arena == NULL || b->pipes == NULL)
         give_up(self, "this machine does not grant a node's memory");
-    }
     for (unsigned d = 0; d < b->links; d++) {
         int peer = d < order->dimension ? (int)(self ^ 1u << d) + 1 : 0;
         mpi_pipe_open(&b->pipes[d], &b->place, peer, (int)order->tag);
@@ -147,22 +145,18 @@ static void run(struct mpi_board *b, const struct node_board *board) {
     const char *why = NULL;
     struct node *node = node_start(board, &why);
     enum node_event event = NODE_BUSY;
-    if (node == NULL) {
+    if (node == NULL)
         give_up(board->identity.self, why);
-    }
     for (unsigned step = 1; event != NODE_STOPPED; step++) {
         event = node_step(node);
-        if (event == NODE_IDLE) {
+        if (event == NODE_IDLE)
             idle(b, node_wait_us(node));
-        }
-        if ((event == NODE_IDLE || step % STEPS_A_LOOK == 0) && heard(b)) {
+        if ((event == NODE_IDLE || step % STEPS_A_LOOK == 0) && heard(b))
             return;
-        }
     }
     MPI_Request told;
-    for (unsigned d = 0; d < b->links; d++) {
+    for (unsigned d = 0; d < b->links; d++)
         mpi_pipe_end(&b->pipes[d]);
-    }
     MPI_Isend(&b->tag, sizeof b->tag, MPI_BYTE, 0, MPI_TAG_ENDED, b->place.comm,
               &told);
     MPI_Request_free(&told);
@@ -182,9 +176,8 @@ static void take_part(struct mpi_board *b, const struct mpi_order *order) {
         give_up((unsigned)b->place.rank - 1,
                 "the host begins before it has ended; please report this");
     }
-    if (!mpi_place_part(&b->place, b->pipes, b->links, PART_US_MAX)) {
+    if (!mpi_place_part(&b->place, b->pipes, b->links, PART_US_MAX))
         give_up((unsigned)b->place.rank - 1, "other ranks do not end");
-    }
     if (mine) {
         (void)munmap(board.arena, board.arena_bytes);
         free(b->pipes);
@@ -203,9 +196,8 @@ int main(int argc, char **argv) {
         listen_for_order(&board);
         for (;;) {
             struct mpi_order order = take_order(&board);
-            if (order.word != MPI_WORD_BEGIN) {
+            if (order.word != MPI_WORD_BEGIN)
                 break;
-            }
             take_part(&board, &order);
         }
         MPI_Cancel(&board.heard);

@@ -19,13 +19,12 @@ enum { SOURCE = 0x60 / 4, TICK_DUE = 1 << 1 }; /* behind RASPI3B_LOCAL */
 /* One device a call: another that waits calls it again. */
 RASPI3B_HANDLER void raspi3b_interrupt(void) {
     volatile uint32_t *pending = raspi3b_at(RASPI3B_INTERRUPTS);
-    if ((raspi3b_at(RASPI3B_LOCAL)[SOURCE] & TICK_DUE) != 0) {
+    if ((raspi3b_at(RASPI3B_LOCAL)[SOURCE] & TICK_DUE) != 0)
         raspi3b_tick_off();
-    } else if ((pending[PENDING_2] & PL011_PENDING) != 0) {
+    else if ((pending[PENDING_2] & PL011_PENDING) != 0)
         raspi3b_pl011();
-    } else if ((pending[PENDING_1] & AUX_PENDING) != 0) {
+    else if ((pending[PENDING_1] & AUX_PENDING) != 0)
         raspi3b_mini();
-    }
 }
 
 void board_start(void) {
@@ -56,7 +55,6 @@ void board_restart(void) {
     pm[WDOG] = PASSWORD | SOON;
     pm[RSTC] =
         PASSWORD | (pm[RSTC] & ~(PASSWORD | (uint32_t)KIND)) | FULL_RESET;
-    for (;;) {
+    for (;;)
         raspi3b_barrier();
-    }
 }

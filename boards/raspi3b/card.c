@@ -115,11 +115,9 @@ static void put(unsigned word, uint32_t value) {
 /* Until one of these bits is set, or none of them. */
 static bool wait_for(unsigned word, uint32_t bits, bool set, uint64_t us) {
     uint64_t begun_us = board_now_us();
-    while (((get(word) & bits) != 0) != set) {
-        if (board_now_us() - begun_us > us) {
+    while (((get(word) & bits) != 0) != set)
+        if (board_now_us() - begun_us > us)
             return false;
-        }
-    }
     return true;
 }
 
@@ -135,9 +133,8 @@ static bool set_clock(uint32_t divisor) {
         LONGEST_WAIT | CLOCK_INSIDE | (divisor & 0xFF) << 8 | divisor >> 8 << 6;
     put(CLOCK, LONGEST_WAIT);
     put(CLOCK, clock);
-    if (!wait_for(CLOCK, CLOCK_STABLE, true, COMMAND_US)) {
+    if (!wait_for(CLOCK, CLOCK_STABLE, true, COMMAND_US))
         return false;
-    }
     put(CLOCK, clock | CLOCK_OUT);
     return true;
 }
@@ -152,9 +149,8 @@ static void clear_lines(void) {
 /* *answer: of a short one. */
 static bool ask(uint32_t command, uint32_t argument, uint32_t *answer) {
     uint32_t busy = BUSY_COMMAND;
-    if ((command & SHORT_BUSY) == SHORT_BUSY || (command & WRITES) != 0) {
+    if ((command & SHORT_BUSY) == SHORT_BUSY || (command & WRITES) != 0)
         busy |= BUSY_DATA;
-    }
     if (!wait_for(STATE, busy, false, DATA_US)) {
         clear_lines();
         return false;
@@ -184,15 +180,13 @@ static bool wake(void) {
     uint32_t answer = 0;
     uint64_t begun_us = board_now_us();
     bool young = ask(commands.choose, CHOICE, &answer);
-    if (young && (answer & 0xFFF) != CHOICE) {
+    if (young && (answer & 0xFFF) != CHOICE)
         return false;
-    }
     do {
         uint32_t wanted = young ? VOLTAGES | LARGE : VOLTAGES;
         if (!ask_own(commands.condition, wanted, &answer) ||
-            board_now_us() - begun_us > START_US) {
+            board_now_us() - begun_us > START_US)
             return false;
-        }
     } while ((answer & STARTED) == 0);
     it.large = (answer & LARGE) != 0;
     return true;
@@ -203,29 +197,25 @@ static bool start(void) {
     it.ready = false;
     it.relative = 0;
     it.write_us = SLOW_WRITE_US;
-    for (unsigned i = CLOCK_PIN; i <= LAST_PIN; i++) {
+    for (unsigned i = CLOCK_PIN; i <= LAST_PIN; i++)
         raspi3b_pin(i, RASPI3B_FUNCTION_3);
-    }
     raspi3b_pull_up(UINT64_C(0x1F) << (CLOCK_PIN + 1)); /* not the clock */
     put(LINES, 0);
     put(CLOCK, RESET_ALL);
     if (!wait_for(CLOCK, RESET_ALL, false, COMMAND_US) ||
-        !set_clock(SLOW_DIVISOR)) {
+        !set_clock(SLOW_DIVISOR))
         return false;
-    }
     put(EVENTS_CALL, 0);
     put(EVENTS_SEEN, ALL_EVENTS);
     pass(1000); /* 74 cycles of the clock and more, before a card listens */
     if (!ask(commands.idle, 0, &answer) || !wake() ||
         !ask(commands.identify, 0, &answer) ||
-        !ask(commands.address, 0, &answer)) {
+        !ask(commands.address, 0, &answer))
         return false;
-    }
     it.relative = answer & 0xFFFF0000;
     if (!ask(commands.select, it.relative, &answer) ||
-        !ask(commands.size, BLOCK, &answer) || !set_clock(FAST_DIVISOR)) {
+        !ask(commands.size, BLOCK, &answer) || !set_clock(FAST_DIVISOR))
         return false;
-    }
     it.write_us = FAST_WRITE_US;
     it.ready = true;
     return true;
@@ -235,18 +225,16 @@ static bool start(void) {
 static void take(uint8_t *bytes) {
     for (unsigned i = 0; i < BLOCK; i += 4) {
         uint32_t word = get(DATA);
-        for (unsigned k = 0; k < 4; k++) {
+        for (unsigned k = 0; k < 4; k++)
             bytes[i + k] = (uint8_t)(word >> 8 * k);
-        }
     }
 }
 
 static void give(const uint8_t *bytes) {
     for (unsigned i = 0; i < BLOCK; i += 4) {
         uint32_t word = 0;
-        for (unsigned k = 0; k < 4; k++) {
+        for (unsigned k = 0; k < 4; k++)
             word |= (uint32_t)bytes[i + k] << 8 * k;
-        }
         raspi3b_at(RASPI3B_CARD)[DATA] = word;
     }
 }
@@ -255,21 +243,18 @@ static void give(const uint8_t *bytes) {
 static bool move(uint32_t block, uint8_t *to, const uint8_t *from) {
     uint32_t answer = 0, command = to != NULL ? commands.read : commands.write;
     put(BLOCKS, 1u << 16 | BLOCK);
-    if (!ask(command, it.large ? block : block * BLOCK, &answer)) {
+    if (!ask(command, it.large ? block : block * BLOCK, &answer))
         return false;
-    }
     bool good = (answer & REFUSED) == 0 &&
                 wait_for_event(to != NULL ? CAME : ROOM, DATA_US);
-    if (good && to != NULL) {
+    if (good && to != NULL)
         take(to);
-    } else if (good) {
+    else if (good)
         give(from);
-    }
     good = good && wait_for_event(DATA_DONE, DATA_US) &&
            wait_for(STATE, BUSY_DATA, false, DATA_US);
-    if (!good) {
+    if (!good)
         clear_lines();
-    }
     return good;
 }
 
@@ -277,9 +262,8 @@ static bool move(uint32_t block, uint8_t *to, const uint8_t *from) {
 static bool try_to(uint32_t block, uint8_t *to, const uint8_t *from) {
     board_feed();
     for (unsigned i = 0; i < TRIES; i++) {
-        if ((it.ready || start()) && move(block, to, from)) {
+        if ((it.ready || start()) && move(block, to, from))
             return true;
-        }
         it.ready = false;
     }
     return false;

@@ -43,21 +43,17 @@ void raspi3b_tables(void) {
     const uint64_t device = DEVICE | USED | NEVER_RUN;
     bool image = (uintptr_t)bare_code == board_facts.image_at;
     bool loader = (uintptr_t)bare_code_room == board_facts.image_at;
-    for (uint64_t i = image ? IMAGE : 0; i < CODE_BLOCKS; i++) {
+    for (uint64_t i = image ? IMAGE : 0; i < CODE_BLOCKS; i++)
         level2[i] = i * BLOCK | A_BLOCK | CACHED | SHARED | USED | READ_ONLY;
-    }
-    if (loader) {
+    if (loader)
         level2[IMAGE] = (uint64_t)IMAGE * BLOCK | A_BLOCK | data;
-    }
-    for (uint64_t i = DEVICES; i < ENTRIES; i++) {
+    for (uint64_t i = DEVICES; i < ENTRIES; i++)
         level2[i] = i * BLOCK | A_BLOCK | device;
-    }
     uint64_t end = (uint64_t)(DATA + 1) * BLOCK;
     level2[DATA] = (uint64_t)DATA * BLOCK | A_BLOCK | data;
     level2[DATA + 1] = (uintptr_t)data_end | A_TABLE;
-    for (uint64_t i = 0; i < ENTRIES - 1; i++) {
+    for (uint64_t i = 0; i < ENTRIES - 1; i++)
         data_end[i] = (end + i * PAGE) | A_PAGE | data;
-    }
     data_end[ENTRIES - 1] = (end + (ENTRIES - 1) * (uint64_t)PAGE) | A_PAGE |
                             UNCACHED | SHARED | USED | NEVER_RUN;
     raspi3b_level1[0] = (uintptr_t)level2 | A_TABLE;

@@ -31,16 +31,14 @@ void board_wait(uint64_t wait_us) {
 
 void board_guard(uint32_t period_us) {
     time.guard_us = period_us;
-    if (period_us == 0) {
+    if (period_us == 0)
         raspi3b_guard_off();
-    }
     board_feed();
 }
 
 void board_feed(void) {
-    if (time.guard_us != 0) {
+    if (time.guard_us != 0)
         raspi3b_guard_at(raspi3b_count() + counts(time.guard_us));
-    }
 }
 
 /* Timers may still be due from before a restart, which an emulator sees only

@@ -69,9 +69,8 @@ static RASPI3B_HANDLER void raspi3b_pl011_send(void) {
     uart[ICR] = INT_SEND;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[FR] & FR_NO_ROOM) == 0 &&
                     bare_ring_take(&bare_uart[0].send, &byte);
-         n++) {
+         n++)
         uart[DR] = byte;
-    }
 }
 
 static RASPI3B_HANDLER void raspi3b_mini_receive(void) {
@@ -91,51 +90,45 @@ static RASPI3B_HANDLER void raspi3b_mini_send(void) {
     uint8_t byte;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[LSR] & LSR_ROOM) != 0 &&
                     bare_ring_take(&bare_uart[1].send, &byte);
-         n++) {
+         n++)
         uart[IO] = byte;
-    }
     uart[IER] = bare_ring_held(&bare_uart[1].send) > 0 ? IER_RECEIVE | IER_SEND
                                                        : IER_RECEIVE;
 }
 
 /* One way a call: what can go calls again when nothing more comes. */
 RASPI3B_HANDLER void raspi3b_pl011(void) {
-    if ((raspi3b_at(RASPI3B_PL011)[FR] & FR_NOTHING_CAME) == 0) {
+    if ((raspi3b_at(RASPI3B_PL011)[FR] & FR_NOTHING_CAME) == 0)
         raspi3b_pl011_receive();
-    } else {
+    else
         raspi3b_pl011_send();
-    }
 }
 
 /* The overrun's mark goes with the first look at the state. */
 RASPI3B_HANDLER void raspi3b_mini(void) {
     uint32_t state = raspi3b_at(RASPI3B_AUX)[LSR];
     bare_uart[1].overruns += (state & LSR_OVERRUN) != 0;
-    if ((state & LSR_CAME) != 0) {
+    if ((state & LSR_CAME) != 0)
         raspi3b_mini_receive();
-    } else {
+    else
         raspi3b_mini_send();
-    }
 }
 
 void board_uart_send(unsigned uart) {
     uint32_t before = board_lock();
-    if (uart == 0) {
+    if (uart == 0)
         raspi3b_pl011_send();
-    } else {
+    else
         raspi3b_mini_send();
-    }
     board_unlock(before);
 }
 
 bool board_console_put(uint8_t byte) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     uint64_t begun_us = board_now_us();
-    while ((uart[FR] & FR_NO_ROOM) != 0) {
-        if (board_now_us() - begun_us > CONSOLE_US) {
+    while ((uart[FR] & FR_NO_ROOM) != 0)
+        if (board_now_us() - begun_us > CONSOLE_US)
             return false;
-        }
-    }
     uart[DR] = byte;
     return true;
 }
@@ -161,9 +154,8 @@ static void pl011_start(void) {
     uart[LCRH] = EIGHT_BITS_BUFFERED;
     uart[IFLS] = 0; /* at 2 bytes either way */
     uart[ICR] = INT_ALL;
-    while ((uart[FR] & FR_NOTHING_CAME) == 0) {
+    while ((uart[FR] & FR_NOTHING_CAME) == 0)
         raspi3b_pl011_receive();
-    }
     uart[IMSC] = INT_RECEIVE | INT_SEND | INT_LATE;
     uart[CR] = ON_BOTH_WAYS;
 }

@@ -17,18 +17,16 @@ int host_create(const char *path, mode_t mode) {
 FILE *host_create_over(const char *path) {
     int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | SAFE, 0666);
     FILE *file = fd < 0 ? NULL : fdopen(fd, "w");
-    if (fd >= 0 && file == NULL) {
+    if (fd >= 0 && file == NULL)
         (void)close(fd);
-    }
     return file;
 }
 
 /* Why not to use the folder; NULL: it is this user's alone. */
 static const char *fault_of(int folder) {
     struct stat about;
-    if (fstat(folder, &about) != 0) {
+    if (fstat(folder, &about) != 0)
         return "cannot be examined; give another place";
-    }
     return about.st_uid != geteuid()
                ? "belongs to another user; remove it, or give another place"
            : (about.st_mode & OTHERS) != 0

@@ -7,9 +7,8 @@
 #include "text.h"
 
 int host_fail(struct host_error *error, int code, const char *format, ...) {
-    if (error->code != 0) {
+    if (error->code != 0)
         return error->code;
-    }
     char raw[sizeof error->text];
     va_list arguments;
     va_start(arguments, format);

@@ -18,16 +18,13 @@ static void *reserve(size_t bytes) {
     size_t extra = bytes >= 2 * huge ? huge : 0;
     char *space = mmap(NULL, bytes + extra, PROT_READ | PROT_WRITE,
                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    if (space == MAP_FAILED) {
+    if (space == MAP_FAILED)
         return NULL;
-    }
-    if (extra == 0) {
+    if (extra == 0)
         return space;
-    }
     size_t skip = (huge - (uintptr_t)space % huge) % huge;
-    if (skip > 0) {
+    if (skip > 0)
         (void)munmap(space, skip);
-    }
     if (extra > skip) {
         size_t page = 4096, end = (bytes + page - 1) / page * page;
         (void)munmap(space + skip + end, extra - skip);
@@ -137,9 +134,8 @@ static uint64_t number_in(const char *path, const char *name,
             value = end == line + n ? without : number;
         }
     }
-    if (file != NULL) {
+    if (file != NULL)
         (void)fclose(file);
-    }
     return value;
 }
 
@@ -151,9 +147,8 @@ static uint64_t status_bytes(const char *name) {
 uint64_t host_memory_peak(void) {
     uint64_t bytes = status_bytes("VmHWM:");
     struct rusage usage;
-    if (bytes == 0 && getrusage(RUSAGE_SELF, &usage) == 0) {
+    if (bytes == 0 && getrusage(RUSAGE_SELF, &usage) == 0)
         bytes = (uint64_t)usage.ru_maxrss * 1024; /* survives exec */
-    }
     return bytes;
 }
 
@@ -179,9 +174,8 @@ static uint64_t left_in_group(const char *directory,
     char name[4096 + 64];
     (void)snprintf(name, sizeof name, "%s/%s", directory, c->limit);
     uint64_t limit = number_in(name, "", UINT64_MAX); /* may be "max" */
-    if (limit == UINT64_MAX) {
+    if (limit == UINT64_MAX)
         return limit;
-    }
     (void)snprintf(name, sizeof name, "%s/%s", directory, c->used);
     uint64_t used = number_in(name, "", 0);
     (void)snprintf(name, sizeof name, "%s/memory.stat", directory);
@@ -197,9 +191,8 @@ static uint64_t left_above(const char *mount, const char *path,
     size_t root = strlen(mount) + strlen(c->folder);
     int n =
         snprintf(directory, sizeof directory, "%s%s%s", mount, c->folder, path);
-    if (n < 0 || (size_t)n >= sizeof directory) {
+    if (n < 0 || (size_t)n >= sizeof directory)
         return left;
-    }
     for (char *end = directory + n; end != NULL;) {
         *end = '\0';
         left = least(left, left_in_group(directory, c));
@@ -220,20 +213,17 @@ uint64_t host_memory_in_groups(const char *list, const char *mount) {
     while (file != NULL && fgets(line, sizeof line, file) != NULL) {
         char *names = strchr(line, ':');
         char *path = names == NULL ? NULL : strchr(names + 1, ':');
-        if (path == NULL) {
+        if (path == NULL)
             continue;
-        }
         *path++ = '\0';
         path[strcspn(path, "\n")] = '\0';
-        if (names[1] == '\0') {
+        if (names[1] == '\0')
             left = least(left, left_above(mount, path, &second));
-        } else if (strcmp(names + 1, "memory") == 0) {
+        else if (strcmp(names + 1, "memory") == 0)
             left = least(left, left_above(mount, path, &first));
-        }
     }
-    if (file != NULL) {
+    if (file != NULL)
         (void)fclose(file);
-    }
     return left;
 }
 
@@ -250,11 +240,9 @@ uint64_t host_memory_available(void) {
     struct rlimit limit;
     left = least(left,
                  host_memory_in_groups("/proc/self/cgroup", "/sys/fs/cgroup"));
-    if (getrlimit(RLIMIT_AS, &limit) == 0) {
+    if (getrlimit(RLIMIT_AS, &limit) == 0)
         left = least(left, left_by(&limit, "VmSize:"));
-    }
-    if (getrlimit(RLIMIT_DATA, &limit) == 0) {
+    if (getrlimit(RLIMIT_DATA, &limit) == 0)
         left = least(left, left_by(&limit, "VmData:"));
-    }
     return left;
 }

@@ -14,25 +14,20 @@ static bool add_part(struct host_node_set *set, const char *text,
                      const char *end, unsigned nodes) {
     char part[PART_BYTES], *dash;
     uint64_t first, last;
-    if (end == text || end - text >= PART_BYTES) {
+    if (end == text || end - text >= PART_BYTES)
         return false;
-    }
     snprintf(part, sizeof part, "%.*s", (int)(end - text), text);
-    if (part[strspn(part, "0123456789-")] != '\0') {
+    if (part[strspn(part, "0123456789-")] != '\0')
         return false; /* a number here has no exponent and no unit */
-    }
     dash = strchr(part, '-');
-    if (dash != NULL) {
+    if (dash != NULL)
         *dash = '\0';
-    }
     if (host_parse_number(part, 0, nodes - 1, &first) != 0 ||
         host_parse_number(dash == NULL ? part : dash + 1, first, nodes - 1,
-                          &last) != 0) {
+                          &last) != 0)
         return false;
-    }
-    for (uint64_t node = first; node <= last; node++) {
+    for (uint64_t node = first; node <= last; node++)
         host_node_set_add(set, (unsigned)node);
-    }
     return true;
 }
 
@@ -60,16 +55,14 @@ int host_node_set_parse(struct host_node_set *set, const char *text,
 
 void host_node_set_all(struct host_node_set *set, unsigned nodes) {
     memset(set, 0, sizeof *set);
-    for (unsigned node = 0; node < nodes; node++) {
+    for (unsigned node = 0; node < nodes; node++)
         host_node_set_add(set, node);
-    }
 }
 
 unsigned host_node_set_count(const struct host_node_set *set) {
     unsigned count = 0;
-    for (size_t i = 0; i < sizeof set->bits; i++) {
+    for (size_t i = 0; i < sizeof set->bits; i++)
         count += (unsigned)__builtin_popcount(set->bits[i]);
-    }
     return count;
 }
 
@@ -81,12 +74,10 @@ void host_node_set_print(const struct host_node_set *set, char *text,
     for (unsigned first = 0, last; left > 0; first = last + 1) {
         char part[PART_BYTES];
         last = first;
-        if (!host_node_set_has(set, first)) {
+        if (!host_node_set_has(set, first))
             continue;
-        }
-        while (last + 1 < CUBE_NODES_MAX && host_node_set_has(set, last + 1)) {
+        while (last + 1 < CUBE_NODES_MAX && host_node_set_has(set, last + 1))
             last++;
-        }
         left -= last - first + 1;
         snprintf(part, sizeof part, last == first ? "%s%u" : "%s%u-%u",
                  used == 0 ? "" : ",", first, last);

@@ -30,20 +30,17 @@ static void fill(struct table *t, const struct argp_option *options,
     static const char *const answered[] = {"help", "usage", "version"};
     size_t n = 0, letters = 0;
     memset(t, 0, sizeof *t);
-    if ((flags & ARGP_IN_ORDER) != 0) {
+    if ((flags & ARGP_IN_ORDER) != 0)
         t->letters[letters++] = '+';
-    }
     t->letters[letters++] = ':';
     t->letters[letters++] = 'V';
     t->letters[letters++] = 'h';
-    for (; n < sizeof answered / sizeof answered[0]; n++) {
+    for (; n < sizeof answered / sizeof answered[0]; n++)
         t->name[n] = (struct option){answered[n], 0, NULL, KEY_ANSWER};
-    }
     for (size_t i = 0; options != NULL; i++) {
         const struct argp_option *o = &options[i];
-        if (o->name == NULL && o->key == 0 && o->doc == NULL) {
+        if (o->name == NULL && o->key == 0 && o->doc == NULL)
             break;
-        }
         assert(i < HOST_OPTIONS_MAX - 1);
         int value = o->arg == NULL                          ? no_argument
                     : (o->flags & OPTION_ARG_OPTIONAL) != 0 ? optional_argument
@@ -54,9 +51,8 @@ static void fill(struct table *t, const struct argp_option *options,
         }
         if (o->key > ' ' && o->key < 0x7f) {
             t->letters[letters++] = (char)o->key;
-            for (int colons = 0; colons < value; colons++) { /* or two */
+            for (int colons = 0; colons < value; colons++) /* or two */
                 t->letters[letters++] = ':';
-            }
         }
     }
 }
@@ -123,14 +119,12 @@ static int refuse_letter(const struct table *t, const char *command,
 static int refuse(const struct table *t, char **argv,
                   struct host_error *error) {
     const char *word = argv[optind - 1], *next = argv[optind];
-    if (optopt == 0 || optopt >= KEY_LONG || optopt == KEY_ANSWER) {
+    if (optopt == 0 || optopt >= KEY_LONG || optopt == KEY_ANSWER)
         return refuse_long(t, argv[0], word, optopt != 0, error);
-    }
     /* Before the last letter of a word, it is still at that word. */
     if (next != NULL && next[0] == '-' && next[1] != '-' &&
-        strchr(next, optopt) != NULL) {
+        strchr(next, optopt) != NULL)
         word = next;
-    }
     return refuse_letter(t, argv[0], word, optopt, error);
 }
 
@@ -139,9 +133,8 @@ static int refuse(const struct table *t, char **argv,
 static bool find_readme(char path[PATH_MAX]) {
     static const char readme[] = "/../share/doc/incode/README.md";
     ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - sizeof readme);
-    if (n <= 0) {
+    if (n <= 0)
         return false;
-    }
     path[n] = '\0';
     *strrchr(path, '/') = '\0';
     strcat(path, readme);
@@ -162,12 +155,10 @@ static char *name_readme(int key, const char *text, void *input) {
     char *at = mine == NULL ? NULL : strstr(mine, name);
     if (at == NULL || !find_readme(path) ||
         asprintf(&whole, "%.*s%s%s", (int)(at - mine), mine, path,
-                 at + strlen(name)) < 0) {
+                 at + strlen(name)) < 0)
         return mine;
-    }
-    if (mine != text) {
+    if (mine != text)
         free(mine);
-    }
     return whole;
 }
 
@@ -176,9 +167,8 @@ static void answer_help(const struct argp *argp, char *command, unsigned flags,
                         void *input) {
     static char help[] = "--help";
     char *words[] = {command, help, NULL};
-    if ((flags & ARGP_NO_HELP) == 0) {
+    if ((flags & ARGP_NO_HELP) == 0)
         (void)argp_parse(argp, 2, words, 0, NULL, input);
-    }
 }
 
 /* What getopt, which argp works with, would say of itself. */
@@ -201,12 +191,10 @@ static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
             answer_help(argp, argv[0], flags, input);
             return -1;
         }
-        if (found == '?' && optopt == '?') {
+        if (found == '?' && optopt == '?')
             break;
-        }
-        if (found == '?') {
+        if (found == '?')
             return refuse(&table, argv, error);
-        }
     } while (found != -1 && found != KEY_ANSWER && found != 'V');
     return 0;
 }
@@ -228,9 +216,8 @@ int host_options_parse(const struct argp *argp, int argc, char **argv,
 int host_option_number(const char *option, const char *value, uint64_t least,
                        uint64_t most, uint64_t *number,
                        struct host_error *error) {
-    if (host_parse_number(value, least, most, number) == 0) {
+    if (host_parse_number(value, least, most, number) == 0)
         return 0;
-    }
     return most == UINT64_MAX
                ? host_fail(error, HOST_USAGE,
                            "--%s %s: not a number; give %llu or more", option,

@@ -40,9 +40,8 @@ static struct {
 static void put(const char *text, size_t bytes) {
     for (size_t done = 0; done < bytes;) {
         ssize_t n = write(STDERR_FILENO, text + done, bytes - done);
-        if (n < 0 && errno != EINTR) {
+        if (n < 0 && errno != EINTR)
             return; /* nobody is there to be told */
-        }
         done += n > 0 ? (size_t)n : 0;
     }
 }
@@ -57,11 +56,10 @@ static unsigned columns(void) {
 
 /* What takes so many rows away is there before they are. */
 static void show(const char *text, size_t bytes, unsigned rows) {
-    if (rows > 1) {
+    if (rows > 1)
         snprintf(line.gone, sizeof line.gone, "\033[%uA\r\033[J", rows - 1);
-    } else {
+    else
         snprintf(line.gone, sizeof line.gone, "\r\033[K");
-    }
     line.shown = 1;
     put(text, bytes);
 }
@@ -70,9 +68,8 @@ static void show(const char *text, size_t bytes, unsigned rows) {
 static void draw_rows(void) {
     char text[ROWS_MAX * (TEXT + 8)];
     int n = 0, width = (int)columns();
-    if (line.shown && line.rows > 1) {
+    if (line.shown && line.rows > 1)
         n = snprintf(text, sizeof text, "\033[%uA", line.rows - 1);
-    }
     for (unsigned i = 0; i < line.rows; i++) {
         n += snprintf(text + n, sizeof text - (size_t)n, "%s\r%.*s\033[K",
                       i == 0 ? "" : "\n", width, line.row[i]);
@@ -157,12 +154,10 @@ static void compose(double part, bool has_total, struct tails tails) {
                       (int)(100.0 * part));
     }
     unsigned used = (unsigned)n, bar = has_total ? BAR_MIN + 3 : 0;
-    while (tail + 2 < TAILS && used + bar + strlen(tails.text[tail]) > width) {
+    while (tail + 2 < TAILS && used + bar + strlen(tails.text[tail]) > width)
         tail++;
-    }
-    while (tail + 1 < TAILS && used + strlen(tails.text[tail]) > width) {
+    while (tail + 1 < TAILS && used + strlen(tails.text[tail]) > width)
         tail++;
-    }
     used += (unsigned)strlen(tails.text[tail]);
     if (has_total && line.terminal && used + bar <= width) {
         unsigned room = width - used - 3;
@@ -176,13 +171,11 @@ static void compose(double part, bool has_total, struct tails tails) {
 }
 
 void host_progress_show(uint64_t done, uint64_t total, uint64_t amount) {
-    if (!line.wanted || line.what == NULL) {
+    if (!line.wanted || line.what == NULL)
         return;
-    }
     uint64_t now = host_now_us();
-    if (now < line.next_us) {
+    if (now < line.next_us)
         return;
-    }
     line.next_us = now + (line.terminal ? EVERY_US : LINE_US);
     double seconds = 1e-6 * (double)(now - line.start_us);
     double part = total == 0 ? 0.0 : (double)done / (double)total;
@@ -198,9 +191,8 @@ void host_progress_add(uint64_t amount) {
 
 unsigned host_progress_rows_max(void) {
     struct winsize size;
-    if (!line.wanted || !line.terminal) {
+    if (!line.wanted || !line.terminal)
         return 0;
-    }
     bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row;
     unsigned all = known ? size.ws_row : HEIGHT;
     return all <= 2 ? 1 : all - 2 < ROWS_MAX ? all - 2 : ROWS_MAX;
@@ -217,9 +209,8 @@ void host_progress_row(unsigned row, const char *head, double part,
                        const char *tail) {
     char bar[BAR_MAX + 16] = "";
     unsigned width = columns();
-    if (row >= line.rows) {
+    if (row >= line.rows)
         return;
-    }
     unsigned used = (unsigned)(strlen(head) + strlen(tail)) + 10;
     if (part >= 0.0 && used + BAR_MIN <= width) {
         unsigned cells = width - used < BAR_MAX ? width - used : BAR_MAX;
@@ -274,7 +265,6 @@ void host_note(const char *format, ...) {
     strcat(text, "\n");
     host_progress_erase();
     put(text, strlen(text));
-    if (again) {
+    if (again)
         draw();
-    }
 }

@@ -71,9 +71,8 @@ static void put_character(struct quoting *q, const char *at, size_t bytes,
 int host_text_quote(char *out, size_t size, const char *text) {
     struct quoting q = {out, size, 0, false};
     bool plain = is_plain(text);
-    if (plain || *text == '\0') {
+    if (plain || *text == '\0')
         put(&q, plain ? text : "''", plain ? strlen(text) : 2);
-    }
     while (!plain && *text != '\0') {
         size_t shown = cube_text_shown(text);
         put_character(&q, text, shown > 0 ? shown : 1, shown > 0);
@@ -98,9 +97,8 @@ static unsigned least(unsigned a, unsigned b) {
 static unsigned distance(const char *a, const char *b) {
     unsigned row[3][WORD_MAX + 1];
     size_t n = strnlen(a, WORD_MAX), m = strnlen(b, WORD_MAX);
-    for (unsigned k = 0; k <= m; k++) {
+    for (unsigned k = 0; k <= m; k++)
         row[0][k] = k;
-    }
     for (unsigned i = 1; i <= n; i++) {
         unsigned *now = row[i % 3];
         const unsigned *before = row[(i + 2) % 3], *first = row[(i + 1) % 3];
@@ -108,10 +106,8 @@ static unsigned distance(const char *a, const char *b) {
         for (unsigned k = 1; k <= m; k++) {
             now[k] = least(least(before[k], now[k - 1]) + 1,
                            before[k - 1] + (a[i - 1] != b[k - 1]));
-            if (i > 1 && k > 1 && a[i - 1] == b[k - 2] &&
-                a[i - 2] == b[k - 1]) {
+            if (i > 1 && k > 1 && a[i - 1] == b[k - 2] && a[i - 2] == b[k - 1])
                 now[k] = least(now[k], first[k - 2] + 1);
-            }
         }
     }
     return row[n % 3][m];
@@ -145,9 +141,8 @@ void host_say(FILE *stream, const char *format, ...) {
     (void)vsnprintf(raw, sizeof raw, format, arguments);
     va_end(arguments);
     size = strlen(raw);
-    if (ends && raw[size - 1] == '\n') {
+    if (ends && raw[size - 1] == '\n')
         raw[size - 1] = '\0';
-    }
     host_text_printable(line, sizeof line, raw);
     (void)fprintf(stream, "%s%s", line, ends ? "\n" : "");
 }
@@ -171,9 +166,8 @@ static bool append(uint64_t *number, unsigned digit) {
 static bool read_digits(const char **text, uint64_t *number) {
     const char *at = *text;
     bool good = is_digit(*at);
-    while (good && is_digit(*at)) {
+    while (good && is_digit(*at))
         good = append(number, (unsigned)(*at++ - '0'));
-    }
     *text = at;
     return good;
 }
@@ -183,14 +177,12 @@ static bool read_exponent(const char *text, uint64_t *number) {
     uint64_t exponent = 0, places = 0;
     if (*text == '.') {
         const char *point = text++;
-        if (!read_digits(&text, number)) {
+        if (!read_digits(&text, number))
             return false;
-        }
         places = (uint64_t)(text - point - 1);
     }
-    if (*text != 'e' && *text != 'E') {
+    if (*text != 'e' && *text != 'E')
         return false;
-    }
     text += text[1] == '+' ? 2 : 1;
     bool good = read_digits(&text, &exponent) && *text == '\0';
     while (good && *number != 0 && exponent > places) {
@@ -218,9 +210,8 @@ int host_parse_number(const char *text, uint64_t lo, uint64_t hi,
     if (!read_digits(&text, &value) ||
         (*text != '\0' && !read_thousands(text, &value) &&
          !read_exponent(text, &value)) ||
-        value < lo || value > hi) {
+        value < lo || value > hi)
         return -1;
-    }
     *number = value;
     return 0;
 }
@@ -229,22 +220,19 @@ int host_parse_bytes(const char *text, uint64_t *bytes) {
     static const char units[] = "KMG";
     uint64_t value = 0;
     unsigned shift = 0;
-    if (!read_digits(&text, &value)) {
+    if (!read_digits(&text, &value))
         return -1;
-    }
     text += *text == ' ' && text[1] != '\0' ? 1 : 0;
     if (*text != '\0') {
         const char *unit = strchr(units, *text >= 'a' ? *text - 32 : *text);
         if (unit == NULL ||
             (text[1] != '\0' && strcasecmp(text + 1, "b") != 0 &&
-             strcasecmp(text + 1, "ib") != 0)) {
+             strcasecmp(text + 1, "ib") != 0))
             return -1;
-        }
         shift = 10 * (unsigned)(unit - units + 1);
     }
-    if (value > UINT64_MAX >> 20 >> shift) {
+    if (value > UINT64_MAX >> 20 >> shift)
         return -1;
-    }
     *bytes = value << shift;
     return 0;
 }

@@ -59,19 +59,16 @@ static bool take(struct bench *b, const struct link_message *m, unsigned role) {
     uint64_t value;
     uint8_t what = m->data[0];
     memcpy(&value, m->data + 8, sizeof value);
-    if (role == 1 && what == ECHO) {
+    if (role == 1 && what == ECHO)
         return say(b, ECHO, value, m->size);
-    }
-    if (role == 1 && what == USED) {
+    if (role == 1 && what == USED)
         return say(b, USED, host_bench_used_us(), HOST_BENCH_SMALL);
-    }
-    if (what == STREAM) {
+    if (what == STREAM)
         b->due = (uint32_t)value;
-    } else if (what == DATA) {
+    else if (what == DATA)
         b->got++;
-    } else if (what == LEAVE) {
+    else if (what == LEAVE)
         b->left = true;
-    }
     memcpy(b->answer, m->data, HOST_BENCH_SMALL);
     return true;
 }
@@ -87,13 +84,11 @@ static unsigned turn(struct bench *b, unsigned role) {
         b->heard_us = now;
         got++;
     }
-    while (b->due > 0 && say(b, DATA, 0, HOST_BENCH_MESSAGE)) {
+    while (b->due > 0 && say(b, DATA, 0, HOST_BENCH_MESSAGE))
         b->due--;
-    }
     moved += link_poll_send(b->link, host_now_us());
-    if (got == 0 && moved == 0) {
+    if (got == 0 && moved == 0)
         b->end->idle(b->end->context, link_next_due_us(b->link, now));
-    }
     return got;
 }
 
@@ -104,14 +99,11 @@ static bool patient(const struct bench *b) {
 /* Microseconds from question to answer; < 0: there is none. */
 static double ask(struct bench *b, uint8_t what, size_t size) {
     uint64_t begin = host_now_us();
-    while (!say(b, what, 0, size)) {
+    while (!say(b, what, 0, size))
         (void)turn(b, 0);
-    }
-    while (turn(b, 0) == 0) {
-        if (!patient(b)) {
+    while (turn(b, 0) == 0)
+        if (!patient(b))
             return -1;
-        }
-    }
     return (double)(host_now_us() - begin);
 }
 
@@ -121,9 +113,8 @@ static double mean_round_trip(struct bench *b, size_t size) {
     for (unsigned i = 1; i <= PINGS; i++) {
         double us = ask(b, ECHO, size);
         sum += us;
-        if (us < 0 || host_now_us() - begin > TRIAL_US) {
+        if (us < 0 || host_now_us() - begin > TRIAL_US)
             return us < 0 ? us : sum / i;
-        }
     }
     return sum / PINGS;
 }
@@ -131,16 +122,14 @@ static double mean_round_trip(struct bench *b, size_t size) {
 /* `count` messages each way at once: microseconds. */
 static double stream(struct bench *b, uint32_t count) {
     uint64_t begin = host_now_us();
-    while (!say(b, STREAM, count, HOST_BENCH_SMALL)) {
+    while (!say(b, STREAM, count, HOST_BENCH_SMALL))
         (void)turn(b, 0);
-    }
     b->due = count;
     b->got = 0;
     while (b->got < count || b->due > 0 || !link_idle(b->link)) {
         (void)turn(b, 0);
-        if (!patient(b)) {
+        if (!patient(b))
             return -1;
-        }
     }
     return (double)(host_now_us() - begin);
 }
@@ -155,9 +144,8 @@ static uint64_t used_by_both(struct bench *b) {
 static int measure(struct bench *b, struct host_bench_row *row) {
     row->round_trip_us =
         ask(b, ECHO, HOST_BENCH_SMALL) < 0 ? -1 : 0; /* shakes hands */
-    if (row->round_trip_us < 0) {
+    if (row->round_trip_us < 0)
         return -1;
-    }
     row->round_trip_us = mean_round_trip(b, HOST_BENCH_SMALL);
     row->hop_us = mean_round_trip(b, HOST_BENCH_MESSAGE) / 2;
     double trial = stream(b, FIRST);
@@ -199,9 +187,8 @@ int host_bench_end(struct host_bench_end *end, unsigned role,
         (void)say(&b, LEAVE, 0, HOST_BENCH_SMALL);
         linger(&b);
     } else if (b.link != NULL) {
-        while (!b.left && patient(&b)) {
+        while (!b.left && patient(&b))
             (void)turn(&b, role);
-        }
         linger(&b);
         status = b.left ? 0 : -1;
     }
@@ -344,9 +331,8 @@ static bool parse_paper(int key, const char *value, struct arguments *a) {
 
 static error_t parse_bench(int key, char *value, struct argp_state *state) {
     struct arguments *a = state->input;
-    if (parse_paper(key, value, a)) {
+    if (parse_paper(key, value, a))
         return 0;
-    }
     switch (key) {
     case KEY_ROUNDS:
         a->of_peers = "--rounds";
@@ -418,9 +404,8 @@ static int check(const struct arguments *a, struct host_error *error) {
     static const char *const all[] = {"paper", "links", "boards", "scaling",
                                       "peers"};
     bool known = false, peers = strcmp(a->what, "peers") == 0;
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         known = known || strcmp(a->what, all[i]) == 0;
-    }
     if (!known) {
         return host_fail(error, HOST_USAGE,
                          "bench %s: not in this version; allowed: paper, "
@@ -446,28 +431,24 @@ int host_bench(int argc, char **argv, struct host_error *error) {
     struct arguments a = {.peers = {.rounds = 3, .limit_s = 60},
                           .error = error};
     if (host_options_parse(&bench_arguments_bench, argc, argv, 0, &a, error) !=
-        0) {
+        0)
         return error->code;
-    }
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,
                          "%s: too few arguments; give paper, links, boards, "
                          "scaling or peers, see --help",
                          argv[0]);
     }
-    if (check(&a, error) != 0) {
+    if (check(&a, error) != 0)
         return error->code;
-    }
-    if (strcmp(a.what, "links") == 0) {
+    if (strcmp(a.what, "links") == 0)
         return host_bench_links(error);
-    }
     if (strcmp(a.what, "boards") == 0) {
         struct host_bench_boards_options boards = {a.paper.csv, a.paper.svg};
         return host_bench_boards(&boards, error);
     }
-    if (strcmp(a.what, "peers") == 0) {
+    if (strcmp(a.what, "peers") == 0)
         return host_bench_peers(&a.peers, error);
-    }
     if (strcmp(a.what, "scaling") == 0) {
         struct host_scaling_options scaling = {a.paper.quick, a.paper.nodes_max,
                                                a.paper.csv, a.paper.svg};
@@ -477,9 +458,8 @@ int host_bench(int argc, char **argv, struct host_error *error) {
         }
         return host_bench_scaling(&scaling, error);
     }
-    if (a.paper.nodes_max == 0) {
+    if (a.paper.nodes_max == 0)
         a.paper.nodes_max = a.paper.quick ? NODES_QUICK : NODES;
-    }
     return host_bench_paper(&a.paper, error);
 }
 
@@ -501,13 +481,11 @@ static void build_folder(char folder[PATH_MAX]) {
     ssize_t n = readlink("/proc/self/exe", folder, PATH_MAX - 1);
     folder[n > 0 ? n : 0] = '\0';
     char *slash = strrchr(folder, '/');
-    if (slash != NULL) {
+    if (slash != NULL)
         *slash = '\0';
-    }
     (void)snprintf(archive, sizeof archive, "%s/libcore.a", folder);
-    if (access(archive, R_OK) != 0) {
+    if (access(archive, R_OK) != 0)
         (void)snprintf(folder, PATH_MAX, "build");
-    }
 }
 
 /* Bit i: peer i is wanted. */
@@ -517,9 +495,8 @@ static int parse(const char *wanted, unsigned *set, struct host_error *error) {
         size_t n = strcspn(at, ",");
         unsigned i = 0;
         while (i < HOST_BENCH_PEERS && (strlen(peers[i].name) != n ||
-                                        memcmp(peers[i].name, at, n) != 0)) {
+                                        memcmp(peers[i].name, at, n) != 0))
             i++;
-        }
         if (i == HOST_BENCH_PEERS) {
             return host_fail(error, HOST_USAGE,
                              "--peers %.*s: not in this version; allowed: "
@@ -540,9 +517,8 @@ static int make(const char *folder, const char *path,
     struct host_trial trial;
     (void)snprintf(build, sizeof build, "BUILD=%s", folder);
     (void)snprintf(target, sizeof target, "%s", path);
-    if (host_trial_run(words, MAKE_S, &trial, error) != 0) {
+    if (host_trial_run(words, MAKE_S, &trial, error) != 0)
         return error->code;
-    }
     return trial.status == 0
                ? 0
                : host_fail(error, HOST_BROKEN,
@@ -564,9 +540,8 @@ static int need_source(const char *bench, struct host_error *error) {
 int host_bench_made(const char *name, char path[4096],
                     struct host_error *error) {
     char folder[PATH_MAX];
-    if (need_source("boards", error) != 0) {
+    if (need_source("boards", error) != 0)
         return error->code;
-    }
     build_folder(folder);
     (void)snprintf(path, 4096, "%.4000s/peers/%s", folder, name);
     return make(folder, path, error);
@@ -577,19 +552,15 @@ int host_bench_build(struct host_bench_builds *builds, const char *wanted,
     char folder[PATH_MAX];
     unsigned set;
     memset(builds, 0, sizeof *builds);
-    if (parse(wanted == NULL ? "cgal,tetgen,qhull" : wanted, &set, error) !=
-        0) {
+    if (parse(wanted == NULL ? "cgal,tetgen,qhull" : wanted, &set, error) != 0)
         return error->code;
-    }
-    if (need_source("peers", error) != 0) {
+    if (need_source("peers", error) != 0)
         return error->code;
-    }
     build_folder(folder);
     host_progress_phase("making the peers", NULL);
     for (unsigned i = 0; i < HOST_BENCH_PEERS && error->code == 0; i++) {
-        if ((set >> i & 1) == 0) {
+        if ((set >> i & 1) == 0)
             continue;
-        }
         if (access(peers[i].header, R_OK) != 0) {
             host_note("%s: left out, as it is not installed; to have it: apt "
                       "install %s",

@@ -58,9 +58,8 @@ struct functions {
 static const char *in_board(const char *path) {
     static const char firmware[] = "/firmware/";
     const char *found = NULL;
-    for (const char *at = path; (at = strstr(at, firmware)) != NULL; at++) {
+    for (const char *at = path; (at = strstr(at, firmware)) != NULL; at++)
         found = at;
-    }
     found = found == NULL ? NULL : strchr(found + sizeof firmware - 1, '/');
     return found == NULL ? NULL : found + 1;
 }
@@ -88,9 +87,8 @@ static bool keep(struct functions *functions, struct function function) {
     if (functions->count % STEP == 0) {
         struct function *more =
             realloc(functions->all, (functions->count + STEP) * sizeof *more);
-        if (more == NULL) {
+        if (more == NULL)
             return false;
-        }
         functions->all = more;
     }
     functions->all[functions->count++] = function;
@@ -114,9 +112,8 @@ static bool read_map(FILE *file, struct functions *functions) {
             sscanf(at, " 0x%" SCNx64 " 0x%" SCNx64 " %4095s", &function.from,
                    &function.bytes, object) == 3 &&
             function.bytes > 0 && room_of(object, &function.room) &&
-            !keep(functions, function)) {
+            !keep(functions, function))
             return false;
-        }
     }
     if (functions->count > 0) {
         qsort(functions->all, functions->count, sizeof *functions->all,
@@ -131,11 +128,10 @@ static enum host_room room_at(const struct functions *functions,
     size_t low = 0, high = functions->count;
     while (high - low > 1) {
         size_t middle = (low + high) / 2;
-        if (functions->all[middle].from <= address) {
+        if (functions->all[middle].from <= address)
             low = middle;
-        } else {
+        else
             high = middle;
-        }
     }
     const struct function *function = &functions->all[low];
     return address - function->from < function->bytes ? function->room
@@ -163,9 +159,8 @@ static int add_folder(const char *folder, const struct functions *functions,
                          strerror(errno));
     }
     while ((entry = readdir(open_folder)) != NULL && error->code == 0) {
-        if (strstr(entry->d_name, ".count") == NULL) {
+        if (strstr(entry->d_name, ".count") == NULL)
             continue;
-        }
         (void)snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
         FILE *file = fopen(path, "rbe");
         if (file == NULL) {
@@ -186,9 +181,8 @@ int host_boards_count(const char *map, const char *folder,
     struct functions functions = {NULL, 0};
     FILE *file = fopen(map, "re");
     bool good = file != NULL && read_map(file, &functions);
-    if (file != NULL) {
+    if (file != NULL)
         (void)fclose(file);
-    }
     if (!good) {
         host_fail(error, HOST_BROKEN,
                   "%s: no map of a linker; make it with: make firmware", map);
@@ -210,9 +204,8 @@ static const char *const colors[HOST_ROOMS] = {"#4477aa", "#aaccee", "#228833",
 
 double host_boards_share(const struct host_boards_row *row, unsigned room) {
     double all = 0;
-    for (unsigned i = 0; i < HOST_ROOMS; i++) {
+    for (unsigned i = 0; i < HOST_ROOMS; i++)
         all += row->counted[i];
-    }
     return all > 0 ? 100 * row->counted[room] / all : 0;
 }
 
@@ -250,9 +243,8 @@ static int host_boards_plot(const char *path,
                             struct host_error *error) {
     double most = 1;
     int y = TOP;
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         most = rows[i].instructions > most ? rows[i].instructions : most;
-    }
     FILE *file = host_create_over(path);
     if (file != NULL) {
         fprintf(file,
@@ -263,9 +255,8 @@ static int host_boards_plot(const char *path,
                 "where they go</text>\n",
                 WIDTH, TOP + (int)count * STEP + 10, LEFT);
         draw_key(file, TOP - 24);
-        for (unsigned i = 0; i < count; i++, y += STEP) {
+        for (unsigned i = 0; i < count; i++, y += STEP)
             draw_row(file, &rows[i], most, y);
-        }
         fprintf(file, "</svg>\n");
     }
     if (file == NULL || ferror(file) != 0 || fclose(file) != 0) {
@@ -327,14 +318,11 @@ static void take_away(const struct bench *b, const char *name) {
 static void take_all_away(const struct bench *b) {
     struct dirent *entry;
     DIR *folder = opendir(b->folder);
-    while (folder != NULL && (entry = readdir(folder)) != NULL) {
-        if (entry->d_name[0] != '.') {
+    while (folder != NULL && (entry = readdir(folder)) != NULL)
+        if (entry->d_name[0] != '.')
             take_away(b, entry->d_name);
-        }
-    }
-    if (folder != NULL) {
+    if (folder != NULL)
         (void)closedir(folder);
-    }
     (void)rmdir(b->folder);
 }
 
@@ -389,9 +377,8 @@ static int run(struct bench *b, const char *board, struct host_error *error) {
         "--patience",     "600",     "--stats",   b->stats, NULL};
     struct host_trial trial;
     (void)snprintf(nodes, sizeof nodes, "%d", NODES);
-    if (host_trial_run((char *const *)words, LIMIT_S, &trial, error) != 0) {
+    if (host_trial_run((char *const *)words, LIMIT_S, &trial, error) != 0)
         return error->code;
-    }
     if (trial.late || trial.status != 0) {
         return host_fail(error, HOST_CUBE, "%s: %s; see incode run --board %s",
                          board, trial.late ? "not ended in time" : trial.said,
@@ -399,9 +386,8 @@ static int run(struct bench *b, const char *board, struct host_error *error) {
     }
     json_t *root = json_load_file(b->stats, 0, NULL);
     const char *digest = json_string_value(json_object_get(root, "digest"));
-    if (b->digest[0] == '\0' && digest != NULL) {
+    if (b->digest[0] == '\0' && digest != NULL)
         (void)snprintf(b->digest, sizeof b->digest, "%s", digest);
-    }
     if (digest == NULL || strcmp(digest, b->digest) != 0) {
         host_fail(error, HOST_BROKEN,
                   "%s: its tetrahedra are not those of this machine; try: "
@@ -433,9 +419,8 @@ static int measure(struct bench *b, const struct host_board *board,
     host_progress_phase(board->name, NULL);
     find_first(b, before);
     if (run(b, board->name, error) == 0 && read_stats(b, row, error) == 0 &&
-        host_boards_count(map, b->folder, row->counted, error) == 0) {
+        host_boards_count(map, b->folder, row->counted, error) == 0)
         b->rows++;
-    }
     (void)setenv("PATH", before, 1);
     take_away(b, board->bare->program);
     host_progress_phase("", NULL);
@@ -452,9 +437,8 @@ static void print_head(void) {
            "executed, in percent; bytes a\ntetrahedron that nodes take from, "
            "and put on, their wires.\n\n%-11s %7s",
            NODES, POINTS, "board", "instr.");
-    for (unsigned i = 0; i < HOST_ROOMS; i++) {
+    for (unsigned i = 0; i < HOST_ROOMS; i++)
         printf(" %*s", (int)strlen(host_room_names[i]) + 1, host_room_names[i]);
-    }
     printf(" %6s %6s\n", "in", "out");
 }
 
@@ -473,18 +457,16 @@ static int write_csv(const struct bench *b, struct host_error *error) {
     FILE *file = host_create_over(path);
     if (file != NULL) {
         fprintf(file, "board,nodes,points,tetrahedra,instructions");
-        for (unsigned i = 0; i < HOST_ROOMS; i++) {
+        for (unsigned i = 0; i < HOST_ROOMS; i++)
             fprintf(file, ",%s_percent", host_room_names[i]);
-        }
         fprintf(file, ",bytes_in,bytes_out\n");
         for (unsigned n = 0; n < b->rows; n++) {
             const struct host_boards_row *row = &b->row[n];
             fprintf(file, "%s,%u,%llu,%llu,%.0f", row->board, row->nodes,
                     (unsigned long long)row->points,
                     (unsigned long long)row->tetrahedra, row->instructions);
-            for (unsigned i = 0; i < HOST_ROOMS; i++) {
+            for (unsigned i = 0; i < HOST_ROOMS; i++)
                 fprintf(file, ",%.2f", host_boards_share(row, i));
-            }
             fprintf(file, ",%.2f,%.2f\n", row->bytes_in, row->bytes_out);
         }
     }
@@ -497,22 +479,18 @@ static int write_csv(const struct bench *b, struct host_error *error) {
 
 static int bench_all(struct bench *b, struct host_error *error) {
     const struct host_board *board;
-    if (run(b, "linux", error) != 0) {
+    if (run(b, "linux", error) != 0)
         return error->code;
-    }
     print_head();
     for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++) {
-        if (board->bare == NULL) {
+        if (board->bare == NULL)
             continue;
-        }
-        if (measure(b, board, error) != 0) {
+        if (measure(b, board, error) != 0)
             return error->code;
-        }
         print_row(&b->row[b->rows - 1]);
     }
-    if (b->options->csv != NULL && write_csv(b, error) != 0) {
+    if (b->options->csv != NULL && write_csv(b, error) != 0)
         return error->code;
-    }
     return b->options->svg == NULL
                ? 0
                : host_boards_plot(b->options->svg, b->row, b->rows, error);

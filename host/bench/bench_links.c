@@ -44,9 +44,8 @@ static void sim_turn(struct sim_bench *s, size_t size) {
             s->due[who] += s->echo && who == 1 ? 1 : 0;
         }
         while (s->due[who] > 0 &&
-               link_write(s->link[who], bytes, size, NULL, 0) == 0) {
+               link_write(s->link[who], bytes, size, NULL, 0) == 0)
             s->due[who]--;
-        }
         (void)link_poll_send(s->link[who], s->now_us);
     }
 }
@@ -59,9 +58,8 @@ static double sim_count(struct sim_bench *s, uint32_t count, bool echo,
     s->got[0] = 0;
     s->due[0] = count;
     s->due[1] = echo ? 0 : count;
-    while (s->got[0] < count && s->now_us - begin < PATIENCE_US) {
+    while (s->got[0] < count && s->now_us - begin < PATIENCE_US)
         sim_turn(s, size);
-    }
     return (double)(s->now_us - begin);
 }
 
@@ -76,9 +74,8 @@ static int host_bench_sim(struct host_bench_row *row,
                                                .bytes = SIM_BYTES_MIN};
     void *memory[3] = {malloc(sim_wire_bytes(&quality)), NULL, NULL};
     memset(&s, 0, sizeof s);
-    if (memory[0] != NULL) {
+    if (memory[0] != NULL)
         sim_wire_init(&s.wire, memory[0], &quality, &s.now_us, 1);
-    }
     for (unsigned who = 0; who < 2 && memory[0] != NULL; who++) {
         struct link_config c = host_bench_serial(0);
         c.epoch = who + 1;
@@ -100,9 +97,8 @@ static int host_bench_sim(struct host_bench_row *row,
         row->bytes_per_s = 1e6 * SIM_COUNT * HOST_BENCH_MESSAGE / us;
     }
     bool made = s.link[1] != NULL;
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++)
         free(memory[i]);
-    }
     return made ? 0 : host_fail_memory(error, "the simulated links");
 }
 
@@ -145,9 +141,8 @@ static int slow_receive(void *context, uint8_t *bytes, size_t size) {
     int got = s->beneath.receive(s->beneath.context, s->bytes + s->held,
                                  sizeof s->bytes - s->held);
     uint64_t now = now_ns();
-    if (got < 0) {
+    if (got < 0)
         return got;
-    }
     /* In a stream bytes came on while nobody looked. */
     uint64_t since = s->flows ? s->look_ns : now;
     s->look_ns = now;
@@ -158,9 +153,8 @@ static int slow_receive(void *context, uint8_t *bytes, size_t size) {
         s->held += (size_t)got;
     }
     size_t due = 0;
-    if (s->last_ns > now) {
+    if (s->last_ns > now)
         due = (size_t)((s->last_ns - now + s->byte_ns - 1) / s->byte_ns);
-    }
     size_t here = s->held > due ? s->held - due : 0;
     here = here < size ? here : size;
     memcpy(bytes, s->bytes, here);
@@ -246,9 +240,8 @@ static int choose_meeting(int fds[2]) {
         fd < 0 ? -1
                : bind(fd, (struct sockaddr *)&free_port, size) |
                      getsockname(fd, (struct sockaddr *)&free_port, &size);
-    if (fd >= 0) {
+    if (fd >= 0)
         close(fd);
-    }
     memcpy(&meeting.to, &free_port, sizeof free_port);
     meeting.size = size;
     fds[0] = fds[1] = -1;
@@ -262,9 +255,8 @@ static int open_net(struct wire *wire, struct host_bench_end *end, int fd,
         .listens = role == 1, .suite = &secure_sodium, .key = key};
     (void)fd, (void)baud;
     config.address = meeting;
-    if (tcp_wire_open(&wire->net, &config) != 0) {
+    if (tcp_wire_open(&wire->net, &config) != 0)
         return -1;
-    }
     end->pipe = tcp_wire_pipe(&wire->net);
     end->idle = idle_net;
     end->settings.window = 8;
@@ -279,13 +271,11 @@ static int run_end(const struct driver *driver, int fd, unsigned role,
     memset(&end, 0, sizeof end);
     end.context = &wire;
     wire.net.listener = wire.net.tcp.fd = -1;
-    if (driver->open(&wire, &end, fd, role, driver->baud) != 0) {
+    if (driver->open(&wire, &end, fd, role, driver->baud) != 0)
         return -1;
-    }
     int status = host_bench_end(&end, role, row);
-    if (driver->open == open_net) {
+    if (driver->open == open_net)
         tcp_wire_close(&wire.net);
-    }
     return status;
 }
 
@@ -308,11 +298,9 @@ static int run_driver(const struct driver *driver, struct host_bench_row *row,
         kill(child, SIGKILL);
         (void)waitpid(child, NULL, 0);
     }
-    for (unsigned i = 0; i < 2; i++) {
-        if (fds[i] >= 0) {
+    for (unsigned i = 0; i < 2; i++)
+        if (fds[i] >= 0)
             close(fds[i]);
-        }
-    }
     return status == 0
                ? 0
                : host_fail(error, HOST_CUBE,
@@ -328,9 +316,8 @@ static bool run_mpi(struct host_bench_row *row) {
     char path[4096], command[4400];
     struct host_error ignored = {0};
     if (host_cluster_program(NULL, "incode-mpi", path, sizeof path, &ignored) !=
-        0) {
+        0)
         return false;
-    }
     snprintf(command, sizeof command,
              "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
              "timeout 30 mpirun --oversubscribe --bind-to none "
@@ -342,20 +329,18 @@ static bool run_mpi(struct host_bench_row *row) {
         said != NULL && fscanf(said, "%lf %lf %lf %lf %lf", &row->bytes_per_s,
                                &row->round_trip_us, &row->hop_us, &row->cpu_us,
                                &row->retransmitted) == 5;
-    if (said != NULL) {
+    if (said != NULL)
         (void)pclose(said);
-    }
     return good;
 }
 
 static void print_row(const char *name, double line_bytes_per_s,
                       const struct host_bench_row *row) {
     printf("%-30s %10.3f ", name, 1e-6 * row->bytes_per_s);
-    if (line_bytes_per_s > 0) {
+    if (line_bytes_per_s > 0)
         printf("%6.1f %%", 100 * row->bytes_per_s / line_bytes_per_s);
-    } else {
+    else
         printf("%8s", "-");
-    }
     printf(" %10.0f %10.0f %8.1f %8.2f %%\n", row->round_trip_us, row->hop_us,
            row->cpu_us, 100 * row->retransmitted);
     fflush(stdout);
@@ -376,15 +361,13 @@ int host_bench_links(struct host_error *error) {
            "16 B, us", "1600 B", "1600 B", "again");
     for (size_t i = 0; i < sizeof drivers / sizeof drivers[0]; i++) {
         struct host_bench_row row = {0};
-        if (run_driver(&drivers[i], &row, error) != 0) {
+        if (run_driver(&drivers[i], &row, error) != 0)
             return error->code;
-        }
         print_row(drivers[i].name, 0.1 * drivers[i].baud, &row);
     }
     struct host_bench_row sim = {0}, mpi = {0};
-    if (host_bench_sim(&sim, error) != 0) {
+    if (host_bench_sim(&sim, error) != 0)
         return error->code;
-    }
     print_row("sim, 3000000 baud, 100 us away", HOST_BENCH_SIM_BYTES, &sim);
     if (run_mpi(&mpi)) {
         print_row("mpi, two ranks", 0, &mpi);
@@ -485,9 +468,8 @@ int host_virtual_run(struct host_virtual_run *run,
                      const struct host_points *points,
                      struct host_error *error) {
     struct virtual_world *v = calloc(1, sizeof *v);
-    if (v == NULL) {
+    if (v == NULL)
         return host_fail_memory(error, "the simulated cube");
-    }
     const struct host_run_options *o = run->options;
     v->run = run;
     memset(&run->result, 0, sizeof run->result);

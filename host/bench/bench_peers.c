@@ -24,9 +24,8 @@ static int put(const struct host_bench_set *set, const void *bytes, size_t n) {
     const char *at = bytes;
     while (n > 0) {
         ssize_t done = write(set->file, at, n);
-        if (done < 0 && errno != EINTR) {
+        if (done < 0 && errno != EINTR)
             return -1;
-        }
         at += done > 0 ? done : 0;
         n -= done > 0 ? (size_t)done : 0;
     }
@@ -205,11 +204,9 @@ static const struct host_bench_class *host_bench_class_row(unsigned i) {
 }
 
 const struct host_bench_class *host_bench_class_named(const char *name) {
-    for (unsigned i = 0; i < CLASSES; i++) {
-        if (strcmp(name, classes[i].name) == 0) {
+    for (unsigned i = 0; i < CLASSES; i++)
+        if (strcmp(name, classes[i].name) == 0)
             return &classes[i];
-        }
-    }
     return NULL;
 }
 
@@ -295,12 +292,10 @@ static bool command(struct bench *b, unsigned turn,
     }
     static const char *const head[] = {
         "/proc/self/exe", "run", NULL, "--format", "npy", "-q", "--stats", "-"};
-    for (; n < sizeof head / sizeof head[0]; n++) {
+    for (; n < sizeof head / sizeof head[0]; n++)
         words[n] = head[n] == NULL ? set->path : head[n];
-    }
-    for (const char *const *o = host_bench_way_options(way); *o != NULL; o++) {
+    for (const char *const *o = host_bench_way_options(way); *o != NULL; o++)
         words[n++] = *o;
-    }
     if (b->class->whole) {
         words[n++] = "-o";
         words[n++] = b->target;
@@ -337,9 +332,8 @@ static int take_turn(struct bench *b, unsigned turn, unsigned round,
     char phase[64];
     struct turns *t = &b->turns[turn];
     struct host_trial trial;
-    if (t->late || t->failed || !command(b, turn, set, words)) {
+    if (t->late || t->failed || !command(b, turn, set, words))
         return 0;
-    }
     (void)snprintf(phase, sizeof phase, "%.14s %llu: %s %u/%u", set->name,
                    (unsigned long long)set->points, title_of(turn), round + 1,
                    b->options->rounds);
@@ -352,9 +346,8 @@ static int take_turn(struct bench *b, unsigned turn, unsigned round,
         (trial.status != 0 || trial.tetrahedra == 0)) {
         note_failure(b, turn, set, &trial);
     } else if (status == 0 && !trial.late) {
-        if (t->rounds == 0) {
+        if (t->rounds == 0)
             t->trial = trial;
-        }
         t->cpu_s[t->rounds] = trial.cpu_s;
         t->host_s[t->rounds] = trial.host_s;
         t->host_all_s[t->rounds] = trial.host_all_s;
@@ -398,24 +391,19 @@ static int measure(struct bench *b, const struct host_bench_set *set,
     memset(b->turns, 0, sizeof b->turns);
     b->left_out = false;
     for (unsigned round = 0; round < b->options->rounds; round++) {
-        for (unsigned turn = 0; turn < TURNS && !b->left_out; turn++) {
-            if (take_turn(b, turn, round, set, error) != 0) {
+        for (unsigned turn = 0; turn < TURNS && !b->left_out; turn++)
+            if (take_turn(b, turn, round, set, error) != 0)
                 return error->code;
-            }
-        }
     }
-    if (b->left_out) {
+    if (b->left_out)
         return 0;
-    }
     struct turns *own = &b->turns[MAIN];
     check_digests(b, set);
     r->name = set->name;
     r->points = set->points;
-    for (unsigned turn = TURNS; turn-- > 0;) {
-        if (b->turns[turn].trial.tetrahedra > 0) {
+    for (unsigned turn = TURNS; turn-- > 0;)
+        if (b->turns[turn].trial.tetrahedra > 0)
             r->tetrahedra = b->turns[turn].trial.tetrahedra;
-        }
-    }
     r->pages = own->trial.pages;
     r->pages_asked = own->trial.pages_asked;
     r->node = time_of(b, own);
@@ -503,12 +491,11 @@ static int measure_files(struct bench *b, struct host_error *error) {
         host_progress_phase("reading", NULL);
         int status = host_bench_set_read(&set, b->file[i], &unreadable);
         result.ratio = host_bench_goal(c, set.name, &named);
-        if (status != 0) {
+        if (status != 0)
             host_note("left out: %s", unreadable.text);
-        } else if ((named || set.points >= HOST_BENCH_FEW) ==
-                   (c->files == HOST_FILES_MANY)) {
+        else if ((named || set.points >= HOST_BENCH_FEW) ==
+                 (c->files == HOST_FILES_MANY))
             (void)measure(b, &set, &result, error);
-        }
         host_bench_set_free(&set);
     }
     return error->code;
@@ -520,13 +507,11 @@ static int measure_made(struct bench *b, struct host_error *error) {
         struct host_bench_set set;
         struct host_bench_result result = {
             .ratio = m->ratio, .seconds = m->seconds, .step = m->step};
-        if (m->large && !b->options->large) {
+        if (m->large && !b->options->large)
             continue;
-        }
         host_progress_phase("making points", NULL);
-        if (host_bench_set_made(&set, m->kind, m->n, error) == 0) {
+        if (host_bench_set_made(&set, m->kind, m->n, error) == 0)
             (void)measure(b, &set, &result, error);
-        }
         host_bench_set_free(&set);
     }
     return error->code;
@@ -535,9 +520,8 @@ static int measure_made(struct bench *b, struct host_error *error) {
 /* CGAL's whole program, and a place on a disk for what such write. */
 static int make_target(struct bench *b, struct host_error *error) {
     if (b->builds.there[0] &&
-        host_bench_made("cgal_file", b->to_file, error) != 0) {
+        host_bench_made("cgal_file", b->to_file, error) != 0)
         return error->code;
-    }
     (void)strcpy(b->folder, "/tmp/incode-bench.XXXXXX");
     if (mkdtemp(b->folder) == NULL) {
         b->folder[0] = '\0';
@@ -558,13 +542,11 @@ static void remove_target(struct bench *b) {
 
 static int measure_class(struct bench *b, const struct host_bench_class *c,
                          struct host_error *error) {
-    if (c->files != HOST_FILES_NONE && b->files == 0) {
+    if (c->files != HOST_FILES_NONE && b->files == 0)
         return 0;
-    }
     b->class = c;
-    if (c->whole && make_target(b, error) != 0) {
+    if (c->whole && make_target(b, error) != 0)
         return error->code;
-    }
     host_bench_table_begin(&b->table, c, b->builds.there, b->options->limit_s);
     int status = c->files == HOST_FILES_NONE ? measure_made(b, error)
                                              : measure_files(b, error);
@@ -598,17 +580,13 @@ int host_bench_peers(const struct host_bench_peers_options *options,
         host_progress_erase();
         print_notes(b);
         for (unsigned i = 0;
-             error->code == 0 && (c = host_bench_class_row(i)) != NULL; i++) {
-            if (options->class == NULL ||
-                strcmp(options->class, c->name) == 0) {
+             error->code == 0 && (c = host_bench_class_row(i)) != NULL; i++)
+            if (options->class == NULL || strcmp(options->class, c->name) == 0)
                 (void)measure_class(b, c, error);
-            }
-        }
     }
     host_progress_end();
-    for (unsigned i = 0; i < b->files; i++) {
+    for (unsigned i = 0; i < b->files; i++)
         free(b->file[i]);
-    }
     if (error->code == 0 && b->wrong > 0) {
         host_fail(error, HOST_BROKEN,
                   "bench peers: %u runs failed or differ from CGAL's "

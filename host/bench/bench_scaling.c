@@ -66,9 +66,8 @@ static void last_line(FILE *err, char *text, size_t size) {
     rewind(err);
     while (fgets(line, sizeof line, err) != NULL) {
         line[strcspn(line, "\n")] = '\0';
-        if (line[0] != '\0') {
+        if (line[0] != '\0')
             (void)snprintf(text, size, "%s", line);
-        }
     }
 }
 
@@ -108,9 +107,8 @@ int host_trial_run(char *const words[], double limit_s,
     uint64_t begin = host_now_us();
     memset(trial, 0, sizeof *trial);
     pid_t child = out == NULL || err == NULL ? -1 : fork();
-    if (child == 0) {
+    if (child == 0)
         become(words, bench, fileno(out), fileno(err));
-    }
     if (child < 0) {
         host_fail(error, HOST_BROKEN, "%s: %s; free memory or room in /tmp",
                   words[0], strerror(errno));
@@ -118,16 +116,13 @@ int host_trial_run(char *const words[], double limit_s,
         await(child, limit_s, trial);
         trial->whole_s = 1e-6 * (double)(host_now_us() - begin);
         last_line(err, trial->said, sizeof trial->said);
-        if (!trial->late && trial->status == 0) {
+        if (!trial->late && trial->status == 0)
             read_said(out, trial);
-        }
     }
-    if (out != NULL) {
+    if (out != NULL)
         (void)fclose(out);
-    }
-    if (err != NULL) {
+    if (err != NULL)
         (void)fclose(err);
-    }
     return error->code;
 }
 
@@ -145,11 +140,9 @@ static double each(double s, uint64_t count) {
 
 static const struct host_scaling_point *
 row_of(const struct host_scaling_rows *rows, uint64_t points) {
-    for (unsigned i = 0; i < rows->points; i++) {
-        if (rows->point[i].points == points) {
+    for (unsigned i = 0; i < rows->points; i++)
+        if (rows->point[i].points == points)
             return &rows->point[i];
-        }
-    }
     return NULL;
 }
 
@@ -224,9 +217,8 @@ static void host_scaling_nodes_head(uint64_t points) {
 static double alone(const struct host_scaling_rows *rows,
                     const char *strategy) {
     unsigned i = 0;
-    while (strcmp(rows->node[i].strategy, strategy) != 0) {
+    while (strcmp(rows->node[i].strategy, strategy) != 0)
         i++;
-    }
     return rows->node[i].busiest_s;
 }
 
@@ -238,9 +230,8 @@ static void host_scaling_nodes_row(struct host_scaling_rows *rows,
     double bytes = n->wire_bytes / (double)n->tetrahedra;
     bool first = strcmp(n->strategy, host_scaling_strategies[0]) == 0;
     host_progress_erase();
-    if (first) {
+    if (first)
         printf("%5u", n->nodes);
-    }
     printf(" | %8.1f %8.1f %8.2f %5.2f %6.2f", each(n->busiest_s, n->points),
            each(n->all_s, n->points), speed_up, speed_up / n->nodes, bytes);
     printf("%s",
@@ -351,9 +342,8 @@ static int run_once(const struct host_bench_set *set,
         "--stats",        "-",   "--strategy", "sequential", "--nodes", "1",
         "--memory",       "4M",  NULL};
     struct host_trial trial;
-    if (host_trial_run((char *const *)words, LIMIT_S, &trial, error) != 0) {
+    if (host_trial_run((char *const *)words, LIMIT_S, &trial, error) != 0)
         return error->code;
-    }
     if (trial.late || trial.status != 0 || trial.tetrahedra == 0) {
         return host_fail(error, HOST_BROKEN,
                          "bench scaling: %llu points ended with status %d: "
@@ -380,13 +370,11 @@ static int measure_points(struct host_scaling_rows *rows, uint64_t points,
                    (unsigned long long)points);
     host_progress_phase(phase, NULL);
     int status = host_bench_set_made(&set, "uniform", points, error);
-    for (unsigned i = 0; i < runs && status == 0; i++) {
+    for (unsigned i = 0; i < runs && status == 0; i++)
         status = run_once(&set, &row, error);
-    }
     host_bench_set_free(&set);
-    if (status == 0) {
+    if (status == 0)
         host_scaling_points_row(rows, &row);
-    }
     return status;
 }
 
@@ -407,9 +395,8 @@ static int model_nodes(struct host_scaling_rows *rows,
                                     .options = &options};
     (void)snprintf(phase, sizeof phase, "%s, %u nodes", strategy, nodes);
     host_progress_phase(phase, NULL);
-    if (host_virtual_run(&run, points, error) != 0) {
+    if (host_virtual_run(&run, points, error) != 0)
         return error->code;
-    }
     const struct host_run_result *r = &run.result;
     struct host_scaling_node row = {.strategy = strategy,
                                     .nodes = nodes,
@@ -446,11 +433,9 @@ static int print_all(const struct host_scaling_options *o,
                      struct host_scaling_rows *rows, struct host_error *error) {
     int status = 0;
     host_scaling_points_head(rows);
-    for (int i = 0; i < SIZES && status == 0; i++) {
-        if (!o->quick || sizes[i] <= QUICK_POINTS) {
+    for (int i = 0; i < SIZES && status == 0; i++)
+        if (!o->quick || sizes[i] <= QUICK_POINTS)
             status = measure_points(rows, sizes[i], error);
-        }
-    }
     if (status == 0) {
         status =
             model_all(rows, o->nodes_max,
@@ -458,22 +443,19 @@ static int print_all(const struct host_scaling_options *o,
     }
     host_progress_erase();
     if (status == 0 && o->svg != NULL &&
-        host_scaling_draw(rows, o->svg, error) == 0) {
+        host_scaling_draw(rows, o->svg, error) == 0)
         printf("\nDrawn in %s.\n", o->svg);
-    }
     return error->code;
 }
 
 int host_bench_scaling(const struct host_scaling_options *options,
                        struct host_error *error) {
     const struct host_scaling_options *o = options;
-    if (o->svg != NULL && host_gnuplot_there(o->svg, error) != 0) {
+    if (o->svg != NULL && host_gnuplot_there(o->svg, error) != 0)
         return error->code;
-    }
     struct host_scaling_rows *rows = calloc(1, sizeof *rows);
-    if (rows == NULL) {
+    if (rows == NULL)
         return host_fail_memory(error, "the rows");
-    }
     if (o->csv != NULL && (rows->csv = host_create_over(o->csv)) == NULL) {
         host_fail(error, HOST_INPUT, "%s: %s; choose another file", o->csv,
                   strerror(errno));

@@ -73,18 +73,16 @@ static void add_times(struct cells *c, const struct host_bench_table *t,
                       const struct host_bench_result *r) {
     bool wall = t->class->wall;
     add(c, wall ? "clock" : "node", each(r->node, r), 0);
-    if (!wall) {
+    if (!wall)
         add(c, "+ host", each(r->host > 0 ? r->node + r->host : 0, r), 0);
-    }
     for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
         if (t->peer[i]) {
             add(c, host_bench_peer_titles[i], each(r->peer[i], r), 0)->beyond =
                 r->peer_late[i];
         }
     }
-    if (t->peer[0]) {
+    if (t->peer[0])
         add_held(c, "CGAL /", over(r->peer[0], r->node), false, r->ratio);
-    }
     if (t->peer[0] && !wall) {
         add(c, "+ host", over(r->peer[0], r->host > 0 ? r->node + r->host : 0),
             2);
@@ -119,9 +117,8 @@ static void collect(struct cells *c, const struct host_bench_table *t,
                  class->versus_most);
         c->cell[c->count - 1].beyond = late;
     }
-    if (has_steps(class)) {
+    if (has_steps(class))
         add_held(c, "step", step(t, r), true, r->step);
-    }
 }
 
 static bool reached(const struct cell *cell) {
@@ -131,11 +128,10 @@ static bool reached(const struct cell *cell) {
 
 static void print_text(const struct cell *cell, const char *value,
                        const char *goal) {
-    if (cell->held) {
+    if (cell->held)
         printf(" %*s %-6s", VALUE, value, goal);
-    } else {
+    else
         printf(" %*s", cell->digits == 0 ? VALUE + 2 : VALUE, value);
-    }
 }
 
 static void print_cell(struct host_bench_table *t, const struct cell *cell) {
@@ -166,9 +162,8 @@ void host_bench_table_begin(struct host_bench_table *table,
     collect(&cells, table, &nothing);
     host_progress_erase();
     printf("\n%s: %s\n%-*s", c->name, c->title, NAME, "");
-    for (unsigned i = 0; i < cells.count; i++) {
+    for (unsigned i = 0; i < cells.count; i++)
         print_text(&cells.cell[i], cells.cell[i].title, "");
-    }
     printf("\n");
     (void)fflush(stdout);
 }
@@ -179,21 +174,18 @@ void host_bench_table_row(struct host_bench_table *table,
     collect(&cells, table, result);
     host_progress_erase();
     printf("%-*.*s", NAME, NAME, result->name);
-    for (unsigned i = 0; i < cells.count; i++) {
+    for (unsigned i = 0; i < cells.count; i++)
         print_cell(table, &cells.cell[i]);
-    }
     printf("\n");
     (void)fflush(stdout);
     for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
         double ratio =
             over(result->peer[i], result->late ? table->limit_s : result->node);
-        if (ratio > 0 && table->rows < HOST_BENCH_ROWS_MAX) {
+        if (ratio > 0 && table->rows < HOST_BENCH_ROWS_MAX)
             table->ratio[i][table->ratios[i]++] = ratio;
-        }
     }
-    if (table->rows++ == 0) {
+    if (table->rows++ == 0)
         table->first = *result;
-    }
     table->before = *result;
     (void)snprintf(table->before_name, sizeof table->before_name, "%s",
                    result->name);
@@ -206,9 +198,8 @@ static int compare(const void *a, const void *b) {
 
 static double mean(const double *ratio, unsigned n) {
     double sum = 0;
-    for (unsigned i = 0; i < n; i++) {
+    for (unsigned i = 0; i < n; i++)
         sum += log(ratio[i]);
-    }
     return exp(sum / n);
 }
 
@@ -217,9 +208,8 @@ unsigned host_bench_table_end(struct host_bench_table *table) {
     for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
         double *ratio = table->ratio[i], goal = c->summary[i];
         unsigned n = table->ratios[i];
-        if (n == 0) {
+        if (n == 0)
             continue;
-        }
         qsort(ratio, n, sizeof *ratio, compare);
         double middle = c->means ? mean(ratio, n)
                                  : 0.5 * (ratio[(n - 1) / 2] + ratio[n / 2]);
@@ -232,9 +222,8 @@ unsigned host_bench_table_end(struct host_bench_table *table) {
         }
         printf(", least %.2f, most %.2f, of %u\n", ratio[0], ratio[n - 1], n);
     }
-    if (table->goals > 0) {
+    if (table->goals > 0)
         printf("goals reached: %u of %u\n", table->reached, table->goals);
-    }
     (void)fflush(stdout);
     return table->goals - table->reached;
 }

@@ -236,20 +236,17 @@ const struct host_paper_series *host_paper_find(const char *table,
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         const struct host_paper_series *s = &all[i];
         if (strcmp(s->table, table) == 0 && strcmp(s->set, set) == 0 &&
-            s->points == points && strcmp(s->what, what) == 0) {
+            s->points == points && strcmp(s->what, what) == 0)
             return s;
-        }
     }
     return NULL;
 }
 
 const struct host_paper_row *
 host_paper_row_of(const struct host_paper_series *series, unsigned nodes) {
-    for (int i = 0; series != NULL && i < HOST_PAPER_ROWS; i++) {
-        if (series->row[i].t_max > 0 && series->row[i].nodes == nodes) {
+    for (int i = 0; series != NULL && i < HOST_PAPER_ROWS; i++)
+        if (series->row[i].t_max > 0 && series->row[i].nodes == nodes)
             return &series->row[i];
-        }
-    }
     return NULL;
 }
 
@@ -317,9 +314,8 @@ void host_bench_counts(const struct node_finished_message *totals,
 double host_bench_work_ns(const double price[HOST_BENCH_COUNTS],
                           const double counts[HOST_BENCH_COUNTS]) {
     double ns = 0;
-    for (int k = 0; k < HOST_BENCH_COUNTS; k++) {
+    for (int k = 0; k < HOST_BENCH_COUNTS; k++)
         ns += price[k] * counts[k];
-    }
     return ns;
 }
 

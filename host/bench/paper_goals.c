@@ -89,23 +89,18 @@ static int host_paper_relation(struct host_paper_bench *bench,
     host_paper_table(&bench->print, "relation",
                      "Relation (1): S_spatial(4N) / S_spatial(N) < "
                      "S_master-slaves(4), Uniform 20,000");
-    for (unsigned n = 16; n <= 32; n *= 2) {
+    for (unsigned n = 16; n <= 32; n *= 2)
         paper_relation(n);
-    }
-    if (!host_paper_has(bench, "master-slaves")) {
+    if (!host_paper_has(bench, "master-slaves"))
         return 0;
-    }
     slaves = speed_up(bench, "master-slaves", 4, error);
     for (unsigned n = 16;
          n <= 64 && error->code == 0 && 4 * n <= bench->options->nodes_max;
-         n *= 2) {
+         n *= 2)
         (void)model_relation(bench, n, slaves, error);
-    }
     for (unsigned n = 64;
-         n <= 128 && error->code == 0 && n <= bench->options->nodes_max;
-         n *= 2) {
+         n <= 128 && error->code == 0 && n <= bench->options->nodes_max; n *= 2)
         (void)estimate(bench, n, slaves, error);
-    }
     return error->code;
 }
 
@@ -145,9 +140,8 @@ static void say(const struct host_paper_bench *bench, const struct goal *g,
         (void)snprintf(wanted, sizeof wanted, ", wanted %.2f%s", g->wanted,
                        meets(g, value, g->wanted) ? " too" : "");
     }
-    if (g->paper > 0) {
+    if (g->paper > 0)
         (void)snprintf(paper, sizeof paper, "; the paper's %.4g", g->paper);
-    }
     host_paper_note("%s on %s %llu, %u nodes: %s %.3f, goal %s %.4g%s: %s%s",
                     g->strategy, g->set, (unsigned long long)g->points,
                     g->nodes, figures[g->figure], value,
@@ -186,14 +180,12 @@ static int host_paper_goals(struct host_paper_bench *bench,
         const struct goal *g = &goals[i];
         bool wanted = g->nodes <= bench->options->nodes_max || g->large;
         if (!wanted || (g->large && !bench->options->large) ||
-            strcmp(missing, g->strategy) == 0) {
+            strcmp(missing, g->strategy) == 0)
             continue;
-        }
-        if (!host_paper_has(bench, g->strategy)) {
+        if (!host_paper_has(bench, g->strategy))
             missing = g->strategy;
-        } else if (hold(bench, g, error) != 0) {
+        else if (hold(bench, g, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -271,9 +263,8 @@ static int modelled_curve(struct host_paper_bench *bench, FILE *plot,
          c.nodes *= 2) {
         const struct host_paper_result *r =
             host_paper_run(&bench->runs, &c, error);
-        if (r != NULL) {
+        if (r != NULL)
             point(plot, c.nodes, (double)r->tetrahedra / r->t_max, mflops);
-        }
     }
     return error->code;
 }
@@ -307,11 +298,10 @@ static int draw(struct host_paper_bench *bench, FILE *plot,
         const struct curve *c = &curves[i];
         double mflops = bench->runs.machine[c->machine].mflops;
         fprintf(plot, "$c%d << END\n", i);
-        if (c->table != NULL) {
+        if (c->table != NULL)
             paper_curve(plot, c, mflops);
-        } else if (drawn(bench, c)) {
+        else if (drawn(bench, c))
             (void)modelled_curve(bench, plot, c, mflops, error);
-        }
         fprintf(plot, "END\n");
     }
     fprintf(plot, "set terminal svg size 1000,520 dynamic\n"
@@ -346,9 +336,8 @@ static int host_paper_figure_11(struct host_paper_bench *bench,
     int status = draw(bench, script, error);
     status = status != 0 ? status : host_gnuplot_draw(script, path, error);
     (void)fclose(script);
-    if (status == 0) {
+    if (status == 0)
         host_paper_note("Drawn in %s.", path);
-    }
     return status;
 }
 
@@ -377,9 +366,8 @@ static bool among(const char *list, const char *name) {
     for (const char *at = list; at != NULL; at = strchr(at, ',')) {
         at += *at == ',' ? 1 : 0;
         if (strncmp(at, name, length) == 0 &&
-            (at[length] == ',' || at[length] == '\0')) {
+            (at[length] == ',' || at[length] == '\0'))
             return true;
-        }
     }
     return false;
 }
@@ -439,24 +427,20 @@ static int print_tables(struct host_paper_bench *bench,
                         struct host_error *error) {
     const struct host_paper_options *o = bench->options;
     host_progress_phase("calibrating", NULL);
-    if (host_paper_runs_begin(&bench->runs, error) != 0) {
+    if (host_paper_runs_begin(&bench->runs, error) != 0)
         return error->code;
-    }
     host_progress_erase();
     print_model(bench);
-    for (int i = 0; i < TABLES && error->code == 0; i++) {
-        if (o->tables == NULL || among(o->tables, tables[i].name)) {
+    for (int i = 0; i < TABLES && error->code == 0; i++)
+        if (o->tables == NULL || among(o->tables, tables[i].name))
             (void)tables[i].print(bench, error);
-        }
-    }
     return error->code;
 }
 
 int host_bench_paper(const struct host_paper_options *options,
                      struct host_error *error) {
-    if (check_tables(options->tables, error) != 0) {
+    if (check_tables(options->tables, error) != 0)
         return error->code;
-    }
     if (options->strategy != NULL &&
         host_strategy_named(options->strategy) == NULL) {
         return host_fail(error, HOST_USAGE,
@@ -470,13 +454,11 @@ int host_bench_paper(const struct host_paper_options *options,
              : host_fail(
                    error, HOST_USAGE,
                    "--svg: goes with table 11; name it, or leave --svg out")) !=
-            0) {
+            0)
         return error->code;
-    }
     struct host_paper_bench *bench = calloc(1, sizeof *bench);
-    if (bench == NULL) {
+    if (bench == NULL)
         return host_fail_memory(error, "the tables");
-    }
     bench->options = options;
     bench->runs.quick = options->quick;
     bench->runs.bluntfin = options->bluntfin;

@@ -11,9 +11,8 @@
 int host_paper_print_begin(struct host_paper_print *print, const char *csv,
                            struct host_error *error) {
     *print = (struct host_paper_print){NULL, ""};
-    if (csv == NULL) {
+    if (csv == NULL)
         return 0;
-    }
     print->csv = host_create_over(csv);
     if (print->csv == NULL) {
         return host_fail(error, HOST_INPUT, "%s: %s; choose another file", csv,
@@ -32,9 +31,8 @@ int host_paper_print_end(struct host_paper_print *print, const char *csv,
                          struct host_error *error) {
     FILE *file = print->csv;
     print->csv = NULL;
-    if (file == NULL) {
+    if (file == NULL)
         return 0;
-    }
     bool well = ferror(file) == 0;
     well = fclose(file) == 0 && well;
     return well ? 0
@@ -81,11 +79,10 @@ static double over(double a, double b) {
 
 /* "-" for what is not known. */
 static void number(int width, int digits, double value) {
-    if (value > 0) {
+    if (value > 0)
         printf(" %*.*f", width, digits, value);
-    } else {
+    else
         printf(" %*s", width, "-");
-    }
 }
 
 /* Nodes that an efficiency is of: a manager, and its builders. */
@@ -111,18 +108,16 @@ static void csv_text(FILE *file, const char *text) {
 }
 
 static void csv_number(FILE *file, double value, char end) {
-    if (value > 0) {
+    if (value > 0)
         fprintf(file, "%.9g", value);
-    }
     fputc(end, file);
 }
 
 void host_paper_csv_row(struct host_paper_print *print,
                         const struct host_paper_csv *r) {
     FILE *f = print->csv;
-    if (f == NULL) {
+    if (f == NULL)
         return;
-    }
     double per_s = over((double)r->tetrahedra, r->t_max);
     unsigned elements = elements_of(r->nodes, r->builders);
     csv_text(f, print->table);
@@ -209,9 +204,8 @@ static void host_paper_line(struct host_paper_print *print,
     number(6, 3, r->duplication);
     number(8, 0, per_s);
     number(6, 1, over(per_s, machine->mflops * nodes));
-    if (row != NULL) {
+    if (row != NULL)
         paper_half(series, row, nodes);
-    }
     printf("\n");
     (void)fflush(stdout);
     csv_of(print, r, speed_up, machine, row);
@@ -229,9 +223,8 @@ struct series {
 bool host_paper_has(const struct host_paper_bench *bench,
                     const char *strategy) {
     const char *only = bench->options->strategy;
-    if (only != NULL && strcmp(only, strategy) != 0) {
+    if (only != NULL && strcmp(only, strategy) != 0)
         return false;
-    }
     if (host_strategy_named(strategy) == NULL) {
         host_paper_note("%s: not there yet", strategy);
         return false;
@@ -268,15 +261,12 @@ static int series(struct host_paper_bench *bench, const struct series *s,
                   struct host_error *error) {
     struct host_paper_case c = s->c;
     unsigned most = bench->options->nodes_max;
-    if (!host_paper_has(bench, c.strategy)) {
+    if (!host_paper_has(bench, c.strategy))
         return 0;
-    }
     head(bench, s, "nodes");
     most = s->last < most ? s->last : most;
-    for (c.nodes = s->first; c.nodes <= most && error->code == 0;
-         c.nodes *= 2) {
+    for (c.nodes = s->first; c.nodes <= most && error->code == 0; c.nodes *= 2)
         (void)row(bench, s, &c, host_paper_row_of(s->paper, c.nodes), error);
-    }
     return error->code;
 }
 
@@ -285,9 +275,8 @@ static int series(struct host_paper_bench *bench, const struct series *s,
 static int builders(struct host_paper_bench *bench, const struct series *s,
                     struct host_error *error) {
     struct host_paper_case c = s->c;
-    if (!host_paper_has(bench, c.strategy)) {
+    if (!host_paper_has(bench, c.strategy))
         return 0;
-    }
     head(bench, s, "build");
     for (unsigned i = 0; i < HOST_PAPER_ROWS && error->code == 0; i++) {
         const struct host_paper_row *paper = &s->paper->row[i];

@@ -58,9 +58,8 @@ static int make_set(const struct host_paper_runs *runs, const char *set,
                     uint64_t points, struct host_points *xyz,
                     struct host_error *error) {
     uint64_t n = runs->quick ? points / HOST_PAPER_QUICK : points;
-    if (strcmp(set, "Blunt Fin") == 0) {
+    if (strcmp(set, "Blunt Fin") == 0)
         return make_fin(runs, xyz, error);
-    }
     return host_gen(strcmp(set, "Bubbles") == 0 ? "bubbles" : "uniform", n, 1,
                     xyz, error);
 }
@@ -70,21 +69,17 @@ static const struct host_points *host_paper_set(struct host_paper_runs *runs,
                                                 const char *set,
                                                 uint64_t points,
                                                 struct host_error *error) {
-    for (unsigned i = 0; i < runs->sets; i++) {
-        if (strcmp(runs->set[i].set, set) == 0 &&
-            runs->set[i].points == points) {
+    for (unsigned i = 0; i < runs->sets; i++)
+        if (strcmp(runs->set[i].set, set) == 0 && runs->set[i].points == points)
             return &runs->set[i].xyz;
-        }
-    }
     if (runs->sets == HOST_PAPER_SETS) {
         host_fail(error, HOST_BROKEN, "bench paper: more sets than %d",
                   HOST_PAPER_SETS);
         return NULL;
     }
     struct host_points *xyz = &runs->set[runs->sets].xyz;
-    if (make_set(runs, set, points, xyz, error) != 0) {
+    if (make_set(runs, set, points, xyz, error) != 0)
         return NULL;
-    }
     runs->set[runs->sets].set = set;
     runs->set[runs->sets++].points = points;
     return xyz;
@@ -130,16 +125,14 @@ static int make_run(struct host_paper_runs *runs,
     struct host_run_options options;
     const struct host_points *points =
         host_paper_set(runs, c->set, c->points, error);
-    if (points == NULL) {
+    if (points == NULL)
         return error->code;
-    }
     configure(c, &options);
     run.machine = &runs->machine[c->machine];
     run.options = &options;
     show(c);
-    if (host_virtual_run(&run, points, error) != 0) {
+    if (host_virtual_run(&run, points, error) != 0)
         return error->code;
-    }
     const struct host_run_result *r = &run.result;
     *result = (struct host_paper_result){.c = *c,
                                          .points = r->points,
@@ -166,20 +159,17 @@ static bool same(const struct host_paper_case *a,
 const struct host_paper_result *host_paper_run(struct host_paper_runs *runs,
                                                const struct host_paper_case *c,
                                                struct host_error *error) {
-    for (unsigned i = 0; i < runs->results; i++) {
-        if (same(&runs->result[i].c, c)) {
+    for (unsigned i = 0; i < runs->results; i++)
+        if (same(&runs->result[i].c, c))
             return &runs->result[i];
-        }
-    }
     struct host_paper_result *result = &runs->result[runs->results];
     if (runs->results == HOST_PAPER_RUNS_MAX) {
         host_fail(error, HOST_BROKEN, "bench paper: more runs than %d",
                   HOST_PAPER_RUNS_MAX);
         return NULL;
     }
-    if (make_run(runs, c, result, error) != 0) {
+    if (make_run(runs, c, result, error) != 0)
         return NULL;
-    }
     runs->results++;
     return result;
 }
@@ -215,9 +205,8 @@ static int find_scale(struct host_bench_machine *machine,
         whole.machine[0] = *machine;
         const struct host_paper_result *r =
             alone(&whole, "Uniform", 20000, (enum host_paper_machine)0, error);
-        if (r != NULL) {
+        if (r != NULL)
             machine->scale = machine->work_s * 1e9 / r->work_ns;
-        }
         host_paper_runs_end(&whole);
     }
     return error->code;
@@ -228,18 +217,15 @@ int host_paper_runs_begin(struct host_paper_runs *runs,
     runs->machine[HOST_PAPER_NCUBE] = host_bench_ncube;
     runs->machine[HOST_PAPER_WORKSTATIONS] = host_bench_workstations;
     runs->machine[HOST_PAPER_HERE] = host_bench_here;
-    for (int i = 0; i < HOST_PAPER_MACHINES && error->code == 0; i++) {
-        if (runs->machine[i].work_s > 0) {
+    for (int i = 0; i < HOST_PAPER_MACHINES && error->code == 0; i++)
+        if (runs->machine[i].work_s > 0)
             (void)find_scale(&runs->machine[i], error);
-        }
-    }
     return error->code;
 }
 
 void host_paper_runs_end(struct host_paper_runs *runs) {
-    for (unsigned i = 0; i < runs->sets; i++) {
+    for (unsigned i = 0; i < runs->sets; i++)
         host_points_free(&runs->set[i].xyz);
-    }
     runs->sets = runs->results = 0;
 }
 
@@ -284,21 +270,17 @@ static int number_vertices(const struct host_points *points,
                            struct host_error *error) {
     struct host_order order = {0};
     if (host_order_make(&order, "points", points->xyz, points->count,
-                        HOST_ADAPTIVE, 1, false, error) != 0) {
+                        HOST_ADAPTIVE, 1, false, error) != 0)
         return error->code;
-    }
     uint32_t *vertex = calloc(points->count, sizeof *vertex);
     *vertices = (uint64_t)order.bricks * INCODE_BRICK_POINTS;
-    for (uint32_t v = 0; vertex != NULL && v < *vertices; v++) {
-        if (order.row[v] != INCODE_NONE) {
+    for (uint32_t v = 0; vertex != NULL && v < *vertices; v++)
+        if (order.row[v] != INCODE_NONE)
             vertex[order.row[v]] = v;
-        }
-    }
-    if (vertex != NULL) {
+    if (vertex != NULL)
         host_tetrahedra_map(tets, vertex);
-    } else {
+    else
         host_fail_memory(error, "the vertices' numbers");
-    }
     free(vertex);
     host_order_free(&order);
     return error->code;
@@ -346,18 +328,15 @@ static int sequential_row(struct host_paper_bench *bench,
                     i == 0 ? p->naive_s : p->optimised_s);
         }
         if (last && error->code == 0 &&
-            number_vertices(points, &tets, &vertices, error) == 0) {
+            number_vertices(points, &tets, &vertices, error) == 0)
             (void)host_paper_list(&tets, vertices, &list, error);
-        }
         host_tetrahedra_free(&tets);
     }
-    if (points == NULL || error->code != 0) {
+    if (points == NULL || error->code != 0)
         return error->code;
-    }
     char naive[16] = "-";
-    if (p->naive_s > 0) {
+    if (p->naive_s > 0)
         (void)snprintf(naive, sizeof naive, "%.0f", p->naive_s);
-    }
     host_paper_note(
         "%6llu %9.3f %9.3f %9.3f %8.0f %9.2f %8.1f %% | %8s %8.0f %6.0f %6.1f",
         (unsigned long long)points->count, seconds[0], seconds[1], seconds[2],
@@ -456,20 +435,17 @@ int host_paper_check(struct host_paper_bench *bench, struct host_error *error) {
     host_paper_table(&bench->print, "check",
                      "The model against real runs of spatial on this machine");
     host_progress_phase("fitting the model", NULL);
-    if (host_calibrate(bench->runs.quick, &fit, error) != 0) {
+    if (host_calibrate(bench->runs.quick, &fit, error) != 0)
         return error->code;
-    }
     here->price = fit.price;
     here->message_us = fit.message_us;
     print_fit(&fit);
     host_paper_note("%-9s %7s %5s %10s %10s %9s %10s %10s %9s", "set", "points",
                     "nodes", "cpu s", "modelled", "error", "t_max s",
                     "modelled", "error");
-    for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++) {
-        for (unsigned nodes = 1; nodes <= 2 && error->code == 0; nodes *= 2) {
+    for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++)
+        for (unsigned nodes = 1; nodes <= 2 && error->code == 0; nodes *= 2)
             (void)hold(bench, &fit, sets[i].set, sets[i].points, nodes, error);
-        }
-    }
     host_paper_note("cpu: processor time of the paper_sequential_busiest node; "
                     "t_max is by the "
                     "clock, while host and\nnodes share the processors of this "
@@ -499,18 +475,15 @@ int host_paper_list(const struct host_tetrahedra *tets, uint64_t vertices,
     uint32_t capacity = (uint32_t)(2 * tets->count + 4);
     uint32_t bricks = (uint32_t)(vertices / INCODE_BRICK_POINTS + 1);
     void *memory = malloc(incode_afl_bytes(capacity, bricks));
-    if (memory == NULL) {
+    if (memory == NULL)
         return host_fail_memory(error, "the active face list");
-    }
     list->seconds = INFINITY;
     for (int times = 0; times < TIMES; times++) {
         incode_afl_init(&afl, memory, capacity, bricks, NULL);
         uint64_t start = host_now_us();
-        for (uint64_t i = 0; i < tets->count; i++) {
-            for (int k = 0; k < 4; k++) {
+        for (uint64_t i = 0; i < tets->count; i++)
+            for (int k = 0; k < 4; k++)
                 toggle(&afl, tets->v[i], faces[k]);
-            }
-        }
         list->seconds =
             fmin(list->seconds, 1e-6 * (double)(host_now_us() - start));
     }
@@ -545,9 +518,8 @@ host_calibrate_messages(const struct node_finished_message *totals) {
 void host_calibrate_fit(const double (*a)[HOST_CALIBRATE_TERMS], unsigned rows,
                         double x[HOST_CALIBRATE_TERMS]) {
     double left[HOST_CALIBRATE_RUNS];
-    for (unsigned i = 0; i < rows; i++) {
+    for (unsigned i = 0; i < rows; i++)
         left[i] = 1;
-    }
     memset(x, 0, HOST_CALIBRATE_TERMS * sizeof *x);
     for (unsigned round = 0; round < ROUNDS; round++) {
         for (int k = 0; k < HOST_CALIBRATE_TERMS; k++) {
@@ -558,9 +530,8 @@ void host_calibrate_fit(const double (*a)[HOST_CALIBRATE_TERMS], unsigned rows,
             }
             double step = square > 0 ? fmax(along / square, -x[k]) : 0;
             x[k] += step;
-            for (unsigned i = 0; i < rows; i++) {
+            for (unsigned i = 0; i < rows; i++)
                 left[i] -= step * a[i][k];
-            }
         }
     }
 }
@@ -586,16 +557,14 @@ static int measure(unsigned set, unsigned times,
         host_tetrahedra_free(&tets);
         const struct node_finished_message *f = &result.node[0].statistics;
         double ns = 1e3 * (double)f->busy_us;
-        if (status != 0 || ns >= least) {
+        if (status != 0 || ns >= least)
             continue;
-        }
         least = ns;
         host_bench_counts(f, row);
         row[HOST_CALIBRATE_MESSAGE] = host_calibrate_messages(f);
         row[HOST_CALIBRATE_START] = 1;
-        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++) {
+        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++)
             row[k] /= ns;
-        }
     }
     host_points_free(&points);
     return status;
@@ -615,17 +584,14 @@ static int host_calibrate(bool quick, struct host_calibration *fit,
                           struct host_error *error) {
     double a[HOST_CALIBRATE_RUNS][HOST_CALIBRATE_TERMS];
     double x[HOST_CALIBRATE_TERMS], square = 0;
-    for (unsigned i = 0; i < HOST_CALIBRATE_RUNS; i++) {
-        if (measure(i, quick ? 1 : CALIBRATE_TIMES, a[i], error) != 0) {
+    for (unsigned i = 0; i < HOST_CALIBRATE_RUNS; i++)
+        if (measure(i, quick ? 1 : CALIBRATE_TIMES, a[i], error) != 0)
             return error->code;
-        }
-    }
     host_calibrate_fit(a, HOST_CALIBRATE_RUNS, x);
     for (unsigned i = 0; i < HOST_CALIBRATE_RUNS; i++) {
         double off = -1;
-        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++) {
+        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++)
             off += a[i][k] * x[k];
-        }
         square += off * off;
     }
     memcpy(fit->price, x, sizeof fit->price);

@@ -43,21 +43,18 @@ static int host_shell_look_ask(struct host_shell *shell,
 int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
                    enum node_question what, unsigned target) {
     struct host_visit *visit = &shell->visit;
-    if (shell->looking) {
+    if (shell->looking)
         return host_shell_look_ask(shell, set, what);
-    }
     struct host_node_set there = {{0}};
     uint64_t age_us =
         shell->machine.now_us(shell->machine.context) - shell->opened_us;
     if (age_us < BEGIN_US &&
-        host_visit_wait(visit, set, BEGIN_US - age_us, &shell->error) != 0) {
+        host_visit_wait(visit, set, BEGIN_US - age_us, &shell->error) != 0)
         return shell->error.code;
-    }
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         visit->node[i].answered = false;
-        if (host_node_set_has(set, i) && visit->node[i].there) {
+        if (host_node_set_has(set, i) && visit->node[i].there)
             host_node_set_add(&there, i);
-        }
     }
     return host_node_set_count(&there) == 0
                ? 0
@@ -97,9 +94,8 @@ int host_shell_fail_absent(struct host_shell *shell,
             first = i;
         }
     }
-    if (first == CUBE_HOST) {
+    if (first == CUBE_HOST)
         return 0;
-    }
     host_node_set_name(&absent, names, sizeof names);
     return host_fail(&shell->error, HOST_CUBE, "%s: %s: %s", names,
                      shell->command->name, reason_of(shell, first, reason));
@@ -111,20 +107,17 @@ int host_shell_answers(struct host_shell *shell,
     struct host_fold fold = {0};
     json_t *list = json_array();
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        if (!host_node_set_has(set, i)) {
+        if (!host_node_set_has(set, i))
             continue;
-        }
         json_t *object = json_pack("{si}", "node", (int)i);
-        if (shell->visit.node[i].answered) {
+        if (shell->visit.node[i].answered)
             tell(shell, i, &fold, object);
-        } else {
+        else
             tell_absent(shell, i, &fold, object);
-        }
         (void)json_array_append_new(list, object);
     }
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "nodes", list);
-    }
     json_decref(list);
     host_fold_print(&fold, heading, say_line, shell);
     bool broken = fold.broken;
@@ -160,14 +153,12 @@ static int ping_node(struct host_shell *shell, unsigned node, unsigned times,
     struct host_node_set one = {{0}};
     host_node_set_add(&one, node);
     for (unsigned i = 0; i < times; i++) {
-        if (host_shell_ask(shell, &one, NODE_WHO, 0) != 0) {
+        if (host_shell_ask(shell, &one, NODE_WHO, 0) != 0)
             return shell->error.code;
-        }
         const struct host_visit_node *n = &shell->visit.node[node];
         p->sent++;
-        if (!n->answered) {
+        if (!n->answered)
             return 0;
-        }
         p->least =
             p->answered == 0 || n->rtt_us < p->least ? n->rtt_us : p->least;
         p->most = n->rtt_us > p->most ? n->rtt_us : p->most;
@@ -211,9 +202,8 @@ int host_shell_ping(struct host_shell *shell, unsigned count,
     struct host_node_set set, all_came = {{0}};
     struct host_fold fold = {0};
     uint64_t times = PINGS;
-    if (host_shell_set(shell, words[0], &set) != 0) {
+    if (host_shell_set(shell, words[0], &set) != 0)
         return shell->error.code;
-    }
     if (count == 2 && host_parse_number(words[1], 1, PINGS_MAX, &times) != 0) {
         return host_fail(&shell->error, HOST_USAGE,
                          "ping %s: not a number of times; give 1 to %d",
@@ -226,20 +216,17 @@ int host_shell_ping(struct host_shell *shell, unsigned count,
         if (host_node_set_has(&set, i)) {
             status = ping_node(shell, i, (unsigned)times, &p);
             tell_pings(shell, i, &p, &fold, list);
-            if (p.answered == times) {
+            if (p.answered == times)
                 host_node_set_add(&all_came, i);
-            }
         }
     }
-    for (unsigned i = 0; i < shell->machine.nodes; i++) {
+    for (unsigned i = 0; i < shell->machine.nodes; i++)
         shell->visit.node[i].answered = host_node_set_has(&all_came, i);
-    }
     host_fold_print(&fold, "     LEAST      MEAN      MOST  ANSWERED", say_row,
                     shell);
     host_fold_free(&fold);
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "nodes", list);
-    }
     json_decref(list);
     return status == 0 ? host_shell_fail_absent(shell, &set) : status;
 }
@@ -253,9 +240,8 @@ static int probe(struct host_shell *shell, unsigned from, unsigned to,
     struct node_probe answer;
     host_node_set_add(&one, from);
     *rtt_us = UINT32_MAX;
-    if (host_shell_ask(shell, &one, NODE_PROBE, to) != 0) {
+    if (host_shell_ask(shell, &one, NODE_PROBE, to) != 0)
         return shell->error.code;
-    }
     const void *bytes = host_shell_answer(shell, from, sizeof answer);
     if (bytes != NULL) {
         memcpy(&answer, bytes, sizeof answer);
@@ -300,9 +286,8 @@ static int walk(struct host_shell *shell, const struct routes *routes,
                              a, b, at, b);
         }
         at ^= 1u << link;
-        if (probe(shell, a, at, &rtt_us) != 0) {
+        if (probe(shell, a, at, &rtt_us) != 0)
             return shell->error.code;
-        }
         tell_hop(shell, ++hops, at, link, rtt_us, before, list);
         before = rtt_us == UINT32_MAX ? before : rtt_us;
     }
@@ -320,13 +305,11 @@ int host_shell_trace(struct host_shell *shell, unsigned count,
     unsigned a = 0, b = 0;
     (void)count;
     if (host_shell_node(shell, words[0], &a) != 0 ||
-        host_shell_node(shell, words[1], &b) != 0) {
+        host_shell_node(shell, words[1], &b) != 0)
         return shell->error.code;
-    }
     void *memory = malloc(routes_bytes(shell->machine.dimension));
-    if (memory == NULL) {
+    if (memory == NULL)
         return host_fail_memory(&shell->error, "the routes");
-    }
     routes_init(&routes, memory, shell->machine.dimension);
     routes_find(&routes, cube_wiring(shell->visit.cube));
     json_t *list = json_array();
@@ -337,9 +320,8 @@ int host_shell_trace(struct host_shell *shell, unsigned count,
                                   json_boolean(routes.tree));
         (void)json_object_set(shell->object, "hops", list);
     }
-    if (routes.tree && a != b) {
+    if (routes.tree && a != b)
         host_shell_say(shell, "along the tree that goes round dead wires");
-    }
     json_decref(list);
     free(memory);
     return status;
@@ -421,28 +403,24 @@ static bool await_held(struct host_shell *shell, char wire[HOST_WIRE_NAME],
     bool held;
     while (!(held = is_held(shell, wire, holder)) && shell->running &&
            host_now_us() < end_us &&
-           (sink->interrupted == NULL || !sink->interrupted(sink->context))) {
+           (sink->interrupted == NULL || !sink->interrupted(sink->context)))
         host_shell_tend(shell, STEP_US);
-    }
     return held;
 }
 
 int host_shell_reach(struct host_shell *shell) {
     char wire[HOST_WIRE_NAME];
     struct host_holder holder;
-    if (shell->open) {
+    if (shell->open)
         return 0;
-    }
     bool held = shell->command->need == HOST_SHELL_LOOK
                     ? await_held(shell, wire, &holder)
                     : is_held(shell, wire, &holder);
     shell->in_use = held && !shell->running;
-    if (held && shell->command->need == HOST_SHELL_LOOK) {
+    if (held && shell->command->need == HOST_SHELL_LOOK)
         return begin_look(shell, wire);
-    }
-    if (held || shell->running) {
+    if (held || shell->running)
         return fail_held(shell, &holder);
-    }
     return host_shell_open(shell, &shell->error);
 }
 
@@ -451,9 +429,8 @@ static int host_shell_look_ask(struct host_shell *shell,
                                enum node_question what) {
     const struct host_shell_sink *sink = shell->sink;
     if (host_look_ask(&shell->look, set, what, HOST_SHELL_ANSWER_US,
-                      &shell->error) != 0) {
+                      &shell->error) != 0)
         return shell->error.code;
-    }
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         struct host_visit_node *node = &shell->visit.node[i];
         const struct host_look_node *seen = &shell->look.node[i];
@@ -461,9 +438,8 @@ static int host_shell_look_ask(struct host_shell *shell,
         node->answer = seen->answer;
         node->size = seen->size;
         if (what == NODE_WHO && seen->answered &&
-            seen->size == sizeof node->who) {
+            seen->size == sizeof node->who)
             memcpy(&node->who, seen->answer, sizeof node->who);
-        }
     }
     if (sink->interrupted != NULL && sink->interrupted(sink->context)) {
         shell->watch.cut = true;

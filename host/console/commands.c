@@ -178,11 +178,9 @@ const struct host_shell_command *host_shell_command_row(unsigned i) {
 }
 
 const struct host_shell_command *host_shell_command(const char *name) {
-    for (unsigned i = 0; i < COMMANDS; i++) {
-        if (strcmp(commands[i].name, name) == 0) {
+    for (unsigned i = 0; i < COMMANDS; i++)
+        if (strcmp(commands[i].name, name) == 0)
             return &commands[i];
-        }
-    }
     return NULL;
 }
 
@@ -212,15 +210,12 @@ static int help(struct host_shell *shell, unsigned count,
                           commands[i].arguments, "help", commands[i].help));
         }
     }
-    if (one != NULL && one->detail != NULL) {
+    if (one != NULL && one->detail != NULL)
         host_shell_say(shell, "  %s", one->detail);
-    }
-    if (one == NULL) {
+    if (one == NULL)
         host_shell_say(shell, "SET: nodes as 0-3,7, or all");
-    }
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "commands", list);
-    }
     json_decref(list);
     return 0;
 }
@@ -242,24 +237,20 @@ static void offer(struct completion *c, const char *candidate) {
 }
 
 static void offer_commands(struct completion *c) {
-    for (unsigned i = 0; i < COMMANDS; i++) {
+    for (unsigned i = 0; i < COMMANDS; i++)
         offer(c, commands[i].name);
-    }
 }
 
 /* The number behind the last comma or dash. */
 static void offer_nodes(struct completion *c, unsigned nodes, bool set) {
     char text[300];
     const char *tail = c->word;
-    for (const char *p = c->word; set && *p != '\0'; p++) {
+    for (const char *p = c->word; set && *p != '\0'; p++)
         tail = *p == ',' || *p == '-' ? p + 1 : tail;
-    }
-    if (set && tail == c->word) {
+    if (set && tail == c->word)
         offer(c, "all");
-    }
-    if (tail - c->word > 200) {
+    if (tail - c->word > 200)
         return;
-    }
     for (unsigned i = 0; i < nodes; i++) {
         snprintf(text, sizeof text, "%.*s%u", (int)(tail - c->word), c->word,
                  i);
@@ -272,9 +263,8 @@ static void offer_nodes(struct completion *c, unsigned nodes, bool set) {
 static void offer_file(struct completion *c, const char *name) {
     char text[1024];
     host_text_printable(text, sizeof text, name);
-    if (strcmp(text, name) == 0 && strpbrk(name, " '\"\\#") == NULL) {
+    if (strcmp(text, name) == 0 && strpbrk(name, " '\"\\#") == NULL)
         offer(c, name);
-    }
 }
 
 static void offer_files(struct completion *c) {
@@ -283,17 +273,15 @@ static void offer_files(struct completion *c) {
     glob_t found;
     for (const char *p = c->word; *p != '\0' && used + 4 < sizeof pattern;
          p++) {
-        if (strchr("*?[\\", *p) != NULL) {
+        if (strchr("*?[\\", *p) != NULL)
             pattern[used++] = '\\';
-        }
         pattern[used++] = *p;
     }
     pattern[used++] = '*';
     pattern[used] = '\0';
     if (glob(pattern, GLOB_MARK, NULL, &found) == 0) {
-        for (size_t i = 0; i < found.gl_pathc; i++) {
+        for (size_t i = 0; i < found.gl_pathc; i++)
             offer_file(c, found.gl_pathv[i]);
-        }
         globfree(&found);
     }
 }
@@ -302,20 +290,18 @@ static void offer_argument(struct host_shell *shell, struct completion *c,
                            const char *name, unsigned place) {
     const struct host_shell_command *command = host_shell_command(name);
     unsigned nodes = shell->open ? shell->machine.nodes : 0;
-    if (command == NULL || place >= command->most) {
+    if (command == NULL || place >= command->most)
         return;
-    }
     enum host_shell_argument argument =
         command->argument[0] == HOST_SHELL_FILE ? HOST_SHELL_FILE
         : place < HOST_SHELL_ARGUMENTS          ? command->argument[place]
                                                 : HOST_SHELL_NOTHING;
-    if (argument == HOST_SHELL_SET || argument == HOST_SHELL_NODE) {
+    if (argument == HOST_SHELL_SET || argument == HOST_SHELL_NODE)
         offer_nodes(c, nodes, argument == HOST_SHELL_SET);
-    } else if (argument == HOST_SHELL_COMMAND) {
+    else if (argument == HOST_SHELL_COMMAND)
         offer_commands(c);
-    } else if (argument == HOST_SHELL_FILE) {
+    else if (argument == HOST_SHELL_FILE)
         offer_files(c);
-    }
 }
 
 /* The word at the end of the line, as it is typed: what is quoted is not
@@ -324,30 +310,26 @@ unsigned host_shell_complete(struct host_shell *shell, const char *line,
                              size_t *from, char **words, unsigned room) {
     size_t size = strlen(line);
     size_t begin = size;
-    while (begin > 0 && strchr(" \t", line[begin - 1]) == NULL) {
+    while (begin > 0 && strchr(" \t", line[begin - 1]) == NULL)
         begin--;
-    }
     struct completion c = {line + begin, words, 0, room};
     *from = begin;
-    if (strpbrk(line, "'\"\\#") != NULL) {
+    if (strpbrk(line, "'\"\\#") != NULL)
         return 0;
-    }
     char name[32] = "";
     unsigned place = 0;
     for (size_t i = 0; i < begin;) {
         size_t length = strcspn(line + i, " \t");
-        if (length > 0 && name[0] == '\0') {
+        if (length > 0 && name[0] == '\0')
             snprintf(name, sizeof name, "%.*s", (int)length, line + i);
-        } else if (length > 0) {
+        else if (length > 0)
             place++;
-        }
         i += length + strspn(line + i + length, " \t");
     }
-    if (name[0] == '\0') {
+    if (name[0] == '\0')
         offer_commands(&c);
-    } else {
+    else
         offer_argument(shell, &c, name, place);
-    }
     return c.count;
 }
 
@@ -363,9 +345,8 @@ static int pulse_lines(struct host_shell *shell, struct host_node_set *left) {
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         if (host_node_set_has(left, i) && place->has_line != NULL &&
             place->has_line(place->context, i)) {
-            if (place->pulse(place->context, i, &shell->error) != 0) {
+            if (place->pulse(place->context, i, &shell->error) != 0)
                 return shell->error.code;
-            }
             host_node_set_remove(left, i);
         }
     }
@@ -383,16 +364,13 @@ static int await_starts(struct host_shell *shell,
         for (unsigned i = 0; i < m->nodes; i++) {
             const struct host_visit_node *n = &shell->visit.node[i];
             if (host_node_set_has(set, i) &&
-                !(n->there && n->starts != shell->starts[i])) {
+                !(n->there && n->starts != shell->starts[i]))
                 host_node_set_add(late, i);
-            }
         }
-        if (host_node_set_count(late) == 0) {
+        if (host_node_set_count(late) == 0)
             break;
-        }
-        if (host_visit_round(&shell->visit, STEP_US, &shell->error) != 0) {
+        if (host_visit_round(&shell->visit, STEP_US, &shell->error) != 0)
             return shell->error.code;
-        }
     } while (m->now_us(m->context) < end);
     return 0;
 }
@@ -410,28 +388,23 @@ static int host_shell_reset(struct host_shell *shell, unsigned count,
     struct host_node_set set, there = {{0}}, left = {{0}}, late;
     (void)count;
     if (host_shell_set(shell, words[0], &set) != 0 ||
-        host_shell_ask(shell, &set, NODE_WHO, 0) != 0) {
+        host_shell_ask(shell, &set, NODE_WHO, 0) != 0)
         return shell->error.code;
-    }
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         shell->starts[i] = visit->node[i].starts;
-        if (host_node_set_has(&set, i)) {
+        if (host_node_set_has(&set, i))
             host_node_set_add(visit->node[i].answered ? &there : &left, i);
-        }
     }
     if (pulse_lines(shell, &left) != 0 ||
         (host_node_set_count(&there) > 0 &&
          host_visit_restart(visit, &there, NODE_RESTART_PLAIN, &shell->error) !=
-             0)) {
+             0))
         return shell->error.code;
-    }
     struct host_node_set due = set;
-    for (unsigned i = 0; i < sizeof due.bits; i++) {
+    for (unsigned i = 0; i < sizeof due.bits; i++)
         due.bits[i] &= (uint8_t)~left.bits[i];
-    }
-    if (await_starts(shell, &due, &late) != 0) {
+    if (await_starts(shell, &due, &late) != 0)
         return shell->error.code;
-    }
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         shell->starts[i] = visit->node[i].starts; /* asked for: no news */
         visit->node[i].answered =
@@ -456,16 +429,14 @@ static void say_text(void *context, const char *text) {
         host_shell_say(shell, "%s", text);
         return;
     }
-    if (shell->said[0] != '\0') {
+    if (shell->said[0] != '\0')
         host_shell_note(shell, "%s", shell->said);
-    }
     snprintf(shell->said, sizeof shell->said, "%s", host_shell_unnamed(text));
 }
 
 static int fail_run(struct host_shell *shell, int status) {
-    if (shell->said[0] != '\0') {
+    if (shell->said[0] != '\0')
         return host_fail(&shell->error, status, "%s", shell->said);
-    }
     return host_fail(&shell->error, status,
                      "run: it ended with status %d; what it says above tells "
                      "why",
@@ -477,13 +448,11 @@ static int finish_run(struct host_shell *shell, int status) {
     json_t *statistics = shell->object == NULL || place->statistics == NULL
                              ? NULL
                              : place->statistics(place->context);
-    if (statistics != NULL) {
+    if (statistics != NULL)
         (void)json_object_set_new(shell->object, "statistics", statistics);
-    }
     int code = status == 0 ? 0 : fail_run(shell, status);
-    if (status == 0 && shell->said[0] != '\0') {
+    if (status == 0 && shell->said[0] != '\0')
         host_shell_note(shell, "%s", shell->said);
-    }
     shell->said[0] = '\0';
     return code;
 }
@@ -509,14 +478,12 @@ static int await_run(struct host_shell *shell) {
 static int prepare_run(struct host_shell *shell) {
     const struct host_shell_place *place = shell->place;
     struct host_node_set all;
-    if (host_shell_open(shell, &shell->error) != 0) {
+    if (host_shell_open(shell, &shell->error) != 0)
         return shell->error.code;
-    }
     host_node_set_all(&all, shell->machine.nodes);
     int status = host_shell_ask(shell, &all, NODE_WHO, 0);
-    if (status == 0 && place->prepare != NULL) {
+    if (status == 0 && place->prepare != NULL)
         status = place->prepare(place->context, &shell->visit, &shell->error);
-    }
     host_shell_leave_cube(shell);
     return status;
 }
@@ -538,9 +505,8 @@ static int host_shell_run(struct host_shell *shell, unsigned count,
     }
     if (prepare_run(shell) != 0 ||
         place->run(place->context, (int)(count - behind), words, behind,
-                   shell->json, &shell->error) != 0) {
+                   shell->json, &shell->error) != 0)
         return shell->error.code;
-    }
     shell->running = true;
     if (behind) {
         host_shell_say(shell, "run: begun; abort ends it, wait waits for it");

@@ -58,9 +58,8 @@ static const struct host_shell_sink *host_script_sink(void) {
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);
     if (sigaction(SIGHUP, NULL, &before) == 0 &&
-        before.sa_handler != SIG_IGN) { /* as nohup has it */
+        before.sa_handler != SIG_IGN) /* as nohup has it */
         (void)sigaction(SIGHUP, &action, NULL);
-    }
     return &sink;
 }
 
@@ -70,15 +69,12 @@ static bool await_bytes(struct host_shell *shell, int file) {
     for (;;) {
         bool tended = shell->open || shell->running;
         int n = poll(&input, 1, tended ? 0 : IDLE_MS);
-        if (ending != 0) {
+        if (ending != 0)
             return false;
-        }
-        if (n > 0) {
+        if (n > 0)
             return true;
-        }
-        if (tended) {
+        if (tended)
             host_shell_tend(shell, TEND_US);
-        }
     }
 }
 
@@ -189,12 +185,10 @@ static int read_file(struct host_shell *shell, const char *path,
 static int do_script(struct host_shell *shell, const struct options *o,
                      struct host_error *error) {
     for (unsigned i = 0;
-         i < o->lines && !shell->leaves && host_script_ending() == 0; i++) {
+         i < o->lines && !shell->leaves && host_script_ending() == 0; i++)
         (void)host_shell_line(shell, o->line[i]);
-    }
-    if (o->file != NULL && !shell->leaves && host_script_ending() == 0) {
+    if (o->file != NULL && !shell->leaves && host_script_ending() == 0)
         return read_file(shell, o->file, error);
-    }
     return o->lines > 0 || o->file != NULL
                ? 0
                : host_script_read(shell, "standard input", STDIN_FILENO, error);
@@ -216,9 +210,8 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
         NULL,
         NULL,
         NULL};
-    if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0) {
+    if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0)
         return error->code;
-    }
     bool person = options.lines == 0 && options.file == NULL &&
                   isatty(STDIN_FILENO) && isatty(STDOUT_FILENO) &&
                   !options.json;
@@ -228,9 +221,8 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
                     person ? host_terminal_sink() : host_script_sink(),
                     options.json);
     status = host_site_check(&options.site, error);
-    if (status == 0) {
+    if (status == 0)
         status = host_site_read(&options.site, error);
-    }
     if (status == 0) {
         status = person ? host_terminal_run(&shell, &signal_number, error)
                         : do_script(&shell, &options, error);
@@ -316,9 +308,8 @@ int host_nodes_command(int argc, char **argv, struct host_error *error) {
         NULL,
         NULL,
         NULL};
-    if (host_options_parse(&argp, argc, argv, 0, &nodes_options, error) != 0) {
+    if (host_options_parse(&argp, argc, argv, 0, &nodes_options, error) != 0)
         return error->code;
-    }
     host_console_place_init(&place, &nodes_options.site);
     host_shell_init(&shell, &place.place, host_script_sink(),
                     nodes_options.json);

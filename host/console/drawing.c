@@ -77,11 +77,10 @@ static void draw_wire(struct canvas *c, unsigned node, unsigned d,
         int x = a.x + (b.x - a.x) * i / steps;
         int y = a.y + (b.y - a.y) * i / steps;
         bool gap = state != HOST_WIRE_UP && d == 0 && i % 2 == 0;
-        if (i == at && state != HOST_WIRE_UP) {
+        if (i == at && state != HOST_WIRE_UP)
             put(c, x, y, mark_of(state));
-        } else if (c->cell[y][x] == ' ' || d == 0) {
+        else if (c->cell[y][x] == ' ' || d == 0)
             put(c, x, y, gap ? ' ' : line);
-        }
     }
 }
 
@@ -110,12 +109,10 @@ static void print_canvas(const struct canvas *c, unsigned dimension,
         int used = (int)sizeof c->cell[y];
         bool drawn = dimension > 2 || y >= ROWS - 1 - UP;
         drawn = drawn && (dimension > 1 || y == ROWS - 1);
-        while (used > 0 && c->cell[y][used - 1] == ' ') {
+        while (used > 0 && c->cell[y][used - 1] == ' ')
             used--;
-        }
-        if (drawn) {
+        if (drawn)
             fprintf(out, "%.*s\n", used, c->cell[y]);
-        }
     }
 }
 
@@ -126,19 +123,15 @@ static void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
     unsigned dimensions = drawing->dimension < 3 ? drawing->dimension : 3;
     memset(c.cell, ' ', sizeof c.cell);
     for (unsigned d = dimensions; d-- > 0;) {
-        for (unsigned i = 0; i < nodes; i++) {
-            if ((i >> d & 1) == 0) {
+        for (unsigned i = 0; i < nodes; i++)
+            if ((i >> d & 1) == 0)
                 draw_wire(&c, i, d, drawing->wire[i][d]);
-            }
-        }
     }
-    for (unsigned i = 0; i < nodes; i++) {
+    for (unsigned i = 0; i < nodes; i++)
         draw_node(&c, i, drawing->absent[i]);
-    }
     print_canvas(&c, drawing->dimension, out);
-    if (drawing->dimension == HOST_DRAWING_MAX) {
+    if (drawing->dimension == HOST_DRAWING_MAX)
         draw_between(drawing, out);
-    }
     enum host_wire_state host = drawing->wire[0][drawing->dimension];
     char mark = host == HOST_WIRE_UP ? '|' : mark_of(host);
     fprintf(out, "%*s%c\n%*shost\n", LEFT, "", mark, LEFT, "");
@@ -147,9 +140,8 @@ static void host_drawing_draw(const struct host_drawing *drawing, FILE *out) {
 /* A letter for each link of a node. */
 static void host_drawing_row(const struct host_drawing *drawing, unsigned node,
                              char text[CUBE_LINKS_MAX + 1]) {
-    for (unsigned d = 0; d < drawing->dimension; d++) {
+    for (unsigned d = 0; d < drawing->dimension; d++)
         text[d] = mark_of(drawing->wire[node & ~(1u << d)][d]);
-    }
     text[drawing->dimension] = '\0';
 }
 
@@ -168,9 +160,8 @@ static void add_end(struct host_drawing *drawing, unsigned node, unsigned d,
     unsigned lower = d < drawing->dimension ? node & ~(1u << d) : node;
     uint8_t *wire = &drawing->wire[lower][d];
     enum host_wire_state state = state_of(link);
-    if (*wire == HOST_WIRE_UNKNOWN || state > *wire) {
+    if (*wire == HOST_WIRE_UNKNOWN || state > *wire)
         *wire = (uint8_t)state;
-    }
 }
 
 static struct node_link_state
@@ -192,9 +183,8 @@ static void gather(struct host_shell *shell, struct host_drawing *drawing) {
             memcpy(&link, n->answer + d * sizeof link, sizeof link);
             add_end(drawing, i, d, &link);
         }
-        if (n->answered) {
+        if (n->answered)
             host_shell_note_lost(shell, i);
-        }
     }
 }
 
@@ -221,9 +211,8 @@ static void tell_drawing(struct host_shell *shell,
     char *text = NULL;
     size_t size;
     FILE *out = open_memstream(&text, &size);
-    if (out == NULL) {
+    if (out == NULL)
         return;
-    }
     host_drawing_draw(drawing, out);
     if (fclose(out) == 0) {
         for (char *p = text, *end; *p != '\0'; p = end + 1) {
@@ -246,9 +235,8 @@ static const char *said_by_end(const struct host_shell *shell, unsigned node,
         link = host_shell_own_link(shell);
         return host_shell_state(&link, text, size);
     }
-    if (!n->answered || (d + 1) * sizeof link > n->size) {
+    if (!n->answered || (d + 1) * sizeof link > n->size)
         return NULL;
-    }
     memcpy(&link, n->answer + d * sizeof link, sizeof link);
     return state_of(&link) == HOST_WIRE_UP
                ? NULL
@@ -266,15 +254,12 @@ static unsigned tell_faults(struct host_shell *shell,
             unsigned peer = host ? 0 : i ^ 1u << d;
             const char *why = said_by_end(shell, i, d, own, sizeof own);
             if ((host ? i != 0 : peer < i) ||
-                drawing->wire[i][d] == HOST_WIRE_UP) {
+                drawing->wire[i][d] == HOST_WIRE_UP)
                 continue;
-            }
-            if (why == NULL && !host) {
+            if (why == NULL && !host)
                 why = said_by_end(shell, peer, d, own, sizeof own);
-            }
-            if (!host) {
+            if (!host)
                 snprintf(to, sizeof to, "node %u", peer);
-            }
             snprintf(text, sizeof text, "%s",
                      why == NULL ? "neither end answers" : why);
             host_shell_say(shell, "node %u link %u to %s: %s", i, d, to, text);
@@ -290,16 +275,14 @@ static unsigned tell_faults(struct host_shell *shell,
 static int tell(struct host_shell *shell, const struct host_drawing *drawing) {
     json_t *list = json_array();
     char wrong[CUBE_FAULT_BYTES];
-    if (drawing->dimension <= HOST_DRAWING_MAX) {
+    if (drawing->dimension <= HOST_DRAWING_MAX)
         tell_drawing(shell, drawing);
-    } else {
+    else
         tell_matrix(shell, drawing);
-    }
     unsigned faults = tell_faults(shell, drawing, list);
     bool crossed = cube_wiring_fault(shell->visit.cube, wrong);
-    if (crossed) {
+    if (crossed)
         host_shell_say(shell, "%s", wrong);
-    }
     if (faults > 0) {
         host_shell_say(shell, "x dead  ! down  ? wrong  . nobody tells  (n) "
                               "does not answer");
@@ -322,13 +305,11 @@ int host_shell_wires(struct host_shell *shell, unsigned count,
     struct host_node_set all;
     (void)count, (void)words;
     host_node_set_all(&all, shell->machine.nodes);
-    if (host_shell_ask(shell, &all, NODE_LINKS, 0) != 0) {
+    if (host_shell_ask(shell, &all, NODE_LINKS, 0) != 0)
         return shell->error.code;
-    }
     struct host_drawing *drawing = calloc(1, sizeof *drawing);
-    if (drawing == NULL) {
+    if (drawing == NULL)
         return host_fail_memory(&shell->error, "the drawing");
-    }
     gather(shell, drawing);
     int status = tell(shell, drawing);
     free(drawing);
@@ -425,9 +406,8 @@ static void tell_link(struct host_shell *shell, unsigned node, unsigned d,
     (void)host_shell_state(link, state, sizeof state);
     snprintf(lost, sizeof lost, "%" PRIu32, link->lost);
     snprintf(to, sizeof to, "%u", d);
-    if (node != CUBE_HOST && d == shell->machine.dimension) {
+    if (node != CUBE_HOST && d == shell->machine.dimension)
         snprintf(to, sizeof to, "host");
-    }
     snprintf(text, sizeof text,
              "%-5s %-9s %9s %7s %7s %6" PRIu32 " %6" PRIu32 " %6s", to, state,
              link->rtt_us == 0 ? "-" : host_shell_time(link->rtt_us, rtt),
@@ -467,23 +447,19 @@ int host_shell_links(struct host_shell *shell, unsigned count,
     struct host_fold own = {0};
     static const char heading[] =
         "LINK  STATE     ROUNDTRIP      IN     OUT  AGAIN    BAD   LOST";
-    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0) {
+    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0)
         return shell->error.code;
-    }
     int status =
         host_shell_ask_tell(shell, &set, NODE_LINKS, heading, show_links_tell);
-    if (shell->looking) {
+    if (shell->looking)
         return status;
-    }
     struct node_link_state link = host_shell_own_link(shell);
     json_t *list = json_array();
     tell_link(shell, CUBE_HOST, 0, &link, &own, list);
-    if (own.count > 0) {
+    if (own.count > 0)
         host_shell_say(shell, "host   %s", own.row[0].text);
-    }
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "host", json_array_get(list, 0));
-    }
     json_decref(list);
     host_fold_free(&own);
     return status;

@@ -15,9 +15,8 @@ enum { SET_TEXT = 48, LINE = 1024, ROWS_FIRST = 16, TIME_TEXT = 32 };
 
 /* Whether a time is of those of a row: all within 2 s and a tenth. */
 static bool is_near(const struct host_fold_row *row, const uint32_t *time_s) {
-    if (time_s == NULL || !row->timed) {
+    if (time_s == NULL || !row->timed)
         return time_s == NULL && !row->timed;
-    }
     uint32_t least = row->least < *time_s ? row->least : *time_s;
     uint32_t most = row->most > *time_s ? row->most : *time_s;
     return most - least <= 2 + least / 10;
@@ -28,17 +27,15 @@ static struct host_fold_row *row_of(struct host_fold *fold, bool of_host,
     for (unsigned i = 0; i < fold->count; i++) {
         struct host_fold_row *row = &fold->row[i];
         if (row->of_host == of_host && strcmp(row->text, text) == 0 &&
-            is_near(row, time_s)) {
+            is_near(row, time_s))
             return row;
-        }
     }
     if (fold->count == fold->room) {
         unsigned room = fold->room == 0 ? ROWS_FIRST : 2 * fold->room;
         struct host_fold_row *more =
             realloc(fold->row, room * sizeof fold->row[0]);
-        if (more == NULL) {
+        if (more == NULL)
             return NULL;
-        }
         fold->row = more;
         fold->room = room;
     }
@@ -55,9 +52,8 @@ static struct host_fold_row *add(struct host_fold *fold, unsigned node,
     bool of_host = node == CUBE_HOST;
     struct host_fold_row *row = row_of(fold, of_host, text, time_s);
     fold->broken = fold->broken || row == NULL;
-    if (row != NULL && !of_host) {
+    if (row != NULL && !of_host)
         host_node_set_add(&row->set, node);
-    }
     return row;
 }
 
@@ -68,9 +64,8 @@ void host_fold_add(struct host_fold *fold, unsigned node, const char *text) {
 void host_fold_add_timed(struct host_fold *fold, unsigned node,
                          const char *text, uint32_t time_s) {
     struct host_fold_row *row = add(fold, node, text, &time_s);
-    if (row == NULL) {
+    if (row == NULL)
         return;
-    }
     row->least = row->timed && row->least < time_s ? row->least : time_s;
     row->most = row->timed && row->most > time_s ? row->most : time_s;
     row->timed = true;
@@ -89,11 +84,10 @@ static void put_times(const struct host_fold_row *row, char text[TIME_TEXT]) {
 }
 
 static void name_row(const struct host_fold_row *row, char text[SET_TEXT]) {
-    if (row->of_host) {
+    if (row->of_host)
         snprintf(text, SET_TEXT, "host");
-    } else {
+    else
         host_node_set_print(&row->set, text, SET_TEXT);
-    }
 }
 
 /* Its lines, each behind four blanks. */
@@ -151,9 +145,8 @@ void host_fold_print(const struct host_fold *fold, const char *heading,
 }
 
 void host_fold_free(struct host_fold *fold) {
-    for (unsigned i = 0; i < fold->count; i++) {
+    for (unsigned i = 0; i < fold->count; i++)
         free(fold->row[i].text);
-    }
     free(fold->row);
     memset(fold, 0, sizeof *fold);
 }
@@ -239,9 +232,8 @@ struct map_text {
 static void add_part(struct map_text *m, const char *name, uint32_t bytes,
                      uint32_t count, const char *unit) {
     char figure[HOST_SHELL_FIGURE], bar[HOST_SHELL_BAR], more[48] = "";
-    if (m->used >= sizeof m->text - 1) {
+    if (m->used >= sizeof m->text - 1)
         return;
-    }
     if (count > 0) {
         snprintf(more, sizeof more, "  %" PRIu32 " %s", count,
                  unit == NULL ? "" : unit);
@@ -314,9 +306,8 @@ static void tell_log(struct host_shell *shell, unsigned node,
         used += (size_t)snprintf(text + used, sizeof text - used,
                                  plain ? "%c" : "\\x%02x", c);
     }
-    while (used > 0 && text[used - 1] == '\n') {
+    while (used > 0 && text[used - 1] == '\n')
         used--;
-    }
     text[used] = '\0';
     host_fold_add(fold, node, used == 0 ? "nothing to say" : text);
     (void)json_object_set_new(object, "log", json_string(text));
@@ -334,25 +325,22 @@ enum { WIRES_US = 10000000 }; /* for those of nodes that have just begun */
 /* A field of fixed length, as a text that a terminal can be given. */
 static const char *field(const uint8_t *bytes, size_t size, char *text) {
     size_t i = 0;
-    for (; i < size && bytes[i] != 0; i++) {
+    for (; i < size && bytes[i] != 0; i++)
         text[i] = (char)(bytes[i] >= ' ' && bytes[i] <= '~' ? bytes[i] : '?');
-    }
     text[i] = '\0';
     return text;
 }
 
 static bool is_zero(const uint8_t *bytes, size_t size) {
     bool zero = true;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         zero = zero && bytes[i] == 0;
-    }
     return zero;
 }
 
 static const char *hex(const uint8_t *bytes, size_t size, char *text) {
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         snprintf(text + 2 * i, 3, "%02x", bytes[i]);
-    }
     return text;
 }
 
@@ -385,9 +373,8 @@ static void tell_who(struct host_shell *shell, unsigned node,
     unsigned links_up = looking ? 0 : host_visit_links_up(&shell->visit, node);
     snprintf(boot, sizeof boot, "%" PRIu32, w->boot);
     snprintf(wires, sizeof wires, "%u of %u", links_up, links);
-    if (links_up == links) {
+    if (links_up == links)
         snprintf(wires, sizeof wires, looking ? "-" : "all");
-    }
     snprintf(row, sizeof row, "%-12s %-8s %-10s %-8.8s %5s %c %7s  %-8s %s",
              board, kind, version,
              is_zero(w->digest, sizeof w->digest) ? "-" : digest,
@@ -425,9 +412,8 @@ static void tell_fault(void *context, unsigned node, unsigned link,
 static unsigned tell_faults(struct host_shell *shell) {
     struct faults faults = {shell, json_array()};
     unsigned count = host_visit_faults(&shell->visit, tell_fault, &faults);
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "wires", faults.list);
-    }
     json_decref(faults.list);
     return count;
 }
@@ -449,9 +435,8 @@ static const char *name_image(const struct host_shell *shell,
         }
     }
     if (!alike || !host_firmware_find(board, path) ||
-        host_text_quote(quoted, sizeof quoted, path) != 0) {
+        host_text_quote(quoted, sizeof quoted, path) != 0)
         return "IMAGE";
-    }
     return strcpy(path, quoted);
 }
 
@@ -464,9 +449,8 @@ static void tell_next(struct host_shell *shell) {
     char names[72], image[PATH_MAX];
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         const struct node_who *w = &shell->visit.node[i].who;
-        if (!shell->visit.node[i].there || w->protocol != NODE_PROTOCOL) {
+        if (!shell->visit.node[i].there || w->protocol != NODE_PROTOCOL)
             continue;
-        }
         if (w->kind == NODE_KIND_LOADER) {
             host_node_set_add(w->boot == 0 ? &worn : &loaders, i);
             continue;
@@ -507,22 +491,19 @@ static void tell_next(struct host_shell *shell) {
 int host_shell_nodes(struct host_shell *shell, unsigned count,
                      const char *const *words) {
     struct host_node_set set;
-    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0) {
+    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0)
         return shell->error.code;
-    }
-    if (!shell->looking && (host_shell_ask(shell, &set, NODE_WHO, 0) != 0 ||
-                            host_visit_settle_wires(&shell->visit, WIRES_US,
-                                                    &shell->error) != 0)) {
+    if (!shell->looking &&
+        (host_shell_ask(shell, &set, NODE_WHO, 0) != 0 ||
+         host_visit_settle_wires(&shell->visit, WIRES_US, &shell->error) != 0))
         return shell->error.code;
-    }
     int status = host_shell_ask_tell(
         shell, &set, NODE_WHO,
         "BOARD        RUNS     VERSION    IMAGE     BOOT        UP  MEMORY  "
         "LINKS    ROLE",
         tell_who);
-    if (count > 0 || shell->looking) {
+    if (count > 0 || shell->looking)
         return status;
-    }
     unsigned faults = tell_faults(shell);
     tell_next(shell);
     return status != 0 || faults == 0

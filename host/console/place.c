@@ -25,9 +25,8 @@ static _Noreturn void become(const char *const *words, const int *report,
     (void)setpgid(0, 0);
     for (int i = 1; i < NSIG; i++) {
         struct sigaction action;
-        if (sigaction(i, NULL, &action) == 0 && action.sa_handler != SIG_IGN) {
+        if (sigaction(i, NULL, &action) == 0 && action.sa_handler != SIG_IGN)
             (void)signal(i, SIG_DFL);
-        }
     }
     (void)sigprocmask(SIG_SETMASK, signals, NULL);
     (void)prctl(PR_SET_PDEATHSIG, SIGTERM);
@@ -36,9 +35,8 @@ static _Noreturn void become(const char *const *words, const int *report,
         (void)dup2(report[1], STDOUT_FILENO);
         (void)dup2(report[1], STDERR_FILENO);
     }
-    if (getppid() == host) { /* else it ended before it could be watched */
+    if (getppid() == host) /* else it ended before it could be watched */
         (void)execv("/proc/self/exe", (char *const *)words);
-    }
     _exit(NO_PROGRAM);
 }
 
@@ -58,9 +56,8 @@ static int host_child_run_begin(struct host_child_run *run,
     (void)fflush(NULL);
     (void)sigprocmask(SIG_SETMASK, &all, &before);
     pid_t pid = fork();
-    if (pid == 0) {
+    if (pid == 0)
         become(words, quiet ? report : NULL, host, &before);
-    }
     int reason = errno;
     (void)sigprocmask(SIG_SETMASK, &before, NULL);
     if (quiet) {
@@ -68,9 +65,8 @@ static int host_child_run_begin(struct host_child_run *run,
         (void)fcntl(report[0], F_SETFL, O_NONBLOCK);
     }
     if (pid < 0) {
-        if (quiet) {
+        if (quiet)
             (void)close(report[0]);
-        }
         return host_fail(error, HOST_BROKEN, "run: %s; end some processes",
                          strerror(reason));
     }
@@ -82,9 +78,8 @@ static void take(struct host_child_run *run, const char *bytes, size_t size,
                  void (*say)(void *context, const char *text), void *context) {
     for (size_t i = 0; i < size; i++) {
         bool end = bytes[i] == '\n';
-        if (!end) {
+        if (!end)
             run->line[run->used++] = bytes[i];
-        }
         if (end || run->used == sizeof run->line - 1) {
             run->line[run->used] = '\0';
             run->used = 0;
@@ -100,9 +95,8 @@ static bool read_said(struct host_child_run *run,
     char bytes[1024];
     for (;;) {
         ssize_t n = read(run->said, bytes, sizeof bytes);
-        if (n <= 0) {
+        if (n <= 0)
             return n == 0;
-        }
         take(run, bytes, (size_t)n, say, context);
     }
 }
@@ -114,21 +108,18 @@ static bool host_child_run_look(struct host_child_run *run, int *status,
     struct pollfd said = {run->said, POLLIN, 0};
     int found, wait_ms = (int)(wait_us / 1000);
     bool over = false;
-    if (run->said < 0 && wait_ms > FOREGROUND_MS) {
+    if (run->said < 0 && wait_ms > FOREGROUND_MS)
         wait_ms = FOREGROUND_MS;
-    }
     if (waitpid(run->pid, &found, WNOHANG) != run->pid) {
         (void)poll(&said, run->said < 0 ? 0 : 1, wait_ms);
         over = run->said >= 0 && read_said(run, say, context);
-        if (waitpid(run->pid, &found, over ? 0 : WNOHANG) != run->pid) {
+        if (waitpid(run->pid, &found, over ? 0 : WNOHANG) != run->pid)
             return false;
-        }
     }
     if (run->said >= 0) {
         (void)read_said(run, say, context);
-        if (run->used > 0) {
+        if (run->used > 0)
             take(run, "\n", 1, say, context);
-        }
         (void)close(run->said);
     }
     run->pid = 0;
@@ -139,9 +130,8 @@ static bool host_child_run_look(struct host_child_run *run, int *status,
 
 /* As Ctrl-C does. */
 static void host_child_run_interrupt(const struct host_child_run *run) {
-    if (run->pid > 0) {
+    if (run->pid > 0)
         (void)kill(run->pid, SIGINT);
-    }
 }
 
 /* --- place ---------------------------------------------------------------- */
@@ -149,9 +139,8 @@ static void host_child_run_interrupt(const struct host_child_run *run) {
 static int open_site(void *context, struct host_machine *machine,
                      struct host_error *error) {
     struct host_console_place *p = context;
-    if (host_site_open(&p->site, &p->options, error) != 0) {
+    if (host_site_open(&p->site, &p->options, error) != 0)
         return error->code;
-    }
     *machine = p->site.machine;
     host_remote_wire(&p->site.file, p->wire);
     return 0;
@@ -165,9 +154,8 @@ static bool find_wire(void *context, char *name) {
     const char *path = p->options.cube;
     if (path != NULL) {
         bool read = host_cube_file_read(&file, path, &error) == 0;
-        if (read) {
+        if (read)
             host_remote_wire(&file, name);
-        }
         host_cube_file_free(&file);
         return read;
     }
@@ -191,9 +179,8 @@ static bool has_line(void *context, unsigned node) {
 static int pulse(void *context, unsigned node, struct host_error *error) {
     struct host_console_place *p = context;
     struct host_lines lines;
-    if (host_lines_open(&lines, &p->site.file, &p->site.remote, error) != 0) {
+    if (host_lines_open(&lines, &p->site.file, &p->site.remote, error) != 0)
         return error->code;
-    }
     int status = host_lines_reset(&lines, node, false, error);
     host_lines_close(&lines);
     return status;
@@ -203,9 +190,8 @@ static int pulse(void *context, unsigned node, struct host_error *error) {
 
 static int make_folder(struct host_console_place *p, struct host_error *error) {
     const char *above = getenv("XDG_RUNTIME_DIR");
-    if (p->folder[0] != '\0') {
+    if (p->folder[0] != '\0')
         return 0;
-    }
     bool fits = above != NULL && above[0] == '/' &&
                 strlen(above) + 24 < sizeof p->folder;
     snprintf(p->folder, sizeof p->folder, "%s/incode-console.XXXXXX",
@@ -241,20 +227,16 @@ static void write_host_wire(const struct host_console_place *p, FILE *out) {
                   o->port != NULL  ? "serial"
                   : o->tcp != NULL ? "tcp"
                                    : "unix");
-    if (o->port != NULL) {
+    if (o->port != NULL)
         (void)fprintf(out, "[\"/dev/null\", ");
-    }
-    if (o->unix_path != NULL && realpath(name, path) != NULL) {
+    if (o->unix_path != NULL && realpath(name, path) != NULL)
         name = path;
-    }
     write_text(out, name);
     (void)fprintf(out, "%s;", o->port != NULL ? "]" : "");
-    if (o->port != NULL && o->baud > 0) {
+    if (o->port != NULL && o->baud > 0)
         (void)fprintf(out, " baud = %llu;", (unsigned long long)o->baud);
-    }
-    if (o->tcp != NULL && o->key == NULL) {
+    if (o->tcp != NULL && o->key == NULL)
         (void)fprintf(out, " insecure = true;");
-    }
     (void)fprintf(out, " }");
 }
 
@@ -283,9 +265,8 @@ static void write_cube(const struct host_console_place *p,
                      : memory;
     }
     (void)fprintf(out, ");\n");
-    if (memory > 0) {
+    if (memory > 0)
         (void)fprintf(out, "memory = \"%u\";\n", memory);
-    }
     if (p->options.key != NULL && realpath(p->options.key, path) != NULL) {
         (void)fprintf(out, "key = ");
         write_text(out, path);
@@ -311,9 +292,8 @@ static void write_cube(const struct host_console_place *p,
 static int prepare(void *context, const struct host_visit *visit,
                    struct host_error *error) {
     struct host_console_place *p = context;
-    if (make_folder(p, error) != 0 || p->options.cube != NULL) {
+    if (make_folder(p, error) != 0 || p->options.cube != NULL)
         return error->code;
-    }
     snprintf(p->cube, sizeof p->cube, "%s/console.cube", p->folder);
     FILE *out = host_create_over(p->cube);
     bool good = out != NULL;

@@ -177,9 +177,8 @@ static void fill_in(char text[LINE], const char *format, va_list list) {
 void host_shell_say(struct host_shell *shell, const char *format, ...) {
     char text[LINE];
     va_list list;
-    if (shell->json) {
+    if (shell->json)
         return;
-    }
     va_start(list, format);
     fill_in(text, format, list);
     va_end(list);
@@ -198,9 +197,8 @@ void host_shell_note(struct host_shell *shell, const char *format, ...) {
 /* --- the cube ------------------------------------------------------------- */
 
 void host_shell_leave_cube(struct host_shell *shell) {
-    if (!shell->open) {
+    if (!shell->open)
         return;
-    }
     host_visit_close(&shell->visit);
     shell->place->close(shell->place->context);
     free(shell->starts);
@@ -212,12 +210,10 @@ void host_shell_leave_cube(struct host_shell *shell) {
 
 int host_shell_open(struct host_shell *shell, struct host_error *error) {
     struct host_machine machine;
-    if (shell->open) {
+    if (shell->open)
         return 0;
-    }
-    if (shell->place->open(shell->place->context, &machine, error) != 0) {
+    if (shell->place->open(shell->place->context, &machine, error) != 0)
         return error->code;
-    }
     host_watch_init(&shell->watch, &machine, shell->sink);
     shell->machine = host_watch_machine(&shell->watch);
     shell->starts = calloc(machine.nodes, sizeof shell->starts[0]);
@@ -262,9 +258,8 @@ static void note_wire(struct host_shell *shell, uint64_t now_us) {
     }
     shell->wire_up = up;
     uint64_t noise = noise_of(shell);
-    if (noise == shell->noise || now_us < shell->noted_us) {
+    if (noise == shell->noise || now_us < shell->noted_us)
         return;
-    }
     char bytes[5 * HOST_WATCH_BYTES];
     host_watch_noise(&shell->watch, bytes, sizeof bytes);
     if (up) {
@@ -291,9 +286,8 @@ static void note_events(struct host_shell *shell) {
     struct host_node_set again = {{0}};
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         uint32_t starts = shell->visit.node[i].starts;
-        if (starts != shell->starts[i] && shell->starts[i] != 0) {
+        if (starts != shell->starts[i] && shell->starts[i] != 0)
             host_node_set_add(&again, i);
-        }
         shell->starts[i] = starts;
     }
     if (host_node_set_count(&again) > 0) {
@@ -308,9 +302,8 @@ static void lose_cube(struct host_shell *shell,
                       const struct host_error *error) {
     bool cut = shell->watch.cut;
     shell->watch.cut = false;
-    if (cut) {
+    if (cut)
         return;
-    }
     shell->in_use = shell->visit.in_use;
     host_shell_note(shell, "%s", error->text);
     host_shell_leave_cube(shell);
@@ -324,14 +317,12 @@ static void note_line(void *context, const char *text) {
 static bool tend_run(struct host_shell *shell, uint64_t wait_us) {
     const struct host_shell_place *place = shell->place;
     int status = 0;
-    if (!place->look(place->context, &status, note_line, shell, wait_us)) {
+    if (!place->look(place->context, &status, note_line, shell, wait_us))
         return true;
-    }
     shell->running = false;
     host_shell_note(shell, "run: ended with status %d", status);
-    if (shell->first == 0) {
+    if (shell->first == 0)
         shell->first = status;
-    }
     return false;
 }
 
@@ -341,9 +332,8 @@ void host_shell_tend(struct host_shell *shell, uint64_t wait_us) {
         (void)tend_run(shell, wait_us);
         return;
     }
-    if (!shell->open) {
+    if (!shell->open)
         return;
-    }
     if (host_visit_round(&shell->visit, wait_us, &error) != 0) {
         lose_cube(shell, &error);
         return;
@@ -370,9 +360,8 @@ static int do_command(struct host_shell *shell, unsigned count,
                          command->name, command->arguments[0] ? " " : "",
                          command->arguments);
     }
-    if (command->need != HOST_SHELL_NO_CUBE && host_shell_reach(shell) != 0) {
+    if (command->need != HOST_SHELL_NO_CUBE && host_shell_reach(shell) != 0)
         return shell->error.code;
-    }
     int status = command->run(shell, count, words);
     if (shell->looking) {
         host_shell_look_end(shell);
@@ -394,27 +383,23 @@ static void tell_status(struct host_shell *shell, int status) {
         }
         char *text =
             json_dumps(shell->object, JSON_COMPACT | JSON_ENSURE_ASCII);
-        if (text != NULL) {
+        if (text != NULL)
             sink->line(sink->context, text);
-        }
         free(text);
         json_decref(shell->object);
         shell->object = NULL;
     }
-    if (status != 0 && shell->error.text[0] != '\0') {
+    if (status != 0 && shell->error.text[0] != '\0')
         sink->failed(sink->context, shell->error.text);
-    }
-    if (shell->first == 0) {
+    if (shell->first == 0)
         shell->first = status;
-    }
 }
 
 int host_shell_fail(struct host_shell *shell, const char *command,
                     const struct host_error *error) {
     shell->error = *error;
-    if (shell->json) {
+    if (shell->json)
         shell->object = json_pack("{ss*}", "command", command);
-    }
     tell_status(shell, error->code);
     return error->code;
 }
@@ -455,13 +440,11 @@ int host_shell_line(struct host_shell *shell, const char *line) {
     int count = 0, status = 0;
     const char **words = NULL;
     Tokenizer *tokens = tok_init(NULL);
-    if (tokens == NULL) {
+    if (tokens == NULL)
         return HOST_BROKEN;
-    }
     int wrong = tok_str(tokens, line, &count, &words);
-    for (int i = 0; wrong == 0 && i < count; i++) {
+    for (int i = 0; wrong == 0 && i < count; i++)
         count = words[i][0] == '#' ? i : count;
-    }
     if (wrong != 0 || count > HOST_SHELL_WORDS) {
         memset(&shell->error, 0, sizeof shell->error);
         shell->object = shell->json ? json_object() : NULL;

@@ -102,9 +102,8 @@ static void draw(struct host_shell *shell, struct top *top,
 
 static int look(struct host_shell *shell, struct top *top,
                 const struct host_node_set *set) {
-    if (host_shell_ask(shell, set, NODE_TOP, 0) != 0) {
+    if (host_shell_ask(shell, set, NODE_TOP, 0) != 0)
         return shell->error.code;
-    }
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
         struct look *l = &top->look[i];
         const void *answer = host_shell_answer(shell, i, sizeof l->now);
@@ -136,11 +135,9 @@ static int pause_for(struct host_shell *shell, uint64_t us) {
         return 0;
     }
     uint64_t end = m->now_us(m->context) + us;
-    for (uint64_t now = end - us; now < end; now = m->now_us(m->context)) {
-        if (host_visit_round(&shell->visit, end - now, &shell->error) != 0) {
+    for (uint64_t now = end - us; now < end; now = m->now_us(m->context))
+        if (host_visit_round(&shell->visit, end - now, &shell->error) != 0)
             return shell->error.code;
-        }
-    }
     return 0;
 }
 
@@ -151,9 +148,8 @@ static void tell_object(struct host_shell *shell, const struct top *top,
         const struct look *l = &top->look[i];
         const struct node_top *t = &l->now;
         const struct node_role *role = node_role_named(t->role);
-        if (!host_node_set_has(set, i)) {
+        if (!host_node_set_has(set, i))
             continue;
-        }
         json_t *object =
             json_pack("{si sb}", "node", (int)i, "there", (int)l->there);
         json_t *fields = json_pack(
@@ -165,23 +161,20 @@ static void tell_object(struct host_shell *shell, const struct top *top,
             1e-6 * rate(l, t->busy_us, l->before.busy_us),
             "wire_bytes_per_second", wire_rate(l), "tetrahedra_built",
             (json_int_t)t->built);
-        if (l->there) {
+        if (l->there)
             (void)json_object_update(object, fields);
-        }
         json_decref(fields);
         (void)json_array_append_new(list, object);
     }
-    if (shell->object != NULL) {
+    if (shell->object != NULL)
         (void)json_object_set(shell->object, "nodes", list);
-    }
     json_decref(list);
 }
 
 static void say_text(struct host_shell *shell, char *text) {
     for (char *line = strtok(text, "\n"); line != NULL;
-         line = strtok(NULL, "\n")) {
+         line = strtok(NULL, "\n"))
         host_shell_say(shell, "%s", line);
-    }
 }
 
 static int show(struct host_shell *shell, struct top *top,
@@ -189,9 +182,8 @@ static int show(struct host_shell *shell, struct top *top,
     const struct host_shell_sink *sink = shell->sink;
     bool live = sink->picture != NULL && !shell->json;
     int status = look(shell, top, set);
-    if (status == 0) {
+    if (status == 0)
         status = pause_for(shell, FIRST_US);
-    }
     do {
         unsigned columns =
             sink->columns == NULL ? 80 : sink->columns(sink->context);
@@ -200,26 +192,22 @@ static int show(struct host_shell *shell, struct top *top,
                      : room / 4 > CELLS_MAX ? CELLS_MAX
                                             : room / 4;
         status = status == 0 ? look(shell, top, set) : status;
-        if (status == 0) {
+        if (status == 0)
             draw(shell, top, set);
-        }
-        if (status != 0 || !live || !sink->picture(sink->context, top->text)) {
+        if (status != 0 || !live || !sink->picture(sink->context, top->text))
             break;
-        }
         status = pause_for(shell, EVERY_US);
     } while (true);
-    if (live) {
+    if (live)
         (void)sink->picture(sink->context, NULL);
-    }
     if (live && shell->watch.cut) { /* the person has seen enough */
         shell->watch.cut = false;
         memset(&shell->error, 0, sizeof shell->error);
         status = 0;
         draw(shell, top, set);
     }
-    if (status != 0) {
+    if (status != 0)
         return status;
-    }
     tell_object(shell, top, set);
     say_text(shell, top->text);
     return host_shell_fail_absent(shell, set);
@@ -228,9 +216,8 @@ static int show(struct host_shell *shell, struct top *top,
 int host_shell_top(struct host_shell *shell, unsigned count,
                    const char *const *words) {
     struct host_node_set set;
-    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0) {
+    if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0)
         return shell->error.code;
-    }
     struct top top = {.room = (shell->machine.nodes + 2) * TEXT_A_NODE};
     top.look = calloc(shell->machine.nodes, sizeof top.look[0]);
     top.text = malloc(top.room);

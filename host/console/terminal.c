@@ -30,17 +30,14 @@ static void find_folder(void) {
     struct host_error error = {0};
     char path[PATH_MAX];
     int n = -1;
-    if (state != NULL && state[0] == '/') {
+    if (state != NULL && state[0] == '/')
         n = snprintf(path, sizeof path, "%s/incode", state);
-    } else if (home != NULL && home[0] == '/') {
+    else if (home != NULL && home[0] == '/')
         n = snprintf(path, sizeof path, "%s/.local/state/incode", home);
-    }
-    if (n > 0 && n < (int)sizeof path) {
+    if (n > 0 && n < (int)sizeof path)
         folder = host_folder_open_all(path, &error);
-    }
-    if (error.code != 0) {
+    if (error.code != 0)
         host_note("no history is kept: %s", error.text);
-    }
 }
 
 /* The newest lines alone, in place of all, once there are too many. */
@@ -50,19 +47,15 @@ static void shorten(FILE *file, size_t lines) {
     snprintf(other, sizeof other, NAME ".%ld", (long)getpid());
     int fd = host_folder_file(folder, other, O_WRONLY | O_CREAT | O_EXCL);
     FILE *out = fd < 0 ? NULL : fdopen(fd, "w");
-    if (out == NULL) {
+    if (out == NULL)
         return;
-    }
     rewind(file);
-    while (getline(&line, &room, file) > 0) {
-        if (at++ + HOST_HISTORY_LINES >= lines) {
+    while (getline(&line, &room, file) > 0)
+        if (at++ + HOST_HISTORY_LINES >= lines)
             (void)fputs(line, out);
-        }
-    }
     free(line);
-    if (fclose(out) != 0 || renameat(folder, other, folder, NAME) != 0) {
+    if (fclose(out) != 0 || renameat(folder, other, folder, NAME) != 0)
         (void)unlinkat(folder, other, 0);
-    }
 }
 
 static void load(History *list) {
@@ -71,17 +64,15 @@ static void load(History *list) {
     size_t room = 0, lines = 0;
     int fd = folder < 0 ? -1 : host_folder_file(folder, NAME, O_RDONLY);
     FILE *file = fd < 0 ? NULL : fdopen(fd, "r");
-    if (file == NULL) {
+    if (file == NULL)
         return;
-    }
     for (ssize_t n; (n = getline(&line, &room, file)) > 0; lines++) {
         line[n - 1] = line[n - 1] == '\n' ? '\0' : line[n - 1];
         (void)history(list, &event, H_ENTER, line);
     }
     free(line);
-    if (lines > 2 * HOST_HISTORY_LINES) {
+    if (lines > 2 * HOST_HISTORY_LINES)
         shorten(file, lines);
-    }
     (void)fclose(file);
 }
 
@@ -90,9 +81,8 @@ static void load(History *list) {
 static History *host_history_open(void) {
     HistEvent event;
     History *list = history_init();
-    if (list == NULL) {
+    if (list == NULL)
         return NULL;
-    }
     (void)history(list, &event, H_SETSIZE, HOST_HISTORY_LINES);
     (void)history(list, &event, H_SETUNIQUE, 1);
     find_folder();
@@ -105,9 +95,8 @@ static void host_history_add(History *list, const char *line) {
     HistEvent event;
     bool same =
         history(list, &event, H_FIRST) == 0 && strcmp(event.str, line) == 0;
-    if (same || line[strspn(line, " \t")] == '\0') {
+    if (same || line[strspn(line, " \t")] == '\0')
         return;
-    }
     (void)history(list, &event, H_ENTER, line);
     int fd = folder < 0 ? -1
                         : host_folder_file(folder, NAME,
@@ -155,9 +144,8 @@ static struct {
 
 static void restore_terminal(void) {
     static const char gone[] = "\033[?1049l";
-    if (t.pictured) {
+    if (t.pictured)
         (void)!write(STDOUT_FILENO, gone, sizeof gone - 1);
-    }
     (void)tcsetattr(STDIN_FILENO, TCSADRAIN, &t.before);
 }
 
@@ -166,9 +154,8 @@ static void take_signal(int number) {
         t.resized = 1;
         return;
     }
-    if (number != SIGINT) {
+    if (number != SIGINT)
         t.ending = number;
-    }
     if (++t.interrupts >= FORCE) {
         restore_terminal();
         (void)signal(number, SIG_DFL);
@@ -181,9 +168,8 @@ enum { SIGNALS = sizeof signals / sizeof signals[0] };
 
 static void take_signals(struct sigaction before[SIGNALS]) {
     struct sigaction action = {.sa_handler = take_signal};
-    for (unsigned i = 0; i < SIGNALS; i++) {
+    for (unsigned i = 0; i < SIGNALS; i++)
         (void)sigaction(signals[i], &action, &before[i]);
-    }
 }
 
 /* --- what is shown -------------------------------------------------------- */
@@ -209,18 +195,16 @@ static void show_line(void *context, const char *text) {
 /* Above the line that is being edited, if there is one. */
 static void show_note(void *context, const char *text) {
     (void)context;
-    if (t.pictured) {
+    if (t.pictured)
         return; /* the next picture would cover it */
-    }
     (void)printf("%s* %s\n",
                  !t.editing ? ""
                  : t.dumb   ? "\n"
                             : "\r\033[K",
                  text);
     (void)fflush(stdout);
-    if (t.editing) {
+    if (t.editing)
         (void)el_set(t.line, EL_REFRESH);
-    }
 }
 
 static void show_host_note(const char *text) {
@@ -271,11 +255,9 @@ static bool key_waits(int wait_ms) {
 static bool interrupted(void *context) {
     char key;
     (void)context;
-    while (t.pictured && key_waits(0) && read(STDIN_FILENO, &key, 1) == 1) {
-        if (key == 'q' || key == 'Q') {
+    while (t.pictured && key_waits(0) && read(STDIN_FILENO, &key, 1) == 1)
+        if (key == 'q' || key == 'Q')
             return true;
-        }
-    }
     return t.interrupts > 0;
 }
 
@@ -292,9 +274,8 @@ const struct host_shell_sink *host_terminal_sink(void) {
 /* A letter from the next byte; false: it takes more of them. */
 static bool letter_of(char byte, wchar_t *letter) {
     size_t n = mbrtowc(letter, &byte, 1, &t.letters);
-    if (n == (size_t)-2) {
+    if (n == (size_t)-2)
         return false;
-    }
     if (n == (size_t)-1) {
         memset(&t.letters, 0, sizeof t.letters);
         *letter = L'?';
@@ -331,20 +312,15 @@ static int next_letter(EditLine *line, wchar_t *letter) {
             (void)el_set(line, EL_REFRESH);
         }
         bool tended = t.shell->open || t.shell->running;
-        if (tended &&
-            (host_now_us() - t.tended_us > TEND_US || !key_waits(0))) {
+        if (tended && (host_now_us() - t.tended_us > TEND_US || !key_waits(0)))
             tend();
-        }
-        if (!key_waits(tended ? 0 : IDLE_MS)) {
+        if (!key_waits(tended ? 0 : IDLE_MS))
             continue;
-        }
         ssize_t n = read(STDIN_FILENO, &byte, 1);
-        if (n == 1 && letter_of(byte, letter)) {
+        if (n == 1 && letter_of(byte, letter))
             return 1;
-        }
-        if (n == 0 || (n < 0 && errno != EINTR && errno != EAGAIN)) {
+        if (n == 0 || (n < 0 && errno != EINTR && errno != EAGAIN))
             return 0;
-        }
     }
 }
 
@@ -359,9 +335,8 @@ static void list_choices(char **words, unsigned count, size_t from) {
     (void)printf("\n");
     for (unsigned i = 0; i < count; i++) {
         (void)printf("%-*s", (int)widest + 2, words[i]);
-        if (++shown % across == 0 || i + 1 == count) {
+        if (++shown % across == 0 || i + 1 == count)
             (void)printf("\n");
-        }
     }
     (void)fflush(stdout);
 }
@@ -370,9 +345,8 @@ static size_t common(char **words, unsigned count) {
     size_t length = strlen(words[0]);
     for (unsigned i = 1; i < count; i++) {
         size_t same = 0;
-        while (same < length && words[i][same] == words[0][same]) {
+        while (same < length && words[i][same] == words[0][same])
             same++;
-        }
         length = same;
     }
     return length;
@@ -385,9 +359,8 @@ static unsigned char complete(EditLine *line, int key) {
     size_t from = 0, typed = (size_t)(info->cursor - info->buffer);
     unsigned char result = CC_ERROR;
     (void)key;
-    if (typed >= sizeof text) {
+    if (typed >= sizeof text)
         return CC_ERROR;
-    }
     memcpy(text, info->buffer, typed);
     text[typed] = '\0';
     unsigned count = host_shell_complete(t.shell, text, &from, words, CHOICES);
@@ -403,9 +376,8 @@ static unsigned char complete(EditLine *line, int key) {
             result = CC_REDISPLAY;
         }
     }
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         free(words[i]);
-    }
     return result;
 }
 
@@ -427,9 +399,8 @@ static bool begin(struct host_shell *shell) {
     (void)tcgetattr(STDIN_FILENO, &t.before);
     t.line = el_init("incode", stdin, stdout, stderr);
     t.history = host_history_open();
-    if (t.line == NULL || t.history == NULL) {
+    if (t.line == NULL || t.history == NULL)
         return false;
-    }
     (void)el_set(t.line, EL_SIGNAL, 0);
     (void)el_set(t.line, EL_EDITOR, "emacs");
     (void)el_set(t.line, EL_PROMPT, prompt);
@@ -448,9 +419,8 @@ static bool begin(struct host_shell *shell) {
 static bool abandon_line(void) {
     bool again = t.warned && !t.typed;
     (void)printf("^C\n");
-    if (!t.typed && !again) {
+    if (!t.typed && !again)
         (void)printf("Ctrl-C again, or Ctrl-D, leaves\n");
-    }
     t.warned = !t.typed;
     t.interrupts = 0;
     return !again;
@@ -462,13 +432,11 @@ static void do_lines(void) {
         t.editing = true;
         const char *line = el_gets(t.line, &count);
         t.editing = false;
-        if (t.ending) {
+        if (t.ending)
             break;
-        }
         if (line == NULL && t.interrupts > 0) {
-            if (!abandon_line()) {
+            if (!abandon_line())
                 break;
-            }
             continue;
         }
         if (line == NULL) {
@@ -499,12 +467,10 @@ static void leave(void) {
 }
 
 static void end(void) {
-    if (t.line != NULL) {
+    if (t.line != NULL)
         el_end(t.line);
-    }
-    if (t.history != NULL) {
+    if (t.history != NULL)
         host_history_close(t.history);
-    }
     restore_terminal();
 }
 
@@ -523,18 +489,16 @@ int host_terminal_run(struct host_shell *shell, int *ending,
     if (status == HOST_USAGE || status == HOST_INPUT) {
         *error = first;
     } else {
-        if (status != 0) {
+        if (status != 0)
             show_failed(NULL, first.text);
-        }
         t.interrupts = 0;
         do_lines();
         leave();
         status = 0;
     }
     host_note_to(NULL);
-    for (unsigned i = 0; i < SIGNALS; i++) {
+    for (unsigned i = 0; i < SIGNALS; i++)
         (void)sigaction(signals[i], &before[i], NULL);
-    }
     end();
     *ending = t.ending;
     return status;

@@ -19,9 +19,8 @@ static volatile sig_atomic_t pipe_end = -1;
 
 static void take(int signal) {
     int reason = errno;
-    for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
+    for (int i = 0; i < HOST_GUARD_SIGNALS; i++)
         came[i] = came[i] || signals[i] == signal;
-    }
     if (signal != SIGTSTP) {
         /* A pipe that is full wakes as well. */
         (void)!write((int)pipe_end, "", 1);
@@ -33,9 +32,8 @@ static void take(int signal) {
 static int host_guard_begin(struct host_guard *guard) {
     struct sigaction action = {.sa_handler = take, .sa_flags = SA_RESTART};
     memset(guard, 0, sizeof *guard);
-    if (pipe2(guard->ends, O_CLOEXEC | O_NONBLOCK) != 0) {
+    if (pipe2(guard->ends, O_CLOEXEC | O_NONBLOCK) != 0)
         return -1;
-    }
     sigfillset(&action.sa_mask);
     pipe_end = guard->ends[1];
     for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
@@ -52,19 +50,16 @@ static bool host_guard_wait(struct host_guard *guard, unsigned ms) {
     struct pollfd look = {.fd = guard->ends[0], .events = POLLIN};
     uint64_t end_us = host_now_us() + (uint64_t)ms * 1000, now_us;
     int got = 0;
-    while (got <= 0 && (now_us = host_now_us()) < end_us) {
+    while (got <= 0 && (now_us = host_now_us()) < end_us)
         got = poll(&look, 1, (int)((end_us - now_us + 999) / 1000));
-    }
     return got <= 0;
 }
 
 /* Signals that came meanwhile are raised before it returns. */
 static void host_guard_end(struct host_guard *guard) {
-    for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
-        if (guard->taken[i]) {
+    for (int i = 0; i < HOST_GUARD_SIGNALS; i++)
+        if (guard->taken[i])
             (void)sigaction(signals[i], &guard->before[i], NULL);
-        }
-    }
     /* A handler may still be at work in another thread: what it writes to is
      * the last to go. */
     for (int i = 0; i < HOST_GUARD_SIGNALS; i++) {
@@ -137,33 +132,28 @@ int host_lines_open(struct host_lines *lines, const struct host_cube_file *file,
     memset(lines, 0, sizeof *lines);
     lines->file = file;
     lines->gpio = calloc(file->pins + 1, sizeof(void *));
-    if (lines->gpio == NULL) {
+    if (lines->gpio == NULL)
         return host_fail_memory(error, "the reset lines");
-    }
     for (unsigned i = 0; i < file->pins && error->code == 0; i++) {
         int wire = file->pin[i].wire;
-        if (wire < 0) {
+        if (wire < 0)
             (void)open_gpio(lines, i, error);
-        } else if (remote != NULL) {
+        else if (remote != NULL)
             lines->port[wire] = &remote->port[wire].serial;
-        } else if (lines->port[wire] == NULL) {
+        else if (lines->port[wire] == NULL)
             (void)open_port(lines, (unsigned)wire, error);
-        }
     }
-    if (error->code != 0) {
+    if (error->code != 0)
         host_lines_close(lines);
-    }
     return error->code;
 }
 
 void host_lines_close(struct host_lines *lines) {
-    for (unsigned i = 0; lines->gpio != NULL && i < lines->file->pins; i++) {
+    for (unsigned i = 0; lines->gpio != NULL && i < lines->file->pins; i++)
         host_gpio_close(lines->gpio[i]);
-    }
     for (int k = 0; k < HOST_PORTS_MAX; k++) {
-        if (lines->port[k] == &lines->own[k]) {
+        if (lines->port[k] == &lines->own[k])
             serial_port_close(lines->port[k]);
-        }
         lines->port[k] = NULL;
     }
     free(lines->gpio);

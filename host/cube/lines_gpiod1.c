@@ -44,13 +44,11 @@ static int refuse_chip(char why[HOST_GPIO_WHY], const char *name, int reason) {
                                    used == 0 ? "" : ", ", gpiod_chip_name(chip),
                                    gpiod_chip_label(chip));
     }
-    if (chips != NULL) {
+    if (chips != NULL)
         gpiod_chip_iter_free(chips);
-    }
     snprintf(what, sizeof what, "chip %.*s", HOST_PIN_NAME_MAX, name);
-    if (used == 0 && (reason == EACCES || reason == EPERM)) {
+    if (used == 0 && (reason == EACCES || reason == EPERM))
         return refuse_errno(why, what, reason);
-    }
     snprintf(why, HOST_GPIO_WHY, "%s: no such GPIO chip here; %s%s", what,
              used == 0 ? "this machine has none that can be opened"
                        : "give one of ",
@@ -67,9 +65,8 @@ static int find_line(struct host_gpio *gpio, const struct host_cube_pin *pin,
     gpio->line = pin->name[0] != '\0'
                      ? gpiod_chip_find_line(gpio->chip, pin->name)
                      : gpiod_chip_get_line(gpio->chip, pin->offset);
-    if (gpio->line != NULL) {
+    if (gpio->line != NULL)
         return 0;
-    }
     snprintf(next, sizeof next,
              "give one of 0 to %u, or a name that gpioinfo shows", count - 1);
     if (pin->name[0] != '\0') {
@@ -105,9 +102,8 @@ int host_gpio_open(struct host_gpio **gpio, const struct host_cube_pin *pin,
                    char why[HOST_GPIO_WHY]) {
     struct host_gpio *opened = calloc(1, sizeof *opened);
     *gpio = opened;
-    if (opened == NULL) {
+    if (opened == NULL)
         return refuse(why, HOST_CUBE, "no memory", "end other programs");
-    }
     opened->chip = gpiod_chip_open_lookup(pin->chip);
     int status = opened->chip == NULL ? refuse_chip(why, pin->chip, errno)
                                       : find_line(opened, pin, why);
@@ -124,8 +120,7 @@ int host_gpio_set(struct host_gpio *gpio, bool active) {
 }
 
 void host_gpio_close(struct host_gpio *gpio) {
-    if (gpio != NULL && gpio->chip != NULL) {
+    if (gpio != NULL && gpio->chip != NULL)
         gpiod_chip_close(gpio->chip);
-    }
     free(gpio);
 }

@@ -43,9 +43,8 @@ static void take_frame(struct listener *l, const uint8_t *bytes, size_t size) {
     struct host_greeting *g = l->greeting;
     struct frame_header header;
     uint8_t hello[LINK_HELLO_SIZE];
-    if (!frame_decode(bytes, size, &header, hello, sizeof hello)) {
+    if (!frame_decode(bytes, size, &header, hello, sizeof hello))
         return;
-    }
     g->learns = g->learns || (header.kind == LINK_ACK && header.session == 0);
     if (header.kind == LINK_HELLO && header.size == sizeof hello &&
         hello[7] != 0) {
@@ -75,9 +74,8 @@ static void hear(struct listener *l, const struct link_pipe *pipe) {
     }
     l->heard -= begin;
     memmove(l->in, l->in + begin, l->heard);
-    if (l->heard == sizeof l->in) {
+    if (l->heard == sizeof l->in)
         l->heard = 0; /* no frame is so long */
-    }
 }
 
 /* Asks by machine->pipe until somebody greets, wait_us at most; first_hello:
@@ -102,9 +100,8 @@ static void host_greeting_wait(struct host_greeting *greeting,
             l.sent = taken < 0 ? 0 : l.sent + (size_t)taken;
         }
         hear(&l, &machine->pipe);
-        if (!greeting->found) {
+        if (!greeting->found)
             machine->idle(machine->context, ASK_US / 4);
-        }
         now_us = machine->now_us(machine->context);
     }
 }
@@ -259,9 +256,8 @@ void host_site_text(const struct host_site_options *options, char *text,
         fits = !words[i].given ||
                put_word(text, size, words[i].name, words[i].value);
     }
-    if (!fits) {
+    if (!fits)
         snprintf(text, size, "--cube FILE");
-    }
 }
 
 /* --- a wire instead of a file --------------------------------------------- */
@@ -272,9 +268,8 @@ static int read_key(struct host_cube_file *file, const char *path,
     int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
     struct key_file_text fault = key_file_text(state);
     file->has_key = state == KEY_FILE_GOOD || state == KEY_FILE_SEEN;
-    if (fault.what == NULL) {
+    if (fault.what == NULL)
         return 0;
-    }
     if (!file->has_key) {
         return host_fail(error, HOST_INPUT, "key %s: %s%s%s; %s", path,
                          fault.what, reason == 0 ? "" : ": ",
@@ -308,9 +303,8 @@ static int make_file(struct host_site *site, const struct host_site_options *o,
     struct host_cube_file *file = &site->file;
     struct host_cube_wire *wire = calloc(1, sizeof *wire);
     memset(file, 0, sizeof *file);
-    if (wire == NULL) {
+    if (wire == NULL)
         return host_fail_memory(error, "the wire");
-    }
     const char *name = o->port != NULL  ? "--port"
                        : o->tcp != NULL ? "--tcp"
                                         : "--unix";
@@ -340,9 +334,8 @@ static int make_file(struct host_site *site, const struct host_site_options *o,
         snprintf(wire->device[1], sizeof wire->device[1], "%s", o->port);
         return 0;
     }
-    if (take_address(wire, o, error) != 0) {
+    if (take_address(wire, o, error) != 0)
         return error->code;
-    }
     wire->at = wire->via;
     return o->key == NULL ? 0 : read_key(file, o->key, error);
 }
@@ -357,11 +350,10 @@ int host_site_read(const struct host_site_options *options,
     static struct host_cube_file file;
     memset(&file, 0, sizeof file);
     host_note_to(pass_over);
-    if (options->cube != NULL) {
+    if (options->cube != NULL)
         (void)host_cube_file_read(&file, options->cube, error);
-    } else if (options->key != NULL) {
+    else if (options->key != NULL)
         (void)read_key(&file, options->key, error);
-    }
     host_note_to(NULL);
     host_cube_file_free(&file);
     return error->code;
@@ -370,9 +362,8 @@ int host_site_read(const struct host_site_options *options,
 static void set_nodes(struct host_cube_file *file, unsigned dimension) {
     file->dimension = dimension;
     file->nodes = 1u << dimension;
-    for (unsigned i = 0; i < file->nodes; i++) {
+    for (unsigned i = 0; i < file->nodes; i++)
         file->board_of[i] = file->board;
-    }
 }
 
 /* Nobody has greeted: why, as far as it is known. */
@@ -413,9 +404,8 @@ static int take_greeting(struct host_site *site,
                          "node 0's host port",
                          site->path, g->node, g->port);
     }
-    if (!g->found && o->nodes == 0) {
+    if (!g->found && o->nodes == 0)
         return fail_silent(site, g, error);
-    }
     if (g->found && g->dimension > CUBE_DIMENSION_MAX) {
         return host_fail(error, HOST_CUBE,
                          "%s: node 0 speaks of a cube of dimension %u; is its "
@@ -432,9 +422,8 @@ static int take_greeting(struct host_site *site,
               g->found ? g->dimension : (unsigned)__builtin_ctz(o->nodes));
     bool serial =
         g->found ? g->frame_payload != CUBE_PAYLOAD_MAX + 8 : g->learns;
-    if (serial && file->serial_baud == 0) {
+    if (serial && file->serial_baud == 0)
         file->serial_baud = BAUD;
-    }
     return 0;
 }
 
@@ -442,9 +431,8 @@ static int open_wire(struct host_site *site, const struct host_site_options *o,
                      struct host_error *error) {
     struct host_greeting greeting;
     if (make_file(site, o, error) != 0 ||
-        host_remote_start(&site->remote, &site->file, "", error) != 0) {
+        host_remote_start(&site->remote, &site->file, "", error) != 0)
         return error->code;
-    }
     struct host_machine machine = host_remote_machine(&site->remote);
     host_greeting_wait(&greeting, &machine, o->port == NULL, GREETING_US);
     if (take_greeting(site, o, &greeting, error) != 0) {
@@ -458,15 +446,13 @@ static int open_wire(struct host_site *site, const struct host_site_options *o,
 
 static int open_file(struct host_site *site, const struct host_site_options *o,
                      struct host_error *error) {
-    if (host_cube_file_read(&site->file, o->cube, error) != 0) {
+    if (host_cube_file_read(&site->file, o->cube, error) != 0)
         return error->code;
-    }
     if (host_remote_program(&site->file, NULL, site->program,
                             sizeof site->program, error) != 0 ||
         host_remote_start(&site->remote, &site->file, site->program, error) !=
-            0) {
+            0)
         return error->code;
-    }
     site->machine = host_remote_machine(&site->remote);
     return 0;
 }
@@ -482,9 +468,8 @@ int host_site_open(struct host_site *site,
                                        : open_wire(site, options, error);
     }
     site->machine.where = site->where;
-    if (status != 0) {
+    if (status != 0)
         host_cube_file_free(&site->file);
-    }
     return status;
 }
 

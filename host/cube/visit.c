@@ -64,9 +64,8 @@ int host_visit_open(struct host_visit *visit, struct host_machine *machine,
         host_visit_close(v);
         return host_fail_memory(error, "the nodes' answers");
     }
-    for (unsigned i = 0; i < nodes; i++) {
+    for (unsigned i = 0; i < nodes; i++)
         v->node[i].answer = v->answers + (size_t)i * HOST_VISIT_ANSWER_BYTES;
-    }
     v->cube = host_cube_make(machine, 0, &v->cube_memory, error);
     if (v->cube == NULL) {
         host_visit_close(v);
@@ -95,18 +94,16 @@ static void begin_start(struct host_visit *v, unsigned i, uint32_t start) {
 /* What is known of a link, both ends know. */
 static void note_links(struct host_visit *v, unsigned i, uint32_t seen) {
     node_of(v, i)->links |= seen;
-    for (unsigned d = 0; d < v->machine->dimension; d++) {
+    for (unsigned d = 0; d < v->machine->dimension; d++)
         node_of(v, i ^ 1u << d)->links |= seen & (uint32_t)1 << d;
-    }
 }
 
 static void take_pong(struct host_visit *v,
                       const struct cube_message *message) {
     struct node_pong_message pong;
     struct host_visit_node *node = node_of(v, message->source);
-    if (message->size != sizeof pong) {
+    if (message->size != sizeof pong)
         return;
-    }
     memcpy(&pong, message->data, sizeof pong);
     /* A board that is told its epoch by neighbours has the same again where
      * they began anew as well; but not its counts. */
@@ -114,12 +111,10 @@ static void take_pong(struct host_visit *v,
         node->received = 0;
         begin_start(v, message->source, pong.start);
     }
-    if (node->pong_us == 0 || pong.silent != node->silent) {
+    if (node->pong_us == 0 || pong.silent != node->silent)
         node->silent_us = v->now_us;
-    }
-    if (node->pinged) {
+    if (node->pinged)
         note_rtt(v, v->now_us - node->ping_us);
-    }
     node->pong_us = v->now_us;
     node->seen = pong.links;
     node->silent = pong.silent;
@@ -134,15 +129,13 @@ static void take_who(struct host_visit *v, unsigned i, const uint8_t *data,
     struct host_visit_node *node = node_of(v, i);
     struct node_who who;
     memset(&who, 0, sizeof who);
-    if (size < sizeof who.protocol) {
+    if (size < sizeof who.protocol)
         return;
-    }
     memcpy(&who.protocol, data, sizeof who.protocol);
     if (who.protocol == NODE_PROTOCOL && size == sizeof who) {
         memcpy(&who, data, sizeof who);
-        if (who.epoch != node->start) {
+        if (who.epoch != node->start)
             begin_start(v, i, who.epoch);
-        }
     }
     uint64_t age_us = UINT64_C(1000000) * who.uptime_s;
     node->born_us = age_us < v->now_us ? v->now_us - age_us : 0;
@@ -155,23 +148,19 @@ static void take_answer(struct host_visit *v,
                         const struct cube_message *message) {
     struct host_visit_node *node = node_of(v, message->source);
     struct node_answer_head head;
-    if (message->size < sizeof head) {
+    if (message->size < sizeof head)
         return;
-    }
     memcpy(&head, message->data, sizeof head);
     const uint8_t *data = message->data + sizeof head;
     size_t size = message->size - sizeof head;
-    if (head.what == NODE_WHO) {
+    if (head.what == NODE_WHO)
         take_who(v, message->source, data, size);
-    }
     if (v->machine->onlookers != NULL &&
-        host_onlooking_take(&v->onlooking, v->machine, message)) {
+        host_onlooking_take(&v->onlooking, v->machine, message))
         return;
-    }
     if (head.tag != v->tag || head.what != v->what ||
-        !host_node_set_has(&v->wanted, message->source)) {
+        !host_node_set_has(&v->wanted, message->source))
         return;
-    }
     memcpy(node->answer, data, size);
     node->size = size;
     node->answered = true;
@@ -182,19 +171,17 @@ static void take_answer(struct host_visit *v,
 
 static void take_message(struct host_visit *v,
                          const struct cube_message *message) {
-    if (message->source >= v->machine->nodes) {
+    if (message->source >= v->machine->nodes)
         return;
-    }
     struct host_visit_node *node = node_of(v, message->source);
     node->heard_us = v->now_us;
     node->heard = true;
-    if (message->type == NODE_PONG) {
+    if (message->type == NODE_PONG)
         take_pong(v, message);
-    } else if (message->type == NODE_ANSWER) {
+    else if (message->type == NODE_ANSWER)
         take_answer(v, message);
-    } else if (v->take != NULL) {
+    else if (v->take != NULL)
         v->take(v->context, message);
-    }
     node->received++;
 }
 
@@ -294,9 +281,8 @@ static void ping_in_turn(struct host_visit *v) {
         v->ping_turn = (v->ping_turn + 1) % v->machine->nodes;
         v->ping_us += every;
     }
-    if (most == 0) {
+    if (most == 0)
         v->ping_us = v->now_us;
-    }
 }
 
 /* --- rounds --------------------------------------------------------------- */
@@ -326,14 +312,12 @@ static int check_use(struct host_visit *v, struct host_error *error) {
 }
 
 static int check(struct host_visit *v, struct host_error *error) {
-    if (v->now_us - v->check_us < CHECK_EVERY_US) {
+    if (v->now_us - v->check_us < CHECK_EVERY_US)
         return 0;
-    }
     v->check_us = v->now_us;
     if (v->machine->check(v->machine->context, error) != 0 ||
-        check_outdone(v, error) != 0) {
+        check_outdone(v, error) != 0)
         return error->code;
-    }
     uint64_t heard_us = 2 * ping_round_us(v);
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         struct host_visit_node *node = node_of(v, i);
@@ -348,11 +332,9 @@ static int check(struct host_visit *v, struct host_error *error) {
 static void look_out(struct host_visit *v) {
     static const struct host_onlookers_progress none;
     host_onlooking_look(&v->onlooking, v->machine, v->now_us, &none);
-    for (unsigned i = 0; v->onlooking.asked && i < v->machine->nodes; i++) {
-        if (!v->node[i].there) {
+    for (unsigned i = 0; v->onlooking.asked && i < v->machine->nodes; i++)
+        if (!v->node[i].there)
             host_onlooking_leave_out(&v->onlooking, i);
-        }
-    }
 }
 
 int host_visit_round(struct host_visit *visit, uint64_t wait_us,
@@ -362,9 +344,8 @@ int host_visit_round(struct host_visit *visit, uint64_t wait_us,
     struct cube_message message;
     v->now_us = m->now_us(m->context);
     unsigned moved = (unsigned)cube_poll(v->cube, v->now_us);
-    if (cube_wiring(v->cube)->generation != v->generation) {
+    if (cube_wiring(v->cube)->generation != v->generation)
         host_visit_wiring_begin(v); /* nodes knew a later one */
-    }
     while (cube_read(v->cube, &message)) {
         take_message(v, &message);
         cube_release(v->cube);
@@ -372,9 +353,8 @@ int host_visit_round(struct host_visit *visit, uint64_t wait_us,
     }
     look_out(v);
     moved += serve_all(v);
-    if (check_use(v, error) != 0 || check(v, error) != 0) {
+    if (check_use(v, error) != 0 || check(v, error) != 0)
         return error->code;
-    }
     if (moved == 0 && wait_us > 0) {
         uint64_t due = cube_next_due_us(v->cube, v->now_us);
         due = due < CHECK_EVERY_US ? due : CHECK_EVERY_US;
@@ -395,15 +375,13 @@ int host_visit_restart(struct host_visit *visit,
     struct node_restart_message restart = {(uint32_t)what};
     uint64_t begun_us = v->now_us;
     unsigned i = 0;
-    while (i < v->machine->nodes && v->now_us - begun_us < RESTART_US) {
+    while (i < v->machine->nodes && v->now_us - begun_us < RESTART_US)
         if (!host_node_set_has(set, i) ||
             host_visit_send(v, (uint16_t)i, NODE_RESTART, &restart,
-                            sizeof restart)) {
+                            sizeof restart))
             i++;
-        } else if (host_visit_round(v, CHECK_EVERY_US, error) != 0) {
+        else if (host_visit_round(v, CHECK_EVERY_US, error) != 0)
             return error->code;
-        }
-    }
     return host_visit_round(v, 0, error); /* it is on its way */
 }
 
@@ -412,20 +390,17 @@ int host_visit_restart(struct host_visit *visit,
 /* The host's wires at whose end somebody is. */
 static uint32_t links_up(const struct host_visit *v) {
     uint32_t up = 0;
-    for (unsigned d = 0; d < cube_links(v->cube); d++) {
+    for (unsigned d = 0; d < cube_links(v->cube); d++)
         up |= (uint32_t)(cube_link_state(v->cube, d) == LINK_UP) << d;
-    }
     return up;
 }
 
 /* Whether one of those has not heard the farewell. */
 static bool parting(const struct host_visit *v, uint32_t links) {
-    for (unsigned d = 0; d < cube_links(v->cube); d++) {
+    for (unsigned d = 0; d < cube_links(v->cube); d++)
         if ((links >> d & 1) != 0 &&
-            cube_link_state(v->cube, d) == LINK_CLOSING) {
+            cube_link_state(v->cube, d) == LINK_CLOSING)
             return true;
-        }
-    }
     return false;
 }
 
@@ -453,9 +428,8 @@ static void part(struct host_visit *v) {
 
 void host_visit_close(struct host_visit *visit) {
     struct host_visit *v = visit;
-    if (v->cube != NULL) {
+    if (v->cube != NULL)
         part(v);
-    }
     free(v->cube_memory);
     free(v->node);
     free(v->answers);
@@ -479,21 +453,17 @@ static int until(struct host_visit *v, uint64_t wait_us,
                  const struct host_node_set *set, struct host_error *error) {
     uint64_t begun_us = v->machine->now_us(v->machine->context);
     v->now_us = begun_us;
-    while (!done(v, set) && v->now_us - begun_us < wait_us) {
-        if (host_visit_round(v, wait_us - (v->now_us - begun_us), error) != 0) {
+    while (!done(v, set) && v->now_us - begun_us < wait_us)
+        if (host_visit_round(v, wait_us - (v->now_us - begun_us), error) != 0)
             return error->code;
-        }
-    }
     return 0;
 }
 
 static bool all_there(const struct host_visit *v,
                       const struct host_node_set *set) {
-    for (unsigned i = 0; i < v->machine->nodes; i++) {
-        if (host_node_set_has(set, i) && !v->node[i].there) {
+    for (unsigned i = 0; i < v->machine->nodes; i++)
+        if (host_node_set_has(set, i) && !v->node[i].there)
             return false;
-        }
-    }
     return true;
 }
 
@@ -513,16 +483,13 @@ static bool all_settled(const struct host_visit *v,
                         const struct host_node_set *set) {
     bool late = v->now_us - v->began_us >= SETTLED_US;
     enum link_state wire = cube_link_state(v->cube, host_visit_wire(v));
-    if (wire != LINK_UP && !v->in_use &&
-        v->now_us - v->opened_us >= NOBODY_US) {
+    if (wire != LINK_UP && !v->in_use && v->now_us - v->opened_us >= NOBODY_US)
         return true;
-    }
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         bool known = v->node[i].there && v->node[i].pong_us != 0;
         if (host_node_set_has(set, i) && !known &&
-            (!late || cube_reaches(v->cube, (uint16_t)i))) {
+            (!late || cube_reaches(v->cube, (uint16_t)i)))
             return false;
-        }
     }
     return true;
 }
@@ -537,9 +504,8 @@ static bool wires_settled(const struct host_visit *v,
     (void)set;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         const struct host_visit_node *node = &v->node[i];
-        if (node->there && node->heard && node->pong_us == 0) {
+        if (node->there && node->heard && node->pong_us == 0)
             return false; /* it has not said */
-        }
     }
     return host_visit_faults_are_old(v, WIRES_US) ||
            host_visit_faults(v, NULL, NULL) == 0;
@@ -552,12 +518,10 @@ int host_visit_settle_wires(struct host_visit *visit, uint64_t wait_us,
 
 static bool all_answered(const struct host_visit *v,
                          const struct host_node_set *set) {
-    for (unsigned i = 0; i < v->machine->nodes; i++) {
+    for (unsigned i = 0; i < v->machine->nodes; i++)
         if (host_node_set_has(set, i) && !v->node[i].answered &&
-            cube_reaches(v->cube, (uint16_t)i)) {
+            cube_reaches(v->cube, (uint16_t)i))
             return false;
-        }
-    }
     return true;
 }
 
@@ -578,8 +542,7 @@ int host_visit_ask(struct host_visit *visit, const struct host_node_set *set,
     }
     int status = until(v, wait_us, all_answered, set, error);
     memset(&v->wanted, 0, sizeof v->wanted);
-    for (unsigned i = 0; i < v->machine->nodes; i++) {
+    for (unsigned i = 0; i < v->machine->nodes; i++)
         v->node[i].question_due = false;
-    }
     return status;
 }

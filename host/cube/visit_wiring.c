@@ -11,11 +11,9 @@
 /* A neighbour that has met somebody with another key where the node should be;
  * -1: none has. */
 static int refused_by(const struct host_visit *v, unsigned node) {
-    for (unsigned d = 0; d < v->machine->dimension; d++) {
-        if ((v->node[node ^ 1u << d].refused >> d & 1) != 0) {
+    for (unsigned d = 0; d < v->machine->dimension; d++)
+        if ((v->node[node ^ 1u << d].refused >> d & 1) != 0)
             return (int)(node ^ 1u << d);
-        }
-    }
     return -1;
 }
 
@@ -27,9 +25,8 @@ static const struct cube_wrong *wrong_at(const struct host_visit *v,
         bool to = w->node < v->machine->nodes &&
                   w->link < v->machine->dimension &&
                   (w->node ^ 1u << w->link) == node;
-        if (w->node == node || w->peer_node == node || to) {
+        if (w->node == node || w->peer_node == node || to)
             return w;
-        }
     }
     return NULL;
 }
@@ -53,9 +50,8 @@ static void describe_wrong(const struct host_visit *v,
 static unsigned first_missing(const struct host_visit *v, unsigned node) {
     unsigned at = cube_wiring(v->cube)->gateway, away = at ^ node;
     for (unsigned d = 0; away >> d != 0; d++) {
-        if (!v->node[at].there) {
+        if (!v->node[at].there)
             return at;
-        }
         at ^= away & 1u << d;
     }
     return node;
@@ -140,14 +136,12 @@ static bool describe_wire(const struct host_visit *v, unsigned node,
                           unsigned link, char *text, size_t size) {
     unsigned other = node ^ 1u << link;
     const struct host_visit_node *one = &v->node[node], *two = &v->node[other];
-    if (!is_down(v, node, link) && !is_down(v, other, link)) {
+    if (!is_down(v, node, link) && !is_down(v, other, link))
         return false;
-    }
     for (unsigned i = 0; i < v->wrong_count; i++) {
         const struct cube_wrong *w = &v->wrong[i];
-        if ((w->node == node || w->node == other) && w->link == link) {
+        if ((w->node == node || w->node == other) && w->link == link)
             return false;
-        }
     }
     bool key = ((one->refused | two->refused) >> link & 1) != 0;
     bool was = ((one->seen | two->seen) >> link & 1) != 0;
@@ -173,17 +167,15 @@ static bool is_old(const struct host_visit *v, unsigned node, uint64_t age_us) {
 bool host_visit_faults_are_old(const struct host_visit *visit,
                                uint64_t age_us) {
     const struct host_visit *v = visit;
-    if (v->now_us - v->opened_us < age_us) {
+    if (v->now_us - v->opened_us < age_us)
         return false; /* wrong wires are told of by others */
-    }
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         for (unsigned d = 0; d < v->machine->dimension; d++) {
             unsigned other = i ^ 1u << d;
             if (v->node[i].there && v->node[other].there &&
                 (is_down(v, i, d) || is_down(v, other, d)) &&
-                !(is_old(v, i, age_us) && is_old(v, other, age_us))) {
+                !(is_old(v, i, age_us) && is_old(v, other, age_us)))
                 return false;
-            }
         }
     }
     return true;
@@ -204,13 +196,11 @@ unsigned host_visit_faults(const struct host_visit *visit,
         for (unsigned d = 0; d < v->machine->dimension; d++) {
             unsigned other = i ^ 1u << d;
             if (i > other || !v->node[i].there || !v->node[other].there ||
-                !describe_wire(v, i, d, text, sizeof text)) {
+                !describe_wire(v, i, d, text, sizeof text))
                 continue;
-            }
             count++;
-            if (tell != NULL) {
+            if (tell != NULL)
                 tell(context, i, d, text);
-            }
         }
     }
     return count;
@@ -267,44 +257,36 @@ static void add(struct host_visit *v, uint32_t *dead, unsigned node,
 /* What nodes have found since this generation began. */
 static void add_found(struct host_visit *v, uint32_t *dead) {
     const struct cube_wiring *w = cube_wiring(v->cube);
-    for (unsigned i = w->settled; i < w->dead_count; i++) {
-        if (w->dead[i].dimension != CUBE_WHOLE_NODE) {
+    for (unsigned i = w->settled; i < w->dead_count; i++)
+        if (w->dead[i].dimension != CUBE_WHOLE_NODE)
             add(v, dead, w->dead[i].node, w->dead[i].dimension);
-        }
-    }
-    for (unsigned i = 0; i < v->wrong_count; i++) {
+    for (unsigned i = 0; i < v->wrong_count; i++)
         add(v, dead, v->wrong[i].node, v->wrong[i].link);
-    }
 }
 
 /* What nodes call silent for long enough. */
 static void add_silent(struct host_visit *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         const struct host_visit_node *node = &v->node[i];
-        for (unsigned d = 0; d < v->machine->dimension; d++) {
+        for (unsigned d = 0; d < v->machine->dimension; d++)
             if ((node->silent & bit_of(d)) != 0 &&
-                v->now_us - node->silent_us >= SILENT_US) {
+                v->now_us - node->silent_us >= SILENT_US)
                 add(v, dead, i, d);
-            }
-        }
     }
 }
 
 /* What an end of a link says of it: 1 alive, -1 not, 0 nothing yet. */
 static int says(const struct host_visit *v, unsigned node, unsigned link) {
     const struct host_visit_node *n = &v->node[node];
-    if (n->pong_us == 0 || n->pong_us - v->began_us < ALIVE_US) {
+    if (n->pong_us == 0 || n->pong_us - v->began_us < ALIVE_US)
         return 0;
-    }
     return (n->seen & ~n->silent & bit_of(link)) != 0 ? 1 : -1;
 }
 
 static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link) {
-    for (unsigned i = 0; i < v->wrong_count; i++) {
-        if (v->wrong[i].node == node && v->wrong[i].link == link) {
+    for (unsigned i = 0; i < v->wrong_count; i++)
+        if (v->wrong[i].node == node && v->wrong[i].link == link)
             return true;
-        }
-    }
     return false;
 }
 
@@ -322,11 +304,9 @@ static bool stays_dead(const struct host_visit *v, unsigned node,
 static void find_dead(struct host_visit *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         dead[i] = 0;
-        for (unsigned d = 0; d < v->machine->dimension; d++) {
-            if ((v->dead[i] & bit_of(d)) != 0 && stays_dead(v, i, d)) {
+        for (unsigned d = 0; d < v->machine->dimension; d++)
+            if ((v->dead[i] & bit_of(d)) != 0 && stays_dead(v, i, d))
                 dead[i] |= bit_of(d);
-            }
-        }
     }
     add_found(v, dead);
     add_silent(v, dead);
@@ -351,14 +331,11 @@ static bool is_whole(const struct host_visit *v, const uint32_t *dead,
 
 /* All links of such nodes: what is said of one brings it back. */
 static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole) {
-    for (unsigned i = 0; i < v->machine->nodes; i++) {
+    for (unsigned i = 0; i < v->machine->nodes; i++)
         whole[i] = is_whole(v, dead, i);
-    }
-    for (unsigned i = 0; i < v->machine->nodes; i++) {
-        for (unsigned d = 0; whole[i] && d < v->machine->dimension; d++) {
+    for (unsigned i = 0; i < v->machine->nodes; i++)
+        for (unsigned d = 0; whole[i] && d < v->machine->dimension; d++)
             add(v, dead, i, d);
-        }
-    }
 }
 
 static void settle(struct host_visit *v, uint32_t *dead,
@@ -378,9 +355,8 @@ static void settle(struct host_visit *v, uint32_t *dead,
             struct cube_dead link = {(uint16_t)i, (uint8_t)d};
             unsigned other = i ^ 1u << d;
             if (i < other && (dead[i] & bit_of(d)) != 0 && !whole[i] &&
-                !whole[other]) {
+                !whole[other])
                 (void)wiring_add_dead(next, link, dimension);
-            }
         }
     }
 }
@@ -444,7 +420,6 @@ void host_visit_wiring_look(struct host_visit *visit) {
         return;
     }
     if (again || (v->now_us - v->evidence_us >= NEWS_US &&
-                  v->now_us - v->renewed_us >= v->pause_us)) {
+                  v->now_us - v->renewed_us >= v->pause_us))
         begin(v, dead, gateway);
-    }
 }

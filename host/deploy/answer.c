@@ -19,15 +19,14 @@ static void put_word(FILE *out, const char *word) {
     (void)fputs(" \"", out);
     for (const char *at = word; *at != '\0'; at++) {
         unsigned char byte = (unsigned char)*at;
-        if (byte == '"' || byte == '\\') {
+        if (byte == '"' || byte == '\\')
             (void)fprintf(out, "\\%c", byte);
-        } else if (byte == '%' || byte == '$') {
+        else if (byte == '%' || byte == '$')
             (void)fprintf(out, "%c%c", byte, byte);
-        } else if (byte < ' ' || byte == 0x7f) {
+        else if (byte < ' ' || byte == 0x7f)
             (void)fprintf(out, "\\x%02x", byte);
-        } else {
+        else
             (void)fputc(byte, out);
-        }
     }
     (void)fputc('"', out);
 }
@@ -81,9 +80,8 @@ static void put_service(FILE *out, const struct host_unit *unit) {
     }
     (void)fputs("StartLimitIntervalSec=0\n\n[Service]\nExecStart=", out);
     put_command(out, unit, put_word);
-    if (system) {
+    if (system)
         (void)fprintf(out, "User=%s\n", unit->user);
-    }
     (void)fprintf(out,
                   "Restart=always\nRestartSec=1\n"
                   "LimitDATA=%llu\nLimitSTACK=%d\nLimitCORE=0\n"
@@ -99,14 +97,12 @@ char *host_unit_text(const struct host_unit *unit) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
-    if (out == NULL) {
+    if (out == NULL)
         return NULL;
-    }
-    if (strcmp(unit->manager, "none") == 0) {
+    if (strcmp(unit->manager, "none") == 0)
         put_start(out, unit);
-    } else {
+    else
         put_service(out, unit);
-    }
     if (fclose(out) != 0) {
         free(text);
         return NULL;
@@ -154,9 +150,8 @@ static void say_running(struct host_deploy_board *board) {
 
 static void print_key(const struct host_cube_file *file,
                       char digits[KEY_DIGITS + 2]) {
-    for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
+    for (unsigned i = 0; i < SECURE_KEY_BYTES; i++)
         snprintf(digits + 2 * i, 3, "%02x", file->key[i]);
-    }
     strcpy(digits + KEY_DIGITS, "\n");
 }
 
@@ -182,13 +177,11 @@ static int compare(struct host_deploy_board *board,
     char key[KEY_DIGITS + 2];
     board->program = host_programs_take(
         job->programs, fact(board, HOST_FACT_MACHINE), &board->error);
-    if (board->program == NULL) {
+    if (board->program == NULL)
         return board->error.code;
-    }
     board->unit = host_unit_text(&unit);
-    if (board->unit == NULL) {
+    if (board->unit == NULL)
         return host_fail_memory(&board->error, "a unit's text");
-    }
     lacks->program =
         strcmp(board->program->digest, fact(board, HOST_FACT_PROGRAM)) != 0;
     lacks->unit =
@@ -203,9 +196,8 @@ static int compare(struct host_deploy_board *board,
 
 static unsigned count_lines(const char *text) {
     unsigned count = 0;
-    for (; *text != '\0'; text++) {
+    for (; *text != '\0'; text++)
         count += *text == '\n';
-    }
     return count;
 }
 
@@ -215,19 +207,16 @@ static int write_reply(struct host_deploy_board *board,
                        const struct lacks *lacks) {
     char key[KEY_DIGITS + 2] = "keep\n";
     FILE *out = open_memstream(&board->reply, &board->reply_bytes);
-    if (out == NULL) {
+    if (out == NULL)
         return host_fail_memory(&board->error, "a board's answer");
-    }
-    if (lacks->key) {
+    if (lacks->key)
         print_key(job->file, key);
-    }
     (void)fputs(key, out);
     secure_wipe(key, sizeof key);
-    if (lacks->unit) {
+    if (lacks->unit)
         (void)fprintf(out, "%u\n%s", count_lines(board->unit), board->unit);
-    } else {
+    else
         (void)fputs("keep\n", out);
-    }
     (void)fprintf(out, "%s\n",
                   lacks->program ? board->program->digest : "keep");
     return fclose(out) == 0
@@ -249,9 +238,8 @@ static void say_lacks(struct host_deploy_board *board,
         say(board, "%skey", between);
         between = ", ";
     }
-    if (lacks->unit) {
+    if (lacks->unit)
         say(board, "%s%s", between, none ? "what starts it" : "unit");
-    }
 }
 
 static void answer_status(struct host_deploy_board *board) {
@@ -298,9 +286,8 @@ int host_answer(struct host_deploy_board *board,
         answer_status(board);
         return 0;
     }
-    if (job->order == HOST_DEPLOY && compare(board, job, &lacks) != 0) {
+    if (job->order == HOST_DEPLOY && compare(board, job, &lacks) != 0)
         return board->error.code;
-    }
     if (job->dry_run) {
         answer_dry(board, job, &lacks);
         return 0;
@@ -318,9 +305,8 @@ int host_answer(struct host_deploy_board *board,
         say_lacks(board, &lacks);
     }
     say(board, "; ");
-    if (!lacks.program) {
+    if (!lacks.program)
         board->program = NULL;
-    }
     if (!lack && running) {
         free(board->unit);
         board->unit = NULL;

@@ -37,9 +37,8 @@ static _Noreturn void become_ssh(const struct host_deploy_job *job,
     argv[n++] = command;
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() == host) {
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++)
             dup2(files[i], i);
-        }
         (void)signal(SIGPIPE, SIG_DFL);
         execvp("ssh", (char *const *)argv);
         (void)fprintf(stderr, "ssh: %s\n", strerror(errno));
@@ -54,18 +53,16 @@ static const char *order_of(const struct host_deploy_job *job) {
 }
 
 static void close_one(int *file) {
-    if (*file >= 0) {
+    if (*file >= 0)
         close(*file);
-    }
     *file = -1;
 }
 
 /* Three pipes; false: errno says why, and none is open. */
 static bool open_pipes(int near[3], int far[3]) {
     bool good = true;
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         near[i] = far[i] = -1;
-    }
     for (int i = 0; i < 3 && good; i++) {
         int ends[2];
         good = pipe2(ends, O_CLOEXEC) == 0;
@@ -107,13 +104,11 @@ int host_board_begin(struct host_deploy_board *board,
     pid_t host = getpid();
     board->heard_us = host_now_us();
     board->pid = fork();
-    if (board->pid == 0) {
+    if (board->pid == 0)
         become_ssh(job, board->to, command, far, host);
-    }
     free(command);
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         close_one(&far[i]);
-    }
     board->in = near[0];
     board->out = near[1];
     board->err = near[2];
@@ -131,9 +126,8 @@ void host_board_free(struct host_deploy_board *board) {
     close_one(&board->in);
     close_one(&board->out);
     close_one(&board->err);
-    if (board->reply != NULL) {
+    if (board->reply != NULL)
         secure_wipe(board->reply, board->reply_bytes);
-    }
     free(board->reply);
     free(board->unit);
     board->reply = board->unit = NULL;
@@ -153,26 +147,23 @@ static void take_fact(struct host_deploy_board *board, const char *text) {
     for (int i = 0; i < HOST_FACTS; i++) {
         const char *name = host_fact_name((enum host_fact)i);
         const char *value = text;
-        if (begins(&value, name) && *value == ' ') {
+        if (begins(&value, name) && *value == ' ')
             snprintf(board->fact[i], HOST_BOARD_TEXT, "%s", value + 1);
-        }
     }
 }
 
 /* A board that leaves a fact out has another script's answers. */
 static bool has_all(const struct host_deploy_board *board) {
     bool all = true;
-    for (int i = 0; i < HOST_FACTS; i++) {
+    for (int i = 0; i < HOST_FACTS; i++)
         all = all && board->fact[i][0] != '\0';
-    }
     return all;
 }
 
 static void take_line(struct host_deploy_board *board,
                       const struct host_deploy_job *job, const char *text) {
-    if (!begins(&text, HOST_SCRIPT_MARK) || board->error.code != 0) {
+    if (!begins(&text, HOST_SCRIPT_MARK) || board->error.code != 0)
         return;
-    }
     if (begins(&text, "fact ")) {
         take_fact(board, text);
     } else if (begins(&text, "step ")) {
@@ -186,9 +177,8 @@ static void take_line(struct host_deploy_board *board,
     } else if (strcmp(text, "ready") == 0 && !board->ready && has_all(board)) {
         board->ready = true;
         (void)host_answer(board, job);
-        if (board->reply == NULL) {
+        if (board->reply == NULL)
             close_one(&board->in);
-        }
     }
 }
 
@@ -199,9 +189,8 @@ static bool put_byte(char line[HOST_BOARD_TEXT], size_t *bytes, char byte) {
         *bytes = 0;
         return true;
     }
-    if (byte != '\r' && *bytes < HOST_BOARD_TEXT - 1) {
+    if (byte != '\r' && *bytes < HOST_BOARD_TEXT - 1)
         line[(*bytes)++] = byte;
-    }
     return false;
 }
 
@@ -210,14 +199,12 @@ static void receive(struct host_deploy_board *board,
     char bytes[4096];
     ssize_t got = read(*file, bytes, sizeof bytes);
     board->heard_us = host_now_us();
-    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
+    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR))
         close_one(file);
-    }
     for (ssize_t i = 0; i < got; i++) {
         if (file == &board->out) {
-            if (put_byte(board->line, &board->line_bytes, bytes[i])) {
+            if (put_byte(board->line, &board->line_bytes, bytes[i]))
                 take_line(board, job, board->line);
-            }
         } else {
             (void)put_byte(board->said, &board->said_bytes, bytes[i]);
         }
@@ -246,10 +233,8 @@ static void send_some(struct host_deploy_board *board) {
                  100 * board->program_sent / board->program->size);
     }
     if (board->reply_sent == board->reply_bytes &&
-        (board->program == NULL ||
-         board->program_sent == board->program->size)) {
+        (board->program == NULL || board->program_sent == board->program->size))
         close_one(&board->in);
-    }
 }
 
 /* --- its end -------------------------------------------------------------- */
@@ -270,11 +255,9 @@ static const char *next_step(const char *said) {
         {"No route", "see that it is on, and on the network; then try: ssh"},
         {"No such file or directory",
          "install the package openssh-client, then try: ssh"}};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (strstr(said, known[i].words) != NULL) {
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strstr(said, known[i].words) != NULL)
             return known[i].next;
-        }
-    }
     return "try: ssh";
 }
 
@@ -285,9 +268,8 @@ static void end(struct host_deploy_board *board) {
         got = waitpid(board->pid, &status, 0);
     } while (got < 0 && errno == EINTR);
     board->ended = true;
-    if (board->said_bytes > 0) {
+    if (board->said_bytes > 0)
         (void)put_byte(board->said, &board->said_bytes, '\n');
-    }
     bool good = WIFEXITED(status) && WEXITSTATUS(status) == 0 && board->ready;
     if (board->error.code == 0 && !good) {
         host_fail(&board->error, HOST_CUBE, "%s; %s %s",
@@ -309,15 +291,12 @@ static void end(struct host_deploy_board *board) {
 unsigned host_board_files(const struct host_deploy_board *board,
                           struct pollfd files[HOST_BOARD_FILES]) {
     unsigned n = 0;
-    if (board->in >= 0 && board->reply != NULL) {
+    if (board->in >= 0 && board->reply != NULL)
         files[n++] = (struct pollfd){.fd = board->in, .events = POLLOUT};
-    }
-    if (board->out >= 0) {
+    if (board->out >= 0)
         files[n++] = (struct pollfd){.fd = board->out, .events = POLLIN};
-    }
-    if (board->err >= 0) {
+    if (board->err >= 0)
         files[n++] = (struct pollfd){.fd = board->err, .events = POLLIN};
-    }
     return n;
 }
 
@@ -325,16 +304,14 @@ void host_board_step(struct host_deploy_board *board,
                      const struct host_deploy_job *job,
                      const struct pollfd *files, unsigned count) {
     for (unsigned i = 0; i < count; i++) {
-        if (files[i].revents == 0 || files[i].fd < 0) {
+        if (files[i].revents == 0 || files[i].fd < 0)
             continue;
-        }
-        if (files[i].fd == board->in) {
+        if (files[i].fd == board->in)
             send_some(board);
-        } else if (files[i].fd == board->out) {
+        else if (files[i].fd == board->out)
             receive(board, job, &board->out);
-        } else if (files[i].fd == board->err) {
+        else if (files[i].fd == board->err)
             receive(board, job, &board->err);
-        }
     }
     if (!board->ended &&
         host_now_us() - board->heard_us > HOST_BOARD_SILENT_US) {
@@ -345,9 +322,8 @@ void host_board_step(struct host_deploy_board *board,
         close_one(&board->out);
         close_one(&board->err);
     }
-    if (!board->ended && board->out < 0 && board->err < 0) {
+    if (!board->ended && board->out < 0 && board->err < 0)
         end(board);
-    }
 }
 
 /* --- lines ---------------------------------------------------------------- */
@@ -359,11 +335,10 @@ void host_deploy_lines_begin(struct host_deploy_lines *lines, unsigned boards,
     host_progress_begin(!quiet);
     lines->quiet = quiet;
     lines->live = boards <= host_progress_rows_max();
-    if (lines->live) {
+    if (lines->live)
         host_progress_rows(boards);
-    } else {
+    else
         host_progress_end();
-    }
 }
 
 static void print_name(const struct host_deploy_board *board,
@@ -410,12 +385,10 @@ void host_deploy_lines_end(const struct host_deploy_lines *lines,
     for (unsigned i = 0; i < count; i++) {
         const struct host_deploy_board *board = &boards[i];
         print_name(board, name);
-        if (board->error.code == 0 && !lines->quiet) {
+        if (board->error.code == 0 && !lines->quiet)
             host_say(stdout, "%s %s\n", name, board->result);
-        }
-        if (board->error.code == 0 && board->unit != NULL && !lines->quiet) {
+        if (board->error.code == 0 && board->unit != NULL && !lines->quiet)
             print_text(board->unit);
-        }
     }
     (void)fflush(stdout);
     for (unsigned i = 0; i < count; i++) {

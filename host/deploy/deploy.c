@@ -37,18 +37,16 @@ void host_digest_bytes(const void *bytes, size_t size,
     sha256_init(&sha);
     sha256_update(&sha, size, bytes);
     sha256_digest(&sha, sizeof sum, sum);
-    for (size_t i = 0; i < sizeof sum; i++) {
+    for (size_t i = 0; i < sizeof sum; i++)
         snprintf(digits + 2 * i, 3, "%02x", sum[i]);
-    }
 }
 
 int host_programs_open(struct host_programs *programs, const char *folder,
                        struct host_error *error) {
     char here[PATH_MAX - 32];
     memset(programs, 0, sizeof *programs);
-    for (int i = 0; i < HOST_PROGRAMS_MAX; i++) {
+    for (int i = 0; i < HOST_PROGRAMS_MAX; i++)
         programs->program[i].processor = processors[i];
-    }
     if (folder != NULL) {
         snprintf(programs->folder, sizeof programs->folder, "%s", folder);
         return 0;
@@ -67,9 +65,8 @@ int host_programs_open(struct host_programs *programs, const char *folder,
     if (access(programs->folder, X_OK) != 0) {
         char installed[PATH_MAX];
         snprintf(installed, sizeof installed, "%s/../lib/incode", here);
-        if (access(installed, X_OK) == 0) {
+        if (access(installed, X_OK) == 0)
             strcpy(programs->folder, installed);
-        }
     }
     return 0;
 }
@@ -92,9 +89,8 @@ static int read_program(struct host_program *program, FILE *file,
     }
     program->size = (size_t)about.st_size;
     program->bytes = malloc(program->size);
-    if (program->bytes == NULL) {
+    if (program->bytes == NULL)
         return host_fail_memory(error, "a node program");
-    }
     if (fread(program->bytes, 1, program->size, file) != program->size) {
         free(program->bytes);
         program->bytes = NULL;
@@ -140,9 +136,8 @@ const struct host_program *host_programs_take(struct host_programs *programs,
                   machine);
         return NULL;
     }
-    if (program->bytes != NULL) {
+    if (program->bytes != NULL)
         return program;
-    }
     snprintf(path, sizeof path, "%s/incode-node-%s", programs->folder,
              program->processor);
     FILE *file = fopen(path, "rbe");
@@ -267,9 +262,8 @@ static int check_ssh(struct host_error *error) {
     for (const char *at = path == NULL ? usual : path; at != NULL;) {
         int length = (int)strcspn(at, ":");
         snprintf(name, sizeof name, "%.*s/ssh", length, at);
-        if (access(name, X_OK) == 0) {
+        if (access(name, X_OK) == 0)
             return 0;
-        }
         at = at[length] == ':' ? at + length + 1 : NULL;
     }
     return host_fail(error, HOST_BROKEN,
@@ -283,9 +277,8 @@ static int choose(const struct deploy *d, const struct host_cube_file *file,
     memset(chosen, 0, sizeof *chosen);
     host_node_set_all(&wanted, file->nodes);
     if (d->nodes != NULL &&
-        host_node_set_parse(&wanted, d->nodes, file->nodes, d->error) != 0) {
+        host_node_set_parse(&wanted, d->nodes, file->nodes, d->error) != 0)
         return d->error->code;
-    }
     for (unsigned i = 0; i < file->nodes; i++) {
         bool there = host_cube_ssh(file, i) != NULL;
         if (host_node_set_has(&wanted, i) && there) {
@@ -317,9 +310,8 @@ struct boards {
 /* Begins as many as there is room for; how many are at work. */
 static unsigned begin_more(struct boards *boards, struct deploy *d) {
     unsigned at_work = 0;
-    for (unsigned i = 0; i < boards->begun; i++) {
+    for (unsigned i = 0; i < boards->begun; i++)
         at_work += !boards->board[i].ended;
-    }
     while (boards->begun < boards->count && at_work < DEPLOY_AT_ONCE) {
         struct host_deploy_board *board = &boards->board[boards->begun++];
         at_work += host_board_begin(board, &d->job, board->node) == 0;
@@ -332,18 +324,15 @@ static void run(struct boards *boards, struct deploy *d,
     struct pollfd files[DEPLOY_AT_ONCE * HOST_BOARD_FILES];
     while (begin_more(boards, d) > 0) {
         unsigned count = 0, at = 0;
-        for (unsigned i = 0; i < boards->begun; i++) {
+        for (unsigned i = 0; i < boards->begun; i++)
             count += host_board_files(&boards->board[i], files + count);
-        }
-        if (poll(files, count, 1000) < 0 && errno != EINTR) {
+        if (poll(files, count, 1000) < 0 && errno != EINTR)
             continue;
-        }
         for (unsigned i = 0; i < boards->begun; i++) {
             struct pollfd mine[HOST_BOARD_FILES];
             unsigned n = host_board_files(&boards->board[i], mine);
-            if (!boards->board[i].ended) {
+            if (!boards->board[i].ended)
                 host_board_step(&boards->board[i], &d->job, files + at, n);
-            }
             at += n;
         }
         host_deploy_lines_show(lines, boards->board, boards->count);
@@ -356,11 +345,10 @@ static int conclude(const struct boards *boards, const struct deploy *d) {
     char text[120], name[128];
     for (unsigned i = 0; i < boards->count; i++) {
         const struct host_deploy_board *board = &boards->board[i];
-        if (board->error.code != 0) {
+        if (board->error.code != 0)
             host_node_set_add(&failed, board->node);
-        } else if (d->job.order == HOST_STATUS && !board->running) {
+        else if (d->job.order == HOST_STATUS && !board->running)
             host_node_set_add(&stopped, board->node);
-        }
     }
     if (host_node_set_count(&failed) > 0) {
         host_node_set_print(&failed, text, sizeof text);
@@ -388,9 +376,8 @@ static int deploy(struct deploy *d, const struct host_node_set *chosen) {
     struct host_deploy_lines lines;
     struct boards boards = {.count = host_node_set_count(chosen)};
     boards.board = calloc(boards.count, sizeof *boards.board);
-    if (boards.board == NULL) {
+    if (boards.board == NULL)
         return host_fail_memory(d->error, "the boards");
-    }
     for (unsigned i = 0, at = 0; i < d->job.file->nodes; i++) {
         if (host_node_set_has(chosen, i)) {
             boards.board[at].to = host_cube_ssh(d->job.file, i)->to;
@@ -404,9 +391,8 @@ static int deploy(struct deploy *d, const struct host_node_set *chosen) {
     run(&boards, d, &lines);
     host_deploy_lines_end(&lines, boards.board, boards.count);
     int status = conclude(&boards, d);
-    for (unsigned i = 0; i < boards.count; i++) {
+    for (unsigned i = 0; i < boards.count; i++)
         host_board_free(&boards.board[i]);
-    }
     free(boards.board);
     return status;
 }
@@ -433,19 +419,15 @@ int host_deploy(int argc, char **argv, struct host_error *error) {
     struct deploy d = {.error = error};
     struct host_node_set chosen;
     if (host_options_parse(&argp, argc, argv, 0, &d, error) != 0 ||
-        check_ssh(error) != 0 ||
-        host_cube_file_read(&file, d.cube, error) != 0) {
+        check_ssh(error) != 0 || host_cube_file_read(&file, d.cube, error) != 0)
         return error->code;
-    }
     d.job.file = &file;
     d.job.programs = &programs;
     int status = choose(&d, &file, &chosen);
-    if (status == 0) {
+    if (status == 0)
         status = host_programs_open(&programs, d.programs, error);
-    }
-    if (status == 0) {
+    if (status == 0)
         status = deploy(&d, &chosen);
-    }
     host_programs_free(&programs);
     host_cube_file_free(&file);
     return status;

@@ -28,9 +28,8 @@ char *host_script_command(const char *order, unsigned node,
     char *command = malloc(size), number[16];
     const char *const words[] = {host_deploy_script, "incode-deploy", order,
                                  number, folder};
-    if (command == NULL) {
+    if (command == NULL)
         return NULL;
-    }
     snprintf(number, sizeof number, "%u", node);
     used = (size_t)snprintf(command, size, "exec sh -c");
     for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {

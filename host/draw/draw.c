@@ -52,9 +52,8 @@ static int draw(const struct host_draw_options *options,
         plane.at = host_plane_middle(points, plane.axis);
     }
     plane.at = options->has_at ? options->at : plane.at;
-    if (host_section_make(&section, points, tets, plane, error) != 0) {
+    if (host_section_make(&section, points, tets, plane, error) != 0)
         return error->code;
-    }
     struct host_picture picture = host_picture_of(&section, options->width);
     if (host_output_open(&out, options->output, error) == 0) {
         host_picture_format(options->output)->write(&out, &picture, error);

@@ -18,12 +18,10 @@ enum { FORMATS = sizeof formats / sizeof formats[0] };
 
 const struct host_picture_format *host_picture_format(const char *path) {
     const char *dot = strrchr(path, '.');
-    for (unsigned i = 0; i < FORMATS; i++) {
+    for (unsigned i = 0; i < FORMATS; i++)
         if (strcmp(path, "-") == 0 ||
-            (dot != NULL && strcasecmp(dot, formats[i].extension) == 0)) {
+            (dot != NULL && strcasecmp(dot, formats[i].extension) == 0))
             return &formats[i];
-        }
-    }
     return NULL;
 }
 
@@ -91,9 +89,8 @@ enum { LINES = 4 };
 static void add_part(struct host_raster *raster, unsigned x, unsigned y,
                      double part, const float channels[HOST_CHANNELS]) {
     float *pixel = raster->pixels[(size_t)y * raster->width + x];
-    for (unsigned k = 0; k < HOST_CHANNELS; k++) {
+    for (unsigned k = 0; k < HOST_CHANNELS; k++)
         pixel[k] += (float)(part / LINES) * channels[k];
-    }
 }
 
 /* From x0 to x1 of one line in row y. */
@@ -101,9 +98,8 @@ static void add_line(struct host_raster *raster, unsigned y, double x0,
                      double x1, const float channels[HOST_CHANNELS]) {
     x0 = fmax(x0, 0.0);
     x1 = fmin(x1, raster->width);
-    for (unsigned x = (unsigned)fmax(x0, 0.0); x < x1; x++) {
+    for (unsigned x = (unsigned)fmax(x0, 0.0); x < x1; x++)
         add_part(raster, x, y, fmin(x1, x + 1.0) - fmax(x0, x), channels);
-    }
 }
 
 void host_raster_add(struct host_raster *raster, double corner[][2],
@@ -124,9 +120,8 @@ void host_raster_add(struct host_raster *raster, double corner[][2],
                 x1 = fmax(x1, x);
             }
         }
-        if (x0 < x1 && line < (long)raster->height * LINES) {
+        if (x0 < x1 && line < (long)raster->height * LINES)
             add_line(raster, (unsigned)(line / LINES), x0, x1, channels);
-        }
     }
 }
 
@@ -135,9 +130,8 @@ void host_raster_add(struct host_raster *raster, double corner[][2],
  * Memory: 23 bytes a pixel, and the file. */
 
 static void channels_of(uint32_t rgb, float channels[HOST_CHANNELS]) {
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         channels[k] = (float)(rgb >> (16 - 8 * k) & 255);
-    }
     channels[3] = 1.0f;
     channels[4] = 0.0f;
 }
@@ -166,9 +160,8 @@ static void draw_cells(struct host_raster *raster,
         double corner[4][2];
         unsigned colour = host_picture_colour(picture, cell);
         channels_of(host_picture_rgb(colour), channels);
-        for (unsigned k = 0; k < cell->corners; k++) {
+        for (unsigned k = 0; k < cell->corners; k++)
             host_picture_place(picture, cell->corner[k], corner[k]);
-        }
         host_raster_add(raster, corner, cell->corners, channels);
         for (unsigned k = 0; picture->line > 0.0 && k < cell->corners; k++) {
             draw_edge(raster, corner[k], corner[(k + 1) % cell->corners],
@@ -205,12 +198,11 @@ static int write_png(struct host_output *out, unsigned width, unsigned height,
                        .format = PNG_FORMAT_RGB};
     png_alloc_size_t room = PNG_IMAGE_PNG_SIZE_MAX(image), size = room;
     void *file = host_map(room);
-    if (file == NULL || png_image_write_to_memory(&image, file, &size, 0, bytes,
-                                                  0, NULL) == 0) {
+    if (file == NULL ||
+        png_image_write_to_memory(&image, file, &size, 0, bytes, 0, NULL) == 0)
         host_fail_memory(error, "the picture");
-    } else {
+    else
         host_output_bytes(out, file, size);
-    }
     host_unmap(file, room);
     return error->code;
 }
@@ -332,19 +324,16 @@ static void put_pixels(struct svg *s, unsigned colour) {
     bool any = false;
     for (size_t i = 0; i < (size_t)width * height; i++) {
         const struct pixel *p = &s->pixels[i];
-        if (p->cells == 0 || p->colours / p->cells != colour) {
+        if (p->cells == 0 || p->colours / p->cells != colour)
             continue;
-        }
-        if (!any) {
+        if (!any)
             begin_path(s, colour);
-        }
         any = true;
         move(s, QUARTERS * (long)(i % width), QUARTERS * (long)(i / width));
         host_output_text(s->out, "h4v4h-4z");
     }
-    if (any) {
+    if (any)
         end_path(s);
-    }
 }
 
 static void put_cells(struct svg *s, unsigned colour) {
@@ -352,17 +341,14 @@ static void put_cells(struct svg *s, unsigned colour) {
     bool any = false;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
-        if (host_picture_colour(s->picture, cell) != colour) {
+        if (host_picture_colour(s->picture, cell) != colour)
             continue;
-        }
         long at[4][2] = {{0}};
         unsigned n = quarters(s->picture, cell, at);
-        if (pixel_of(s, at, n) != NULL) {
+        if (pixel_of(s, at, n) != NULL)
             continue;
-        }
-        if (!any) {
+        if (!any)
             begin_path(s, colour);
-        }
         any = true;
         move(s, at[0][0], at[0][1]);
         for (unsigned k = 1; k < n; k++) {
@@ -374,9 +360,8 @@ static void put_cells(struct svg *s, unsigned colour) {
         }
         host_output_text(s->out, "z");
     }
-    if (any) {
+    if (any)
         end_path(s);
-    }
 }
 
 int host_picture_svg(struct host_output *out, struct host_picture *picture,
@@ -385,9 +370,8 @@ int host_picture_svg(struct host_output *out, struct host_picture *picture,
     size_t pixels = (size_t)picture->width * picture->height;
     char text[256];
     s.pixels = host_map(pixels * sizeof *s.pixels);
-    if (s.pixels == NULL) {
+    if (s.pixels == NULL)
         return host_fail_memory(error, "the picture");
-    }
     merge(&s);
     snprintf(text, sizeof text,
              "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%u\" "
@@ -395,18 +379,16 @@ int host_picture_svg(struct host_output *out, struct host_picture *picture,
              picture->width, picture->height, QUARTERS * picture->width,
              QUARTERS * picture->height);
     host_output_text(out, text);
-    for (unsigned colour = 0; colour < HOST_COLOURS; colour++) {
+    for (unsigned colour = 0; colour < HOST_COLOURS; colour++)
         put_pixels(&s, colour);
-    }
     snprintf(text, sizeof text,
              "<g stroke=\"#%06x\" stroke-width=\"%.2g\" "
              "stroke-linejoin=\"round\"%s>\n",
              HOST_PICTURE_EDGES, QUARTERS * picture->line,
              picture->line > 0.0 ? "" : " shape-rendering=\"crispEdges\"");
     host_output_text(out, text);
-    for (unsigned colour = 0; colour < HOST_COLOURS; colour++) {
+    for (unsigned colour = 0; colour < HOST_COLOURS; colour++)
         put_cells(&s, colour);
-    }
     host_output_text(out, "</g>\n</svg>\n");
     host_unmap(s.pixels, pixels * sizeof *s.pixels);
     return 0;

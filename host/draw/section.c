@@ -115,9 +115,8 @@ static uint64_t measure(struct cut *c, const struct host_tetrahedra *tets,
     uint64_t count = 0;
     for (uint64_t i = 0; i < tets->count; i++) {
         unsigned above = split(c, tets->v[i], vertex);
-        if (above == 0 || above == 4) {
+        if (above == 0 || above == 4)
             continue;
-        }
         unsigned n = corners(c, vertex, above, at);
         for (unsigned k = 0; k < n; k++) {
             for (unsigned d = 0; d < 2; d++) {
@@ -145,18 +144,15 @@ static void take(const struct cut *c, const struct host_tetrahedra *tets,
     double sum = 0.0;
     for (uint64_t i = 0; i < tets->count; i++) {
         unsigned above = split(c, tets->v[i], vertex);
-        if (above == 0 || above == 4) {
+        if (above == 0 || above == 4)
             continue;
-        }
         struct host_cell *cell = &section->cells[section->count++];
         cell->corners = corners(c, vertex, above, at);
         cell->size = (float)size_of(vertex);
         sum += (double)cell->size;
-        for (unsigned k = 0; k < cell->corners; k++) {
-            for (unsigned d = 0; d < 2; d++) {
+        for (unsigned k = 0; k < cell->corners; k++)
+            for (unsigned d = 0; d < 2; d++)
                 cell->corner[k][d] = (float)((at[k][d] - c->lo[d]) / c->scale);
-            }
-        }
     }
     section->size_mean = sum / (double)section->count;
 }
@@ -180,13 +176,11 @@ int host_section_make(struct host_section *section,
     c.side[0] = plane.axis == 0 ? 1 : 0;
     c.side[1] = plane.axis == 2 ? 1 : 2;
     uint64_t count = measure(&c, tets, section);
-    if (section->proportion[0] <= 0.0 || section->proportion[1] <= 0.0) {
+    if (section->proportion[0] <= 0.0 || section->proportion[1] <= 0.0)
         return beside(points, plane, error);
-    }
     section->cells = host_map(count * sizeof *section->cells);
-    if (section->cells == NULL) {
+    if (section->cells == NULL)
         return host_fail_memory(error, "the section");
-    }
     take(&c, tets, section);
     return 0;
 }

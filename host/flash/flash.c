@@ -31,18 +31,15 @@ static void host_flash_cut_begin(void) {
     const struct sigaction action = {.sa_handler = keep,
                                      .sa_flags = (int)SA_RESETHAND};
     came = 0;
-    for (int i = 0; i < SIGNALS; i++) {
+    for (int i = 0; i < SIGNALS; i++)
         if (sigaction(signals[i], NULL, &before[i]) == 0 &&
-            before[i].sa_handler != SIG_IGN) { /* as nohup has it */
+            before[i].sa_handler != SIG_IGN) /* as nohup has it */
             (void)sigaction(signals[i], &action, NULL);
-        }
-    }
 }
 
 static void host_flash_cut_end(void) {
-    for (int i = 0; i < SIGNALS; i++) {
+    for (int i = 0; i < SIGNALS; i++)
         (void)sigaction(signals[i], &before[i], NULL);
-    }
 }
 
 /* The signal that came; 0: none has. */
@@ -78,9 +75,8 @@ static void tell_states(FILE *out, const struct host_spread *spread) {
     for (unsigned i = 0; i < nodes; i++) {
         struct host_node_set set = {{0}};
         char name[LIST];
-        if (!spread_wanted(spread, i) || host_node_set_has(&told, i)) {
+        if (!spread_wanted(spread, i) || host_node_set_has(&told, i))
             continue;
-        }
         for (unsigned k = i; k < nodes; k++) {
             if (spread_wanted(spread, k) &&
                 state_of(spread, k) == state_of(spread, i)) {
@@ -130,11 +126,9 @@ static const struct host_spread_node *node_of(const struct host_flash_show *s,
 void host_flash_show_begin(struct host_flash_show *show,
                            const struct host_spread *spread, bool quiet) {
     *show = (struct host_flash_show){.spread = spread, .quiet = quiet};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (host_node_set_has(&spread->options.nodes, i)) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if (host_node_set_has(&spread->options.nodes, i))
             show->node[show->wanted++] = (uint16_t)i;
-        }
-    }
     host_progress_begin(!quiet);
     unsigned most = host_progress_rows_max();
     if (most > 0) {
@@ -167,9 +161,8 @@ static void draw_row(const struct host_flash_show *s, unsigned row) {
 }
 
 void host_flash_show_draw(const struct host_flash_show *show) {
-    for (unsigned row = 0; row < show->rows; row++) {
+    for (unsigned row = 0; row < show->rows; row++)
         draw_row(show, row);
-    }
     host_progress_draw();
 }
 
@@ -179,9 +172,8 @@ void host_flash_show_change(const struct host_flash_show *show, unsigned node) {
                   n->phase == HOST_SPREAD_WHOLE ||
                   (n->phase == HOST_SPREAD_TAKES && n->held != 0) ||
                   n->phase >= HOST_SPREAD_HAS;
-    if (show->rows == 0 && !show->quiet && !silent) {
+    if (show->rows == 0 && !show->quiet && !silent)
         host_note("flash: node %u: %s", node, host_spread_phase_text(n->phase));
-    }
 }
 
 /* --- at the end ----------------------------------------------------------- */
@@ -197,9 +189,8 @@ static struct host_node_set alike(const struct host_flash_show *s,
                                       *b = node_of(s, first);
         if (a->phase == b->phase && strcmp(a->text, b->text) == 0 &&
             memcmp(seen[i].who.version, seen[first].who.version,
-                   sizeof seen[i].who.version) == 0) {
+                   sizeof seen[i].who.version) == 0)
             host_node_set_add(&set, i);
-        }
     }
     return set;
 }
@@ -220,13 +211,11 @@ static void say_each(const struct host_flash_show *s,
     for (unsigned k = 0; k < s->wanted; k++) {
         char nodes[FLASH_SHOW_LIST + 8], line[FLASH_SHOW_LINE] = "";
         unsigned i = s->node[k];
-        if (host_node_set_has(&told, i)) {
+        if (host_node_set_has(&told, i))
             continue;
-        }
         struct host_node_set set = alike(s, i);
-        for (unsigned b = 0; b < sizeof told.bits; b++) {
+        for (unsigned b = 0; b < sizeof told.bits; b++)
             told.bits[b] |= set.bits[b];
-        }
         say(s, i, host_node_set_count(&set) == 1, line);
         if (line[0] != '\0') {
             host_node_set_name(&set, nodes, sizeof nodes);
@@ -241,19 +230,17 @@ static void say_result(const struct host_flash_show *s, unsigned i, bool one,
     const struct host_spread_node *n = node_of(s, i);
     char image[FLASH_SHOW_LIST];
     name_image(s, image);
-    if (n->phase == HOST_SPREAD_DONE) {
+    if (n->phase == HOST_SPREAD_DONE)
         snprintf(line, FLASH_SHOW_LINE, "%s %s", one ? "runs" : "run", image);
-    } else if (n->phase == HOST_SPREAD_HAS) {
+    else if (n->phase == HOST_SPREAD_HAS)
         snprintf(line, FLASH_SHOW_LINE, "had %s already", image);
-    } else if (n->phase == HOST_SPREAD_PASSED) {
+    else if (n->phase == HOST_SPREAD_PASSED)
         snprintf(line, FLASH_SHOW_LINE, "passed over, as it %s", n->text);
-    }
 }
 
 void host_flash_show_result(const struct host_flash_show *show) {
-    if (!show->quiet) {
+    if (!show->quiet)
         say_each(show, say_result);
-    }
 }
 
 static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
@@ -379,13 +366,11 @@ static int parse_all(struct flash *f, int argc, char **argv) {
 /* --- before --------------------------------------------------------------- */
 
 static int open_image(struct flash *f) {
-    if (host_image_open(&f->file, f->path, f->error) != 0) {
+    if (host_image_open(&f->file, f->path, f->error) != 0)
         return f->error->code;
-    }
     enum loader_fault fault = host_image_fault(&f->file);
-    if (fault == LOADER_GOOD) {
+    if (fault == LOADER_GOOD)
         return 0;
-    }
     host_image_close(&f->file);
     if (fault == LOADER_UNSIGNED) {
         return host_fail(f->error, HOST_INPUT,
@@ -413,11 +398,10 @@ static int choose_nodes(struct flash *f) {
     const char *board = f->file.image.board;
     unsigned nodes = f->site.machine.nodes;
     bool fits = f->where.cube == NULL;
-    if (f->nodes == NULL) {
+    if (f->nodes == NULL)
         host_node_set_all(&f->set, nodes);
-    } else if (host_node_set_parse(&f->set, f->nodes, nodes, f->error) != 0) {
+    else if (host_node_set_parse(&f->set, f->nodes, nodes, f->error) != 0)
         return f->error->code;
-    }
     for (unsigned i = 0; i < nodes; i++) {
         fits = fits || (host_node_set_has(&f->set, i) &&
                         strcmp(board_in_file(f, i), board) == 0);
@@ -438,10 +422,8 @@ static int reset(struct flash *f) {
                          "--reset: only a cube file says which lines reset "
                          "boards; give --cube FILE");
     }
-    if (host_lines_open(&lines, &f->site.file, &f->site.remote, f->error) !=
-        0) {
+    if (host_lines_open(&lines, &f->site.file, &f->site.remote, f->error) != 0)
         return f->error->code;
-    }
     int status = 0;
     for (unsigned i = 0; status == 0 && i < f->site.machine.nodes; i++) {
         if (host_node_set_has(&f->set, i) &&
@@ -480,9 +462,8 @@ static void say(void *context, const char *line) {
 static int plan(struct flash *f) {
     char why[HOST_SPREAD_TEXT];
     host_flash_show_plan(&f->show);
-    if (host_spread_result(&f->spread, f->error) != 0) {
+    if (host_spread_result(&f->spread, f->error) != 0)
         return f->error->code;
-    }
     for (unsigned i = 0; i < f->site.machine.nodes; i++) {
         if (host_node_set_has(&f->set, i) &&
             f->spread.node[i].phase == HOST_SPREAD_AWAITED) {
@@ -495,9 +476,8 @@ static int plan(struct flash *f) {
 
 static int spread(struct flash *f) {
     int status = host_spread_look(&f->spread, f->error);
-    if (status == 0 && f->dry_run) {
+    if (status == 0 && f->dry_run)
         return plan(f);
-    }
     host_flash_cut_begin();
     while (status == 0 && host_flash_cut() == 0 &&
            !host_spread_over(&f->spread)) {
@@ -512,9 +492,8 @@ static int spread(struct flash *f) {
     host_flash_cut_end();
     status = status == 0 ? host_spread_run(&f->spread, f->error) : status;
     host_progress_end();
-    if (status != 0) {
+    if (status != 0)
         return status;
-    }
     host_flash_show_result(&f->show);
     return host_spread_result(&f->spread, f->error);
 }
@@ -531,9 +510,8 @@ static int visit(struct flash *f) {
                                                 .serial = draw_serial,
                                                 .changed = changed,
                                                 .say = say};
-    if (host_visit_open(&f->visit, &f->site.machine, f->error) != 0) {
+    if (host_visit_open(&f->visit, &f->site.machine, f->error) != 0)
         return f->error->code;
-    }
     int status = host_spread_open(&f->spread, &f->visit, &options, f->error);
     if (status == 0) {
         host_flash_show_begin(&f->show, &f->spread, f->quiet || f->dry_run);
@@ -550,9 +528,8 @@ int host_flash(int argc, char **argv, struct host_error *error) {
     f.argc = argc;
     f.argv = argv;
     if (parse_all(&f, argc, argv) != 0 || check_nodes(&f) != 0 ||
-        host_site_check(&f.where, error) != 0 || open_image(&f) != 0) {
+        host_site_check(&f.where, error) != 0 || open_image(&f) != 0)
         return error->code;
-    }
     int status = host_site_open(&f.site, &f.where, error);
     if (status == 0) {
         bool ready = choose_nodes(&f) == 0 && (!f.reset || reset(&f) == 0);

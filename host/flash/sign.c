@@ -27,9 +27,8 @@
 int host_image_open(struct host_image *file, const char *path,
                     struct host_error *error) {
     if (host_source_open_bounded(&file->source, path, LOADER_IMAGE_MAX,
-                                 "an image", error) != 0) {
+                                 "an image", error) != 0)
         return error->code;
-    }
     size_t bytes = file->source.bytes;
     bool good =
         bytes >= LOADER_HEADER_BYTES &&
@@ -139,9 +138,8 @@ static int write_pair(const char *path, const char *public_path,
     int status = host_key_write(path, secret, SECRET_TEXT, 0600, error);
     if (status == 0) {
         status = host_key_write(public_path, public, PUBLIC_TEXT, 0644, error);
-        if (status != 0) {
+        if (status != 0)
             (void)unlink(path);
-        }
     }
     host_sign_key_wipe(&pair);
     secure_wipe(secret, sizeof secret);
@@ -151,9 +149,8 @@ static int write_pair(const char *path, const char *public_path,
 int host_sign_key_make(const char *path, struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     char public_path[PATH_MAX];
-    if (name_public(public_path, path, error) != 0) {
+    if (name_public(public_path, path, error) != 0)
         return error->code;
-    }
     if (getrandom(seed, sizeof seed, 0) != (ssize_t)sizeof seed) {
         return host_fail(
             error, HOST_BROKEN,
@@ -207,9 +204,8 @@ static int host_sign_key_read(struct host_sign_key *pair, const char *path,
                               struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     enum key_file_state state = key_file_read_marked(path, MARK, seed);
-    if (state == KEY_FILE_GOOD) {
+    if (state == KEY_FILE_GOOD)
         make_pair(pair, seed);
-    }
     int status = state == KEY_FILE_GOOD ? 0 : refuse(path, state, error);
     secure_wipe(seed, sizeof seed);
     return status;
@@ -219,9 +215,8 @@ int host_sign_public_read(uint8_t public[SIGN_PUBLIC_BYTES], const char *path,
                           struct host_error *error) {
     uint8_t seed[SEED_BYTES];
     enum key_file_state state = key_file_read(path, public);
-    if (state == KEY_FILE_GOOD || state == KEY_FILE_SEEN) {
+    if (state == KEY_FILE_GOOD || state == KEY_FILE_SEEN)
         return 0;
-    }
     int reason = errno;
     bool secret = state == KEY_FILE_NO_KEY &&
                   key_file_read_marked(path, MARK, seed) < KEY_FILE_WRITABLE;
@@ -303,9 +298,8 @@ static void parse_value(struct sign *s, const char *option, const char *value,
 static void parse_text(struct sign *s, const char *option, const char *value,
                        size_t most, const char **text) {
     bool printable = *value != '\0';
-    for (const char *at = value; *at != '\0'; at++) {
+    for (const char *at = value; *at != '\0'; at++)
         printable = *at > ' ' && *at < 0x7f && printable;
-    }
     *text = value;
     if (!printable || strlen(value) > most) {
         host_fail(s->error, HOST_USAGE,
@@ -353,12 +347,10 @@ static int check_board(const struct sign *s) {
     for (unsigned i = 0; host_board_name(i) != NULL; i++) {
         const struct host_board *board = host_board_row(i);
         size_t used = strlen(allowed);
-        if (board->bare == NULL) {
+        if (board->bare == NULL)
             continue;
-        }
-        if (strcmp(s->board, board->name) == 0) {
+        if (strcmp(s->board, board->name) == 0)
             return 0;
-        }
         snprintf(allowed + used, sizeof allowed - used, "%s%s",
                  used == 0 ? "" : ", ", board->name);
     }
@@ -409,9 +401,8 @@ static int describe(const struct sign *s, const struct host_source *source,
                          "anew",
                          s->path);
     }
-    if (!old && check_binary(s, source) != 0) {
+    if (!old && check_binary(s, source) != 0)
         return s->error->code;
-    }
     if (source->bytes - *code > LOADER_IMAGE_MAX - LOADER_HEADER_BYTES) {
         return host_fail(s->error, HOST_INPUT,
                          "%s: %zu bytes, and a board takes %d; give a board's "
@@ -455,9 +446,8 @@ static int make(const struct sign *s, const struct host_source *source,
                 uint8_t header[LOADER_HEADER_BYTES], size_t *code) {
     struct loader_image image;
     if (describe(s, source, &image, code) != 0 ||
-        (*code > 0 && check_old(s, source) != 0)) {
+        (*code > 0 && check_old(s, source) != 0))
         return s->error->code;
-    }
     loader_image_pack(&image, header);
     host_image_digest(header, source->data + *code, image.bytes, image.digest);
     memcpy(image.key, pair->public, sizeof image.key);
@@ -471,9 +461,8 @@ static int write_image(const struct sign *s, const struct host_source *source,
                        const uint8_t header[LOADER_HEADER_BYTES], size_t code) {
     struct host_output out;
     const char *path = s->output == NULL ? s->path : s->output;
-    if (host_output_open(&out, path, s->error) != 0) {
+    if (host_output_open(&out, path, s->error) != 0)
         return s->error->code;
-    }
     host_output_bytes(&out, header, LOADER_HEADER_BYTES);
     host_output_bytes(&out, source->data + code, source->bytes - code);
     (void)host_output_close(&out, 1, s->error);
@@ -500,17 +489,15 @@ int host_sign(int argc, char **argv, struct host_error *error) {
     uint8_t header[LOADER_HEADER_BYTES];
     size_t code;
     if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
-        (s.board != NULL && check_board(&s) != 0)) {
+        (s.board != NULL && check_board(&s) != 0))
         return error->code;
-    }
     if (s.key == NULL) {
         return host_fail(error, HOST_USAGE,
                          "--key: is missing; give the secret half of a pair, "
                          "made with: incode key --sign FILE");
     }
-    if (host_sign_key_read(&pair, s.key, error) != 0) {
+    if (host_sign_key_read(&pair, s.key, error) != 0)
         return error->code;
-    }
     /* An ELF file is longer than its binary, and is told apart. */
     int status = host_source_open_bounded(
         &source, s.path, 16 * LOADER_IMAGE_MAX, "an image", error);
@@ -547,17 +534,14 @@ static void print_image(const struct loader_image *image) {
 static int judge(const struct sign *s, const struct host_image *file,
                  const uint8_t wanted[SIGN_PUBLIC_BYTES]) {
     enum loader_fault fault = host_image_fault(file);
-    if (fault == LOADER_UNSIGNED) {
+    if (fault == LOADER_UNSIGNED)
         printf("signed by  nobody\n");
-    } else {
+    else
         print_hex("signed by", file->image.key, sizeof file->image.key);
-    }
-    if (fault == LOADER_GOOD && s->key != NULL) {
+    if (fault == LOADER_GOOD && s->key != NULL)
         fault = loader_image_signed(file->source.data, &sign_sodium, wanted);
-    }
-    if (fault == LOADER_GOOD || (fault == LOADER_UNSIGNED && s->key == NULL)) {
+    if (fault == LOADER_GOOD || (fault == LOADER_UNSIGNED && s->key == NULL))
         return 0;
-    }
     if (fault == LOADER_WRONG_DIGEST || fault == LOADER_WRONG_SIGNATURE) {
         return host_fail(s->error, HOST_UNVERIFIED,
                          "%s: %s; copy or build it anew", s->path,
@@ -583,9 +567,8 @@ int host_image_show(int argc, char **argv, struct host_error *error) {
     uint8_t wanted[SIGN_PUBLIC_BYTES];
     if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
         (s.key != NULL && host_sign_public_read(wanted, s.key, error) != 0) ||
-        host_image_open(&file, s.path, error) != 0) {
+        host_image_open(&file, s.path, error) != 0)
         return error->code;
-    }
     print_image(&file.image);
     int status = judge(&s, &file, wanted);
     host_image_close(&file);

@@ -48,9 +48,8 @@ int host_spread_open(struct host_spread *spread, struct host_visit *visit,
            spread->blocks <= LOADER_BLOCKS_MAX);
     (void)loader_image_unpack(&spread->image, options->image);
     spread->node = calloc(visit->machine->nodes, sizeof *spread->node);
-    if (spread->node == NULL) {
+    if (spread->node == NULL)
         return host_fail_memory(error, "what is known of the nodes");
-    }
     look_at_clock(spread);
     spread->began_us = spread->arrived_us = spread->now_us;
     for (unsigned i = 0; i < visit->machine->nodes; i++) {
@@ -84,11 +83,9 @@ static void spread_judge(struct host_spread *spread, unsigned i);
 
 static void judge_all(struct host_spread *spread) {
     look_at_clock(spread);
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (spread_wanted(spread, i)) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if (spread_wanted(spread, i))
             spread_judge(spread, i);
-        }
-    }
 }
 
 int host_spread_look(struct host_spread *spread, struct host_error *error) {
@@ -105,9 +102,8 @@ int host_spread_look(struct host_spread *spread, struct host_error *error) {
 /* --- steps ---------------------------------------------------------------- */
 
 static void say(const struct host_spread *spread, const char *line) {
-    if (spread->options.say != NULL) {
+    if (spread->options.say != NULL)
         spread->options.say(spread->options.context, line);
-    }
 }
 
 /* Says once of each absence whom it waits for. */
@@ -125,9 +121,8 @@ static void say_who_is_awaited(struct host_spread *spread) {
             first = i;
         }
     }
-    if (first == spread->visit->machine->nodes) {
+    if (first == spread->visit->machine->nodes)
         return;
-    }
     host_node_set_name(&set, nodes, sizeof nodes);
     const char *reason =
         host_visit_reason(spread->visit, first, why, sizeof why);
@@ -138,28 +133,24 @@ static void say_who_is_awaited(struct host_spread *spread) {
 }
 
 bool host_spread_over(const struct host_spread *spread) {
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
         if (spread_wanted(spread, i) &&
-            (!spread_ended(&spread->node[i]) || spread_goes_home(spread, i))) {
+            (!spread_ended(&spread->node[i]) || spread_goes_home(spread, i)))
             return false;
-        }
-    }
     return true;
 }
 
 /* With a generation goes what was on its way: it is said again, and nobody
  * waits for answers to it. */
 static void look_at_generation(struct host_spread *spread) {
-    if (spread->generation == spread->visit->generation) {
+    if (spread->generation == spread->visit->generation)
         return;
-    }
     spread->generation = spread->visit->generation;
     spread->ask_lost = true;
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
-        if (n->phase >= HOST_SPREAD_BEGINS && n->phase < HOST_SPREAD_STARTS) {
+        if (n->phase >= HOST_SPREAD_BEGINS && n->phase < HOST_SPREAD_STARTS)
             n->told_us = 0;
-        }
     }
 }
 
@@ -169,16 +160,13 @@ int host_spread_step(struct host_spread *spread, uint64_t wait_us,
                      struct host_error *error) {
     look_at_generation(spread);
     judge_all(spread);
-    if (spread_orders(spread, error) != 0) {
+    if (spread_orders(spread, error) != 0)
         return error->code;
-    }
     spread_blocks(spread);
     int status = host_visit_round(spread->visit, wait_us, error);
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (spread_wanted(spread, i) && !spread_ended(&spread->node[i])) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if (spread_wanted(spread, i) && !spread_ended(&spread->node[i]))
             spread_expire(spread, i);
-        }
-    }
     say_who_is_awaited(spread);
     return status;
 }
@@ -189,30 +177,23 @@ static void spread_explain(struct host_spread *spread, unsigned i);
 static int ask_for_logs(struct host_spread *spread, struct host_error *error) {
     enum { LOG_US = 3000000 };
     struct host_node_set set = {{0}};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (spread->node[i].phase == HOST_SPREAD_FELL_BACK) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if (spread->node[i].phase == HOST_SPREAD_FELL_BACK)
             host_node_set_add(&set, i);
-        }
-    }
-    if (host_node_set_count(&set) == 0) {
+    if (host_node_set_count(&set) == 0)
         return 0;
-    }
     int status =
         host_visit_ask(spread->visit, &set, NODE_LOG, 0, LOG_US, error);
-    for (unsigned i = 0; status == 0 && i < spread->visit->machine->nodes;
-         i++) {
-        if (host_node_set_has(&set, i)) {
+    for (unsigned i = 0; status == 0 && i < spread->visit->machine->nodes; i++)
+        if (host_node_set_has(&set, i))
             spread_explain(spread, i);
-        }
-    }
     return status;
 }
 
 int host_spread_run(struct host_spread *spread, struct host_error *error) {
     int status = spread->looked ? 0 : host_spread_look(spread, error);
-    while (status == 0 && !host_spread_over(spread)) {
+    while (status == 0 && !host_spread_over(spread))
         status = host_spread_step(spread, LOOK_US, error);
-    }
     return status == 0 ? ask_for_logs(spread, error) : status;
 }
 
@@ -229,9 +210,8 @@ static unsigned gather(const struct host_spread *spread,
     unsigned first = spread->visit->machine->nodes;
     *set = (struct host_node_set){{0}};
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (!has_failed(spread, i) || host_node_set_has(told, i)) {
+        if (!has_failed(spread, i) || host_node_set_has(told, i))
             continue;
-        }
         first = first == spread->visit->machine->nodes ? i : first;
         if (strcmp(spread->node[i].text, spread->node[first].text) == 0) {
             host_node_set_add(set, i);
@@ -247,9 +227,8 @@ int host_spread_result(struct host_spread *spread, struct host_error *error) {
     unsigned all = spread->visit->machine->nodes, i;
     int code = 0;
     while ((i = gather(spread, &told, &set)) < all) {
-        if (code != 0) {
+        if (code != 0)
             say(spread, line);
-        }
         host_node_set_name(&set, nodes, sizeof nodes);
         snprintf(line, sizeof line, "%s: %s", nodes, spread->node[i].text);
         bool refused = spread->node[i].phase == HOST_SPREAD_REFUSED;
@@ -297,9 +276,8 @@ bool spread_goes_home(const struct host_spread *spread, unsigned i) {
 
 static void tell(const struct host_spread *spread, unsigned i) {
     const struct host_spread_options *options = &spread->options;
-    if (options->changed != NULL) {
+    if (options->changed != NULL)
         options->changed(options->context, i);
-    }
 }
 
 void spread_set(struct host_spread *spread, unsigned i,
@@ -366,9 +344,8 @@ static bool pass_over(struct host_spread *spread, unsigned i) {
     const struct host_spread_options *options = &spread->options;
     const char *known =
         options->board == NULL ? NULL : options->board(options->context, i);
-    if (known == NULL || strcmp(known, spread->image.board) == 0) {
+    if (known == NULL || strcmp(known, spread->image.board) == 0)
         return false;
-    }
     end(spread, i, HOST_SPREAD_PASSED, "is no %s but %s", spread->image.board,
         known);
     return true;
@@ -431,34 +408,30 @@ static bool is_absent(const struct host_spread *spread, unsigned i) {
     enum { BUSY_US = 15000000 };
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
-    if (seen->heard) {
+    if (seen->heard)
         n->heard_us = spread->now_us;
-    }
     return !seen->there || spread->now_us - n->heard_us > BUSY_US;
 }
 
 /* A node that is told to restart is not there for a while. */
 static void judge_absent(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
-    if (n->phase > HOST_SPREAD_LEAVES && n->phase < HOST_SPREAD_STARTS) {
+    if (n->phase > HOST_SPREAD_LEAVES && n->phase < HOST_SPREAD_STARTS)
         spread_set(spread, i, HOST_SPREAD_AWAITED);
-    }
 }
 
 /* By what the visit knows of it; by what its loader says. */
 static void spread_judge(struct host_spread *spread, unsigned i) {
     const struct host_visit_node *seen = &spread->visit->node[i];
     struct host_spread_node *n = &spread->node[i];
-    if (spread_ended(n) || pass_over(spread, i)) {
+    if (spread_ended(n) || pass_over(spread, i))
         return;
-    }
     if (is_absent(spread, i)) {
         judge_absent(spread, i);
         return;
     }
-    if (seen->starts != n->start || n->starts == 0) {
+    if (seen->starts != n->start || n->starts == 0)
         begin_anew(spread, i);
-    }
     if (n->starts > HOST_SPREAD_STARTS_MAX) {
         end(spread, i, HOST_SPREAD_LOST,
             "restarts again and again; look at its console, and at its "
@@ -477,9 +450,8 @@ static void spread_judge(struct host_spread *spread, unsigned i) {
 
 static uint32_t lacking(const struct host_spread *spread, const uint8_t *map) {
     uint32_t count = 0;
-    for (uint32_t b = 0; b < spread->blocks; b++) {
+    for (uint32_t b = 0; b < spread->blocks; b++)
         count += (map[b / 8] >> b % 8 & 1) == 0;
-    }
     return count;
 }
 
@@ -501,17 +473,15 @@ static void take_whole(struct host_spread *spread, unsigned i,
                        enum host_spread_phase phase) {
     struct host_spread_node *n = &spread->node[i];
     n->held = n->blocks = spread->blocks;
-    if (n->phase < phase) {
+    if (n->phase < phase)
         spread_set(spread, i, phase);
-    }
 }
 
 static void spread_hear(struct host_spread *spread, unsigned i,
                         const struct loader_state_message *state) {
     struct host_spread_node *n = &spread->node[i];
-    if (!spread_in_loader(spread, i) || n->phase >= HOST_SPREAD_STARTS) {
+    if (!spread_in_loader(spread, i) || n->phase >= HOST_SPREAD_STARTS)
         return;
-    }
     n->replies += n->replies < n->asks;
     n->silent = 0;
     spread->answered_us = spread->now_us;
@@ -569,12 +539,10 @@ static void spread_expire(struct host_spread *spread, unsigned i) {
     struct host_spread_node *n = &spread->node[i];
     char text[HOST_SPREAD_TEXT];
     const char *reason = NULL;
-    if (n->phase == HOST_SPREAD_VERIFIED) {
+    if (n->phase == HOST_SPREAD_VERIFIED)
         return; /* it waits for others */
-    }
-    if (spread->now_us - n->moved_us <= spread->options.patience_us) {
+    if (spread->now_us - n->moved_us <= spread->options.patience_us)
         return;
-    }
     switch (n->phase) {
     case HOST_SPREAD_AWAITED:
         reason = host_visit_reason(spread->visit, i, text, sizeof text);

@@ -69,14 +69,11 @@ static void begin(struct host_spread *spread) {
     }
     memcpy(message.header, spread->options.image, LOADER_HEADER_BYTES);
     if (count == 0 || !send(spread, count == 1 ? (uint16_t)last : CUBE_ALL,
-                            NODE_IMAGE_BEGIN, &message, sizeof message)) {
+                            NODE_IMAGE_BEGIN, &message, sizeof message))
         return;
-    }
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if ((message.nodes[i / 8] >> i % 8 & 1) != 0) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if ((message.nodes[i / 8] >> i % 8 & 1) != 0)
             spread->node[i].told_us = spread->now_us;
-        }
-    }
     spread->ask_due = true;
 }
 
@@ -137,9 +134,8 @@ static bool send_ask(struct host_spread *spread, unsigned count,
                      unsigned last) {
     const struct loader_ask_message message = {spread->transfer};
     if (!send(spread, count == 1 ? (uint16_t)last : CUBE_ALL, NODE_IMAGE_ASK,
-              &message, sizeof message)) {
+              &message, sizeof message))
         return false;
-    }
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
         if (is_asked(spread, i)) {
@@ -166,9 +162,8 @@ static void ask(struct host_spread *spread) {
     bool open = silent > 0 && !spread->ask_lost && passed < answer_time(spread);
     bool due = spread->ask_due || (spread->ask_lost && silent > 0) ||
                passed >= ask_interval(spread, count);
-    if (count > 0 && due && !open) {
+    if (count > 0 && due && !open)
         (void)send_ask(spread, count, last);
-    }
 }
 
 /* --- blocks --------------------------------------------------------------- */
@@ -177,9 +172,8 @@ static void ask(struct host_spread *spread) {
 static bool is_waited_for(const struct host_spread *spread, unsigned i) {
     const struct host_spread_node *n = &spread->node[i];
     uint64_t passed = spread->now_us - n->moved_us;
-    if (n->phase == HOST_SPREAD_LEAVES) {
+    if (n->phase == HOST_SPREAD_LEAVES)
         return spread_wanted(spread, i) && passed < LEAVE_US;
-    }
     bool silent = n->phase == HOST_SPREAD_BEGINS || !has_answered(n);
     return is_asked(spread, i) && n->phase <= HOST_SPREAD_TAKES && silent &&
            passed < answer_time(spread);
@@ -187,11 +181,9 @@ static bool is_waited_for(const struct host_spread *spread, unsigned i) {
 
 /* A pass begins once all who will be in it have said what they lack. */
 static bool may_plan(const struct host_spread *spread) {
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
-        if (is_waited_for(spread, i)) {
+    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+        if (is_waited_for(spread, i))
             return false;
-        }
-    }
     return !spread->ask_due;
 }
 
@@ -202,9 +194,8 @@ static bool is_any_unknown(const struct host_spread *spread) {
         const struct host_spread_node *n = &spread->node[i];
         bool known = n->phase > HOST_SPREAD_TAKES ||
                      (n->phase == HOST_SPREAD_TAKES && has_answered(n));
-        if (spread_wanted(spread, i) && !known) {
+        if (spread_wanted(spread, i) && !known)
             return true;
-        }
     }
     return false;
 }
@@ -212,15 +203,13 @@ static bool is_any_unknown(const struct host_spread *spread) {
 static void plan(struct host_spread *spread) {
     uint16_t *dest = spread->dest;
     bool unknown = is_any_unknown(spread);
-    for (uint32_t b = 0; b < spread->blocks; b++) {
+    for (uint32_t b = 0; b < spread->blocks; b++)
         dest[b] = CUBE_HOST;
-    }
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         if (!spread_in_loader(spread, i) || n->phase != HOST_SPREAD_TAKES ||
-            !has_answered(n)) {
+            !has_answered(n))
             continue;
-        }
         for (uint32_t b = 0; b < spread->blocks; b++) {
             if ((n->map[b / 8] >> b % 8 & 1) == 0) {
                 dest[b] =
@@ -248,9 +237,8 @@ static bool send_block(struct host_spread *spread, uint32_t block) {
 }
 
 void spread_blocks(struct host_spread *spread) {
-    if (!spread->passing && may_plan(spread)) {
+    if (!spread->passing && may_plan(spread))
         plan(spread);
-    }
     while (spread->passing) {
         if (spread->next == spread->blocks) {
             spread->passing = false;
@@ -285,10 +273,8 @@ static bool may_boot(const struct host_spread *spread) {
         const struct host_spread_node *n = &spread->node[i];
         bool off = n->phase == HOST_SPREAD_AWAITED &&
                    (!n->left || now - n->moved_us >= LEAVE_US);
-        if (spread_wanted(spread, i) && n->phase < HOST_SPREAD_VERIFIED &&
-            !off) {
+        if (spread_wanted(spread, i) && n->phase < HOST_SPREAD_VERIFIED && !off)
             return false;
-        }
     }
     return true;
 }
@@ -299,12 +285,10 @@ static bool boot(struct host_spread *spread, unsigned i) {
                   (n->phase == HOST_SPREAD_VERIFIED ||
                    (n->phase == HOST_SPREAD_STARTS && is_due(spread, n)));
     bool home = spread_goes_home(spread, i) && is_due(spread, n);
-    if (!starts && !home) {
+    if (!starts && !home)
         return true;
-    }
-    if (!order(spread, i, LOADER_BOOT)) {
+    if (!order(spread, i, LOADER_BOOT))
         return false;
-    }
     if (home) {
         n->homeward++;
     } else {
@@ -319,22 +303,18 @@ static bool boot(struct host_spread *spread, unsigned i) {
 /* The farthest ones first: their way leads over the others. */
 static void boot_all(struct host_spread *spread) {
     struct host_machine *machine = spread->visit->machine;
-    if (!may_boot(spread)) {
+    if (!may_boot(spread))
         return;
-    }
     for (unsigned far = machine->dimension + 1; far-- > 0;) {
-        for (unsigned i = 0; i < machine->nodes; i++) {
-            if ((unsigned)__builtin_popcount(i) == far && !boot(spread, i)) {
+        for (unsigned i = 0; i < machine->nodes; i++)
+            if ((unsigned)__builtin_popcount(i) == far && !boot(spread, i))
                 return;
-            }
-        }
     }
 }
 
 int spread_orders(struct host_spread *spread, struct host_error *error) {
-    if (restart_those_that_run(spread, error) != 0) {
+    if (restart_those_that_run(spread, error) != 0)
         return error->code;
-    }
     begin(spread);
     for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
         if (spread_in_loader(spread, i)) {

@@ -24,9 +24,8 @@ static int check_claims(const char *in, const char *out,
  * makes none has its points where that of standard input has them. */
 static const char *points_extension(const char *path) {
     const struct host_format *f = host_format_named(path);
-    if (f == NULL || f->beside[0] == NULL) {
+    if (f == NULL || f->beside[0] == NULL)
         f = host_format_of("-", HOST_READ_TETRAHEDRA);
-    }
     return f->beside[0];
 }
 
@@ -38,17 +37,15 @@ static int points_beside(const char *in, const char *out,
     size_t n = strlen(in) - (host_is_packed(in) ? strlen(".gz") : 0);
     size_t more = strlen(extension);
     char *name = malloc(n + more + sizeof ".gz");
-    if (name == NULL) {
+    if (name == NULL)
         return host_fail_memory(error, "a name");
-    }
     memcpy(name, in, n);
     name[n] = '\0';
     char *end = strrchr(name, '.'); /* the format was known by it */
     end = end == NULL ? name + n : end;
     strcpy(end, extension);
-    if (access(name, R_OK) != 0) {
+    if (access(name, R_OK) != 0)
         strcpy(end + more, ".gz");
-    }
     if (access(name, R_OK) != 0) {
         end[more] = '\0';
         host_fail(error, HOST_INPUT,
@@ -73,13 +70,11 @@ static int convert_tetrahedra(const char *in, const char *out,
                               struct host_error *error) {
     struct host_tetrahedra tets;
     struct host_points points;
-    if (host_tetrahedra_read(in, &tets, &points, error) != 0) {
+    if (host_tetrahedra_read(in, &tets, &points, error) != 0)
         return error->code;
-    }
     bool needed = !holds_rows_only(out);
-    if (needed && points.count == 0) {
+    if (needed && points.count == 0)
         points_beside(in, out, &points, error);
-    }
     if (error->code == 0 &&
         (!needed || host_rows_check(in, &tets, &points, error) == 0)) {
         host_tetrahedra_sort(&tets);
@@ -99,9 +94,8 @@ static bool holds_tetrahedra(const char *path) {
 /* Others may hold either. */
 static bool has_tetrahedra(const char *path) {
     const struct host_format *f = host_format_named(path);
-    if (f == NULL || f->read_tetrahedra == NULL) {
+    if (f == NULL || f->read_tetrahedra == NULL)
         return false;
-    }
     struct host_tetrahedra tets;
     struct host_error error = {0};
     bool any =
@@ -115,13 +109,11 @@ static int convert(const char *in, const char *format, const char *out,
     const struct host_format *to = host_format_named(out);
     bool either =
         to != NULL && to->write_points != NULL && to->write_tetrahedra != NULL;
-    if (check_claims(in, out, error) != 0) {
+    if (check_claims(in, out, error) != 0)
         return error->code;
-    }
     if (format == NULL && (holds_tetrahedra(in) || holds_tetrahedra(out) ||
-                           (either && has_tetrahedra(in)))) {
+                           (either && has_tetrahedra(in))))
         return convert_tetrahedra(in, out, error);
-    }
     struct host_points points;
     if (host_points_read_as(in, format, &points, error) == 0) {
         host_points_note(in, &points);

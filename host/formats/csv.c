@@ -29,17 +29,15 @@ static const char *line_end(const struct host_scan *s) {
  * empty. */
 static const char *line_begin(const struct host_scan *s) {
     const char *at = s->at;
-    while (at > s->start && (is_blank(at[-1]) || is_mark(at[-1]))) {
+    while (at > s->start && (is_blank(at[-1]) || is_mark(at[-1])))
         at--;
-    }
     return at;
 }
 
 bool host_csv_begins_empty(const struct host_scan *s) {
     const char *at = s->at;
-    while (at > s->start && is_blank(at[-1])) {
+    while (at > s->start && is_blank(at[-1]))
         at--;
-    }
     return at > s->start && is_mark(at[-1]);
 }
 
@@ -49,17 +47,15 @@ static bool is_delimiter(char c, char delimiter) {
 }
 
 static const char *skip_blanks(const char *c, const char *end, char delimiter) {
-    while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter)) {
+    while (c < end && is_blank(*c) && (delimiter == ' ' || *c != delimiter))
         c++;
-    }
     return c;
 }
 
 /* Where the field behind the one that ends at c begins; NULL: nowhere. */
 static const char *behind(const char *c, const char *end, char delimiter) {
-    if (c == end) {
+    if (c == end)
         return NULL;
-    }
     c++;
     if (delimiter == ' ') { /* many are one */
         c = skip_blanks(c, end, delimiter);
@@ -74,13 +70,11 @@ static struct field next_field(const char **at, const char *end,
     bool quoted = false;
     const char *c = skip_blanks(*at, end, delimiter);
     struct field f = {c, c};
-    for (; c < end && (quoted || !is_delimiter(*c, delimiter)); c++) {
+    for (; c < end && (quoted || !is_delimiter(*c, delimiter)); c++)
         quoted = quoted != (*c == '"');
-    }
     *at = behind(c, end, delimiter);
-    while (c > f.first && is_blank(c[-1])) {
+    while (c > f.first && is_blank(c[-1]))
         c--;
-    }
     f.last = c;
     if (c - f.first >= 2 && *f.first == '"' && c[-1] == '"') {
         f.first++;
@@ -96,9 +90,8 @@ static char delimiter_of(const char *at, const char *end) {
         bool quoted = false;
         for (const char *c = at; c < end; c++) {
             quoted = quoted != (*c == '"');
-            if (*c == *d && !quoted) {
+            if (*c == *d && !quoted)
                 return *d;
-            }
         }
     }
     return ' ';
@@ -106,13 +99,11 @@ static char delimiter_of(const char *at, const char *end) {
 
 /* 0, 1, 2 for x, y, z, alone or with a unit after it; else 3. */
 static unsigned axis_of(struct field f) {
-    while (f.first < f.last && is_blank(*f.first)) {
+    while (f.first < f.last && is_blank(*f.first))
         f.first++;
-    }
     if (f.first == f.last ||
-        (f.last - f.first > 1 && strchr(" \t[({/", f.first[1]) == NULL)) {
+        (f.last - f.first > 1 && strchr(" \t[({/", f.first[1]) == NULL))
         return 3;
-    }
     char c = (char)(*f.first | 0x20);
     return c >= 'x' && c <= 'z' ? (unsigned)(c - 'x') : 3;
 }
@@ -123,15 +114,12 @@ static bool is_numeric(const char *word) {
     static const char *const others[] = {"nan", "inf", "infinity"};
     bool quoted = word[0] == '"';
     size_t n = strlen(word += quoted);
-    if (begins_number(word[0])) {
+    if (begins_number(word[0]))
         return true;
-    }
     n -= quoted && n > 0 && word[n - 1] == '"';
-    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
-        if (n == strlen(others[i]) && strncasecmp(word, others[i], n) == 0) {
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        if (n == strlen(others[i]) && strncasecmp(word, others[i], n) == 0)
             return true;
-        }
-    }
     return false;
 }
 
@@ -140,9 +128,8 @@ static bool names_columns(struct host_scan s) {
     while (host_scan_more(&s)) {
         char word[64];
         host_scan_word(&s, word, sizeof word);
-        if (is_numeric(word)) {
+        if (is_numeric(word))
             return false;
-        }
     }
     return true;
 }
@@ -151,18 +138,16 @@ int host_csv_header(struct host_csv *csv, struct host_scan *s,
                     struct host_error *error) {
     unsigned found[4] = {0};
     *csv = (struct host_csv){.column = {0, 1, 2}};
-    if (!host_scan_skip_blank_lines(s) || !names_columns(*s)) {
+    if (!host_scan_skip_blank_lines(s) || !names_columns(*s))
         return 0;
-    }
     const char *at = line_begin(s), *end = line_end(s);
     csv->delimiter = delimiter_of(at, end);
     while (at != NULL) {
         struct field f = next_field(&at, end, csv->delimiter);
         unsigned axis = axis_of(f);
         found[axis]++;
-        if (axis < 3) {
+        if (axis < 3)
             csv->column[axis] = csv->fields;
-        }
         csv->fields +=
             at != NULL || f.first < f.last; /* a last one is no more */
     }
@@ -194,13 +179,11 @@ static int take_number(const struct host_scan *s, const char **at,
     part.at = skip_blanks(*at, end, delimiter);
     part.end = end;
     if (part.at < end && begins_number(*part.at)) {
-        if (host_scan_double(&part, value, error) != 0) {
+        if (host_scan_double(&part, value, error) != 0)
             return error->code;
-        }
         const char *c = part.at;
-        while (c < end && is_blank(*c) && !is_delimiter(*c, delimiter)) {
+        while (c < end && is_blank(*c) && !is_delimiter(*c, delimiter))
             c++;
-        }
         if (c == end || *c == '#' || is_delimiter(*c, delimiter)) {
             *at = c < end && *c == '#' ? NULL : behind(c, end, delimiter);
             return 0;
@@ -209,12 +192,10 @@ static int take_number(const struct host_scan *s, const char **at,
     struct field f = next_field(at, end, delimiter);
     part.at = f.first;
     part.end = f.last;
-    if (f.first == f.last) {
+    if (f.first == f.last)
         return host_scan_fail(s, f.first, error, HOST_CSV_EMPTY);
-    }
-    if (host_scan_double(&part, value, error) != 0) {
+    if (host_scan_double(&part, value, error) != 0)
         return error->code;
-    }
     return host_scan_more(&part)
                ? host_scan_fail(&part, part.at, error,
                                 "more than one number in a column; correct "
@@ -235,20 +216,17 @@ int host_csv_row(const struct host_csv *csv, struct host_scan *s, double xyz[3],
     const char *at = line_begin(s), *end = line_end(s), *field = at;
     char delimiter = csv->delimiter;
     uint64_t columns = 0;
-    if (memchr(at, delimiter, (size_t)(end - at)) == NULL) {
+    if (memchr(at, delimiter, (size_t)(end - at)) == NULL)
         delimiter = delimiter_of(at, end); /* rows may have one of their own */
-    }
     for (; at != NULL && columns < csv->fields; columns++) {
         unsigned d = 0;
         field = at;
-        while (d < 3 && csv->column[d] != columns) {
+        while (d < 3 && csv->column[d] != columns)
             d++;
-        }
-        if (d == 3) {
+        if (d == 3)
             (void)next_field(&at, end, delimiter);
-        } else if (take_number(s, &at, end, delimiter, &xyz[d], error) != 0) {
+        else if (take_number(s, &at, end, delimiter, &xyz[d], error) != 0)
             return error->code;
-        }
     }
     if (columns < csv->fields || (at != NULL && !is_end(at, end, delimiter))) {
         return host_scan_fail(s, at == NULL ? field : at, error,

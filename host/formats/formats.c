@@ -58,30 +58,25 @@ const struct host_format *host_format_named(const char *path) {
     size_t length = strlen(path) - (host_is_packed(path) ? strlen(".gz") : 0);
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
-        for (unsigned k = 0; f->extensions[k] != NULL; k++) {
-            if (ends_in(path, length, f->extensions[k])) {
+        for (unsigned k = 0; f->extensions[k] != NULL; k++)
+            if (ends_in(path, length, f->extensions[k]))
                 return f;
-            }
-        }
     }
     return NULL;
 }
 
 static const struct host_format *first_with(enum host_use use) {
     const struct host_format *f;
-    for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
-        if (has_use(f, use)) {
+    for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++)
+        if (has_use(f, use))
             break;
-        }
-    }
     return f;
 }
 
 const struct host_format *host_format_of(const char *path, enum host_use use) {
     bool written = use == HOST_WRITE_POINTS || use == HOST_WRITE_TETRAHEDRA;
-    if (strcmp(path, "-") == 0) {
+    if (strcmp(path, "-") == 0)
         return first_with(use);
-    }
     const struct host_format *f = host_format_named(path);
     return f == NULL || !has_use(f, use) || (written && host_is_packed(path))
                ? NULL
@@ -139,16 +134,14 @@ void host_format_help(enum host_use use, char *text, size_t size) {
     const struct host_format *f;
     const char *between = "";
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
-        if (!has_use(f, use)) {
+        if (!has_use(f, use))
             continue;
-        }
         add(&list, between);
         add_extensions(&list, f);
         add(&list, " (");
         add(&list, f->name);
-        if (use == HOST_WRITE_TETRAHEDRA) {
+        if (use == HOST_WRITE_TETRAHEDRA)
             add_beside(&list, f);
-        }
         add(&list, ")");
         between = ", ";
     }
@@ -162,9 +155,8 @@ const struct host_format *host_format_told(const char *name, enum host_use use,
     bool whole = n > 0 && (size_t)n < sizeof path;
     const struct host_format *f = whole ? host_format_of(path, use) : NULL;
     const struct host_format *named = whole ? host_format_named(path) : NULL;
-    if (f != NULL) {
+    if (f != NULL)
         return f;
-    }
     if (named != NULL && named->unread != NULL) {
         host_fail(error, HOST_USAGE, "--format %s: %s", name, named->unread);
         return NULL;

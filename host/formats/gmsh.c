@@ -8,9 +8,8 @@ static int msh_format(struct host_scan *s, struct host_error *error) {
     double version;
     uint64_t binary;
     if (host_scan_double_anywhere(s, &version, error) != 0 ||
-        host_scan_unsigned(s, 1, &binary, error) != 0) {
+        host_scan_unsigned(s, 1, &binary, error) != 0)
         return error->code;
-    }
     if (!(version >= 2 && version < 3) || binary != 0) {
         return host_scan_fail(s, s->at, error,
                               "only text files of version 2 are read; save "
@@ -22,29 +21,24 @@ static int msh_format(struct host_scan *s, struct host_error *error) {
 static int msh_nodes(struct host_scan *s, struct host_mesh *mesh,
                      struct host_error *error) {
     uint64_t count;
-    if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0) {
+    if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0)
         return error->code;
-    }
     for (uint64_t i = 0; i < count; i++) {
         uint64_t number;
         double xyz[3];
-        if (host_scan_unsigned(s, UINT32_MAX, &number, error) != 0) {
+        if (host_scan_unsigned(s, UINT32_MAX, &number, error) != 0)
             return error->code;
-        }
         if (number != i + 1) {
             return host_scan_fail(s, s->at, error,
                                   "nodes are not numbered from 1 on without "
                                   "gaps; renumber the mesh");
         }
-        for (int d = 0; d < 3; d++) {
-            if (host_scan_double(s, &xyz[d], error) != 0) {
+        for (int d = 0; d < 3; d++)
+            if (host_scan_double(s, &xyz[d], error) != 0)
                 return error->code;
-            }
-        }
         if (mesh->points != NULL &&
-            host_points_append(mesh->points, xyz, 1, error) != 0) {
+            host_points_append(mesh->points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     host_scan_next_line(s);
     return host_take_section_end(s, error);
@@ -65,33 +59,26 @@ static int msh_elements(const struct host_source *source, struct host_scan *s,
                         struct host_mesh *mesh, struct host_error *error) {
     enum { TETRAHEDRON = 4 };
     uint64_t count;
-    if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0) {
+    if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0)
         return error->code;
-    }
     for (; count > 0; count--) {
         uint64_t number, type = 0, tags = 0, v[4];
         if (host_scan_unsigned(s, UINT64_MAX / 16, &number, error) != 0 ||
             msh_number(s, UINT32_MAX, &type, error) != 0 ||
-            msh_number(s, 64, &tags, error) != 0) {
+            msh_number(s, 64, &tags, error) != 0)
             return error->code;
-        }
         if (type != TETRAHEDRON) {
             host_scan_next_line(s);
             continue;
         }
-        for (; tags > 0; tags--) {
-            if (msh_number(s, UINT64_MAX / 16, &number, error) != 0) {
+        for (; tags > 0; tags--)
+            if (msh_number(s, UINT64_MAX / 16, &number, error) != 0)
                 return error->code;
-            }
-        }
-        for (int k = 0; k < 4; k++) {
-            if (msh_number(s, UINT64_MAX / 16, &v[k], error) != 0) {
+        for (int k = 0; k < 4; k++)
+            if (msh_number(s, UINT64_MAX / 16, &v[k], error) != 0)
                 return error->code;
-            }
-        }
-        if (host_take_element(mesh, v, 1, source, s, error) != 0) {
+        if (host_take_element(mesh, v, 1, source, s, error) != 0)
             return error->code;
-        }
     }
     return host_take_section_end(s, error);
 }
@@ -111,9 +98,8 @@ static int read_msh(const struct host_source *source, struct host_mesh *mesh,
         } else {
             host_scan_next_line(&s);
         }
-        if (error->code != 0) {
+        if (error->code != 0)
             return error->code;
-        }
     }
     return any ? 0
                : host_source_fail(source, error,

@@ -50,9 +50,8 @@ static int check_known(const struct host_source *source, const struct las *las,
                          "to one of these",
                          source->path, source->data[AT_MAJOR], las->minor);
     }
-    if ((las->format & MARKS_OF_LASZIP) != 0) {
+    if ((las->format & MARKS_OF_LASZIP) != 0)
         return host_source_fail(source, error, COMPRESSED);
-    }
     if (las->format >= FORMATS) {
         return host_fail(error, HOST_INPUT,
                          "%s: point record format %u, where 0 to 10 are read; "
@@ -106,18 +105,15 @@ static int skip_signature(const struct host_source *source, struct las *las,
                           const uint8_t **at, const uint8_t **end,
                           struct host_error *error) {
     static const uint8_t signature[] = {0xdd, 0xcc};
-    if (las->minor != 0) {
+    if (las->minor != 0)
         return 0;
-    }
-    if (host_source_all(source, at, end, error) != 0) {
+    if (host_source_all(source, at, end, error) != 0)
         return error->code;
-    }
     uint64_t bytes = (uint64_t)(*end - *at);
     if (las->offset + 2 <= bytes &&
         bytes - las->offset == las->count * las->length + 2 &&
-        memcmp(*at + las->offset, signature, 2) == 0) {
+        memcmp(*at + las->offset, signature, 2) == 0)
         las->offset += 2;
-    }
     return 0;
 }
 
@@ -127,9 +123,8 @@ static bool skip(const struct host_source *source, uint64_t bytes,
     while ((uint64_t)(*end - *at) < bytes) {
         bytes -= (uint64_t)(*end - *at);
         *at = *end;
-        if (!host_source_more(source, at, end)) {
+        if (!host_source_more(source, at, end))
             return false;
-        }
     }
     *at += bytes;
     return true;
@@ -147,9 +142,8 @@ static int read_header(const struct host_source *source, struct las *las,
     las->offset = field(source, AT_OFFSET, HOST_U32);
     las->length = field(source, AT_LENGTH, HOST_U16);
     las->count = field(source, AT_FEW, HOST_U32);
-    if (check_known(source, las, error) != 0) {
+    if (check_known(source, las, error) != 0)
         return error->code;
-    }
     if (las->minor == 4 && source->bytes >= AT_MANY + 8) {
         uint64_t few = las->count, many = field(source, AT_MANY, HOST_U64);
         if (few != 0 && many != 0 && few != many) {
@@ -172,30 +166,24 @@ static int read_header(const struct host_source *source, struct las *las,
 static int read_las(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error) {
     struct las las = {0};
-    if (read_header(source, &las, error) != 0) {
+    if (read_header(source, &las, error) != 0)
         return error->code;
-    }
     const uint8_t *at = source->data, *end = source->data + source->bytes;
-    if (skip_signature(source, &las, &at, &end, error) != 0) {
+    if (skip_signature(source, &las, &at, &end, error) != 0)
         return error->code;
-    }
-    if (!skip(source, las.offset, &at, &end)) {
+    if (!skip(source, las.offset, &at, &end))
         return cut_short(source, &las, 0, error);
-    }
     for (uint64_t i = 0; i < las.count; i++, at += las.length) {
         double xyz[3];
-        while ((uint64_t)(end - at) < las.length) {
-            if (!host_source_more(source, &at, &end)) {
+        while ((uint64_t)(end - at) < las.length)
+            if (!host_source_more(source, &at, &end))
                 return cut_short(source, &las, i, error);
-            }
-        }
         for (size_t d = 0; d < 3; d++) {
             double whole = host_number_at(at + 4 * d, HOST_I32, false);
             xyz[d] = whole * las.scale[d] + las.shift[d]; /* both rounded */
         }
-        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+        if (host_points_append(mesh->points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }

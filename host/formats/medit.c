@@ -7,21 +7,17 @@
 static int medit_vertices(struct host_scan *s, struct host_mesh *mesh,
                           struct host_error *error) {
     uint64_t count;
-    if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0) {
+    if (host_scan_unsigned(s, UINT32_MAX - 1, &count, error) != 0)
         return error->code;
-    }
     for (; count > 0; count--) {
         double xyz[3], reference;
-        for (int d = 0; d < 3; d++) {
-            if (host_scan_double_anywhere(s, &xyz[d], error) != 0) {
+        for (int d = 0; d < 3; d++)
+            if (host_scan_double_anywhere(s, &xyz[d], error) != 0)
                 return error->code;
-            }
-        }
         if (host_scan_double(s, &reference, error) != 0 ||
             (mesh->points != NULL &&
-             host_points_append(mesh->points, xyz, 1, error) != 0)) {
+             host_points_append(mesh->points, xyz, 1, error) != 0))
             return error->code;
-        }
     }
     return host_take_section_end(s, error);
 }
@@ -30,19 +26,15 @@ static int medit_tetrahedra(const struct host_source *source,
                             struct host_scan *s, struct host_mesh *mesh,
                             struct host_error *error) {
     uint64_t count;
-    if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0) {
+    if (host_scan_unsigned(s, UINT64_MAX / 64, &count, error) != 0)
         return error->code;
-    }
     for (; count > 0; count--) {
         uint64_t v[5]; /* the fifth is a reference */
-        for (int k = 0; k < 5; k++) {
-            if (host_scan_unsigned(s, UINT64_MAX / 16, &v[k], error) != 0) {
+        for (int k = 0; k < 5; k++)
+            if (host_scan_unsigned(s, UINT64_MAX / 16, &v[k], error) != 0)
                 return error->code;
-            }
-        }
-        if (host_take_element(mesh, v, 1, source, s, error) != 0) {
+        if (host_take_element(mesh, v, 1, source, s, error) != 0)
             return error->code;
-        }
     }
     return host_take_section_end(s, error);
 }
@@ -67,9 +59,8 @@ static int read_mesh(const struct host_source *source, struct host_mesh *mesh,
         } else { /* another section: its lines are passed over */
             host_scan_next_line(&s);
         }
-        if (error->code != 0) {
+        if (error->code != 0)
             return error->code;
-        }
     }
     return any ? 0
                : host_source_fail(source, error,

@@ -23,20 +23,17 @@ static enum host_number type_of(char kind, int bytes) {
                  {'i', 4, HOST_I32}, {'i', 2, HOST_I16}, {'i', 1, HOST_I8},
                  {'u', 8, HOST_U64}, {'u', 4, HOST_U32}, {'u', 2, HOST_U16},
                  {'u', 1, HOST_U8}};
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
-        if (kinds[i].kind == kind && kinds[i].bytes == bytes) {
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
+        if (kinds[i].kind == kind && kinds[i].bytes == bytes)
             return kinds[i].type;
-        }
-    }
     return HOST_NO_NUMBER;
 }
 
 /* Just past `key` and its colon, or NULL. */
 static const char *value_of(const char *header, const char *key) {
     const char *at = strstr(header, key);
-    if (at == NULL) {
+    if (at == NULL)
         return NULL;
-    }
     at += strlen(key);
     return *at == '\0' ? NULL : at + 1 + strspn(at + 1, ": ");
 }
@@ -46,20 +43,17 @@ static bool parse_dictionary(const char *header, struct npy *npy) {
     const char *order = value_of(header, "'fortran_order'");
     const char *shape = value_of(header, "'shape'");
     if (descr == NULL || order == NULL || shape == NULL || *descr != '\'' ||
-        *shape != '(') {
+        *shape != '(')
         return false;
-    }
     npy->big = descr[1] == '>';
-    if (descr[1] == '\0' || descr[2] == '\0') {
+    if (descr[1] == '\0' || descr[2] == '\0')
         return false;
-    }
     npy->type = type_of(descr[2], atoi(descr + 3));
     npy->fortran = *order == 'T';
     char *end;
     npy->rows = strtoull(shape + 1, &end, 10);
-    if (end == shape + 1 || *end != ',') {
+    if (end == shape + 1 || *end != ',')
         return false;
-    }
     shape = end + 1;
     npy->columns = strtoull(shape, &end, 10);
     return end != shape && strspn(end, ", ") < 4 &&
@@ -130,12 +124,10 @@ static int take_rows(const struct host_source *source, const struct npy *npy,
     const uint8_t *end = source->data + source->bytes;
     uint64_t left = npy->rows, taken = 0;
     bool more = source->feed != NULL;
-    if (npy->fortran && host_source_all(source, &at, &end, error) != 0) {
+    if (npy->fortran && host_source_all(source, &at, &end, error) != 0)
         return error->code;
-    }
-    if (npy->columns > UINT32_MAX || (more && npy->rows > UINT32_MAX)) {
+    if (npy->columns > UINT32_MAX || (more && npy->rows > UINT32_MAX))
         return wrong_size(source, npy, (uint64_t)(end - at), error);
-    }
     if (!more || npy->fortran) {
         uint64_t have = (uint64_t)(end - at);
         return have / row < left || have != left * row
@@ -145,9 +137,8 @@ static int take_rows(const struct host_source *source, const struct npy *npy,
     while (more) {
         uint64_t n = (uint64_t)(end - at) / row;
         n = n < left ? n : left;
-        if (take(source, npy, at, n, mesh, error) != 0) {
+        if (take(source, npy, at, n, mesh, error) != 0)
             return error->code;
-        }
         at += n * row;
         left -= n;
         taken += n * row;
@@ -174,9 +165,8 @@ static int take_points(const struct host_source *source, const struct npy *npy,
             xyz[d] = host_number_at(from + (d * rows + i) * bytes, npy->type,
                                     npy->big);
         }
-        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+        if (host_points_append(mesh->points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -192,9 +182,8 @@ static int take_tetrahedra(const struct host_source *source,
             uint64_t at = npy->fortran ? k * rows + i : 4 * i + k;
             v[k] = host_whole_at(from + at * bytes, npy->type, npy->big);
         }
-        if (host_append_tetrahedron(mesh->tets, v, source, error) != 0) {
+        if (host_append_tetrahedron(mesh->tets, v, source, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -235,12 +224,10 @@ static int read_tetrahedra(const struct host_source *source,
 static int read_npy(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error) {
     struct npy npy = {.type = HOST_NO_NUMBER};
-    if (parse_header(source, &npy, error) != 0) {
+    if (parse_header(source, &npy, error) != 0)
         return error->code;
-    }
-    if (mesh->tets != NULL) {
+    if (mesh->tets != NULL)
         return read_tetrahedra(source, &npy, mesh, error);
-    }
     return read_points(source, &npy, mesh, error);
 }
 
@@ -257,9 +244,8 @@ static void write_header(struct host_output *out, const char *type,
     host_output_bytes(out, "\x93NUMPY\x01\x00", 8);
     host_put_whole(out, (uint64_t)padded, 2, false);
     host_output_text(out, text);
-    for (; n < padded - 1; n++) {
+    for (; n < padded - 1; n++)
         host_output_text(out, " ");
-    }
     host_output_text(out, "\n");
 }
 
@@ -276,9 +262,8 @@ static int write_tetrahedra(struct host_output *out, struct host_output *beside,
     (void)beside;
     (void)points;
     write_header(out, "<u4", tets->count, 4);
-    if (tets->count > 0) {
+    if (tets->count > 0)
         host_put_words(out, tets->v[0], 4 * (size_t)tets->count);
-    }
     return error->code;
 }
 

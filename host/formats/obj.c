@@ -9,14 +9,12 @@
 /* Whether the line goes on behind the backslash at hand; goes there if so. */
 static bool take_continuation(struct host_scan *s) {
     const char *c = s->at;
-    if (c == s->end || *c != '\\') {
+    if (c == s->end || *c != '\\')
         return false;
-    }
     c++;
     c += c < s->end && *c == '\r';
-    if (c < s->end && *c != '\n') {
+    if (c < s->end && *c != '\n')
         return false;
-    }
     s->at = c < s->end ? c + 1 : c;
     return true;
 }
@@ -27,16 +25,13 @@ static int take_number(struct host_scan *s, double *value,
     }
     struct host_scan word = *s; /* a backslash may end it */
     const char *c = s->at;
-    while (c < s->end && strchr(" \t\r\n,;#\\", *c) == NULL) {
+    while (c < s->end && strchr(" \t\r\n,;#\\", *c) == NULL)
         c++;
-    }
     word.end = c;
-    if (word.at == c) {
+    if (word.at == c)
         word.end = s->end;
-    }
-    if (host_scan_double(&word, value, error) != 0) {
+    if (host_scan_double(&word, value, error) != 0)
         return error->code;
-    }
     s->at = word.at;
     return 0;
 }
@@ -64,9 +59,8 @@ static int read_obj(const struct host_source *source, struct host_mesh *mesh,
             (take_number(&s, &xyz[0], error) != 0 ||
              take_number(&s, &xyz[1], error) != 0 ||
              take_number(&s, &xyz[2], error) != 0 ||
-             host_points_append(mesh->points, xyz, 1, error) != 0)) {
+             host_points_append(mesh->points, xyz, 1, error) != 0))
             return error->code;
-        }
         pass_line(&s);
     }
     return 0;

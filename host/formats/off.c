@@ -15,14 +15,11 @@ static int skip_faces(struct host_scan *s, uint64_t faces, uint64_t vertices,
                                   "it begins with; correct these numbers, or "
                                   "get it whole");
         }
-        if (host_scan_unsigned(s, UINT32_MAX, &corners, error) != 0) {
+        if (host_scan_unsigned(s, UINT32_MAX, &corners, error) != 0)
             return error->code;
-        }
-        for (; corners > 0; corners--) {
-            if (host_scan_unsigned(s, vertices - 1, &vertex, error) != 0) {
+        for (; corners > 0; corners--)
+            if (host_scan_unsigned(s, vertices - 1, &vertex, error) != 0)
                 return error->code;
-            }
-        }
         host_scan_next_line(s); /* colours */
     }
     return host_scan_end(s, error,
@@ -37,12 +34,10 @@ static int take_vertex(struct host_scan *s, double xyz[3], uint64_t *columns,
     *columns = 3;
     if (host_scan_double_anywhere(s, &xyz[0], error) != 0 ||
         host_scan_double(s, &xyz[1], error) != 0 ||
-        host_scan_double(s, &xyz[2], error) != 0) {
+        host_scan_double(s, &xyz[2], error) != 0)
         return error->code;
-    }
-    for (; host_scan_more(s); ++*columns) {
+    for (; host_scan_more(s); ++*columns)
         host_scan_word(s, word, sizeof word);
-    }
     return 0;
 }
 
@@ -62,16 +57,14 @@ static int read_off(const struct host_source *source, struct host_mesh *mesh,
     }
     uint64_t count, faces;
     if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
-        host_scan_unsigned(&s, UINT64_MAX / 16, &faces, error) != 0) {
+        host_scan_unsigned(&s, UINT64_MAX / 16, &faces, error) != 0)
         return error->code;
-    }
     host_scan_next_line(&s);
     for (uint64_t i = 0, first = 0; i < count; i++) {
         uint64_t columns;
         double xyz[3];
-        if (take_vertex(&s, xyz, &columns, error) != 0) {
+        if (take_vertex(&s, xyz, &columns, error) != 0)
             return error->code;
-        }
         first = i == 0 ? columns : first;
         if (columns != first) {
             return host_scan_fail(&s, s.at, error,
@@ -79,9 +72,8 @@ static int read_off(const struct host_source *source, struct host_mesh *mesh,
                                   "the first; correct it, or the number of "
                                   "vertices");
         }
-        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+        if (host_points_append(mesh->points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return skip_faces(&s, faces, count, error);
 }

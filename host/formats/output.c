@@ -56,9 +56,8 @@ static void tell(int number) {
 
 /* With its default action back, the signal ends the program on return. */
 static void on_ending(int number) {
-    for (struct host_part *part = parts; part != NULL; part = part->next) {
+    for (struct host_part *part = parts; part != NULL; part = part->next)
         (void)unlink(part->name);
-    }
     tell(number);
     (void)raise(number);
 }
@@ -67,12 +66,10 @@ void host_output_guard(void) {
     struct sigaction action = {.sa_handler = on_ending,
                                .sa_flags = (int)SA_RESETHAND};
     struct sigaction before;
-    for (int i = 0; i < ENDINGS; i++) {
+    for (int i = 0; i < ENDINGS; i++)
         if (sigaction(endings[i], NULL, &before) == 0 &&
-            before.sa_handler == SIG_DFL) { /* nohup has it ignored */
+            before.sa_handler == SIG_DFL) /* nohup has it ignored */
             (void)sigaction(endings[i], &action, NULL);
-        }
-    }
     (void)signal(SIGPIPE, SIG_IGN);
     (void)signal(SIGXFSZ, SIG_IGN);
 }
@@ -82,9 +79,8 @@ void host_output_guard(void) {
 static void hold(sigset_t *before) {
     sigset_t set;
     (void)sigemptyset(&set);
-    for (int i = 0; i < ENDINGS; i++) {
+    for (int i = 0; i < ENDINGS; i++)
         (void)sigaddset(&set, endings[i]);
-    }
     (void)pthread_sigmask(SIG_BLOCK, &set, before);
 }
 
@@ -95,12 +91,10 @@ static void release(const sigset_t *before) {
 /* What has its names is whole, whatever comes after. */
 static void end_guard(void) {
     struct sigaction action;
-    for (int i = 0; i < ENDINGS; i++) {
+    for (int i = 0; i < ENDINGS; i++)
         if (sigaction(endings[i], NULL, &action) == 0 &&
-            action.sa_handler == on_ending) {
+            action.sa_handler == on_ending)
             (void)signal(endings[i], SIG_IGN);
-        }
-    }
 }
 
 static int cannot_make(const char *path, int reason, struct host_error *error) {
@@ -125,9 +119,8 @@ void host_output_clean(const char *path, pid_t writer) {
     if (name != NULL && kept != NULL && made != NULL) {
         (void)unlink(name);
         if (lstat(made, &status) == 0 && host_is_file(&status, target) &&
-            rename(kept, target) != 0) {
+            rename(kept, target) != 0)
             (void)unlink(target);
-        }
         (void)unlink(kept);
         (void)unlink(made);
     }
@@ -172,9 +165,8 @@ static struct host_part *make_part(const char *path, char *target) {
 
 static bool is_ours(const char *name) {
     const struct host_part *part = parts;
-    while (part != NULL && strcmp(part->name, name) != 0) {
+    while (part != NULL && strcmp(part->name, name) != 0)
         part = part->next;
-    }
     return part != NULL;
 }
 
@@ -185,20 +177,17 @@ static int open_part(struct host_part *part) {
     hold(&signals);
     int file = host_create(part->name, 0666);
     if (file < 0 && errno == EEXIST && !is_ours(part->name) &&
-        unlink(part->name) == 0) {
+        unlink(part->name) == 0)
         file = host_create(part->name, 0666);
-    }
     int reason = errno;
-    if (file >= 0) {
+    if (file >= 0)
         (void)fstat(file, &part->file);
-    }
     if (file >= 0 && parts == NULL) {
         parts = part;
     } else if (file >= 0) {
         struct host_part *before = parts;
-        while (before->next != NULL) {
+        while (before->next != NULL)
             before = before->next;
-        }
         before->next = part;
     }
     release(&signals);
@@ -214,9 +203,8 @@ static void drop_part(struct host_part *part) {
         parts = part->next;
     } else {
         struct host_part *before = parts;
-        while (before->next != part) {
+        while (before->next != part)
             before = before->next;
-        }
         before->next = part->next;
     }
     free_part(part);
@@ -236,9 +224,8 @@ static int open_in_place(struct host_output *out, bool pipe,
                          "first, or choose another place",
                          out->path);
     }
-    if (out->file < 0 || (pipe && fcntl(out->file, F_SETFL, O_WRONLY) != 0)) {
+    if (out->file < 0 || (pipe && fcntl(out->file, F_SETFL, O_WRONLY) != 0))
         return cannot_make(out->path, errno, error);
-    }
     return 0;
 }
 
@@ -246,23 +233,18 @@ static int open_in_place(struct host_output *out, bool pipe,
 static int open_file(struct host_output *out, struct host_error *error) {
     struct stat status;
     bool there = stat(out->path, &status) == 0;
-    if (there && S_ISDIR(status.st_mode)) {
+    if (there && S_ISDIR(status.st_mode))
         return cannot_make(out->path, EISDIR, error);
-    }
-    if (there && !S_ISREG(status.st_mode)) {
+    if (there && !S_ISREG(status.st_mode))
         return open_in_place(out, S_ISFIFO(status.st_mode), error);
-    }
-    if (there && access(out->path, W_OK) != 0) {
+    if (there && access(out->path, W_OK) != 0)
         return cannot_make(out->path, errno, error);
-    }
     char *target = host_target(out->path);
-    if (target == NULL) {
+    if (target == NULL)
         return cannot_make(out->path, errno, error);
-    }
     struct host_part *part = make_part(out->path, target);
-    if (part == NULL) {
+    if (part == NULL)
         return host_fail_memory(error, "an output");
-    }
     out->file = open_part(part);
     if (out->file < 0) {
         int reason = errno;
@@ -278,16 +260,14 @@ int host_output_open(struct host_output *out, const char *path,
     *out = (struct host_output){.path = path, .file = -1};
     asked = 1;
     out->buffer = malloc(BUFFER_BYTES);
-    if (out->buffer == NULL) {
+    if (out->buffer == NULL)
         host_fail_memory(error, "an output");
-    } else if (strcmp(path, "-") == 0) {
+    else if (strcmp(path, "-") == 0)
         out->file = STDOUT_FILENO;
-    } else {
+    else
         open_file(out, error);
-    }
-    if (error->code != 0) {
+    if (error->code != 0)
         host_output_close(out, 1, error);
-    }
     return error->code;
 }
 
@@ -296,9 +276,8 @@ int host_output_probe(const char *path, struct host_error *error) {
     struct stat status;
     if (host_output_open(&out, path, error) == 0) {
         struct host_error dropped = {.code = HOST_BROKEN}; /* remove it */
-        if (fstat(out.file, &status) == 0 && S_ISFIFO(status.st_mode)) {
+        if (fstat(out.file, &status) == 0 && S_ISFIFO(status.st_mode))
             out.file = -1; /* until the program ends */
-        }
         (void)host_output_close(&out, 1, &dropped);
     }
     return error->code;
@@ -342,9 +321,8 @@ void host_output_bytes(struct host_output *out, const void *bytes, size_t n) {
         }
         from += part;
         n -= part;
-        if (out->used == BUFFER_BYTES) {
+        if (out->used == BUFFER_BYTES)
             flush(out);
-        }
     }
 }
 
@@ -365,9 +343,8 @@ static void finish(struct host_output *out, struct host_error *error) {
     if (out->file >= 0) {
         flush(out);
         if (out->file != STDOUT_FILENO && close(out->file) != 0 &&
-            out->failure == 0) {
+            out->failure == 0)
             out->failure = errno;
-        }
         out->file = -1;
     }
     if (out->failure == EPIPE) {
@@ -389,9 +366,8 @@ int host_output_close(struct host_output *out, size_t n,
         free(out[i].buffer);
     }
     for (size_t i = 0; i < n; i++) {
-        if (out[i].part != NULL && error->code != 0) {
+        if (out[i].part != NULL && error->code != 0)
             drop_part(out[i].part);
-        }
         out[i] = (struct host_output){.file = -1};
     }
     return error->code;
@@ -414,12 +390,10 @@ static bool name_part(struct host_part *part) {
 }
 
 static void forget_names(const struct host_part *part) {
-    if (part->marked) {
+    if (part->marked)
         (void)unlink(part->made);
-    }
-    if (part->keeps) {
+    if (part->keeps)
         (void)unlink(part->kept);
-    }
 }
 
 /* The path of an output whose former file could not be kept; NULL: none.  A
@@ -440,9 +414,8 @@ static const char *take_names_back(void) {
 /* All of them get their names, or none. */
 static int name_all(struct host_error *error) {
     struct host_part *part = parts;
-    while (part != NULL && name_part(part)) {
+    while (part != NULL && name_part(part))
         part = part->next;
-    }
     if (part != NULL) {
         int reason = errno;
         const char *lost = take_names_back();
@@ -466,30 +439,26 @@ static int name_all(struct host_error *error) {
 int host_output_commit(struct host_error *error) {
     sigset_t signals;
     hold(&signals);
-    if (error->code == 0 && name_all(error) == 0) {
+    if (error->code == 0 && name_all(error) == 0)
         end_guard();
-    }
-    while (parts != NULL) {
+    while (parts != NULL)
         drop_part(parts);
-    }
     release(&signals);
     return error->code;
 }
 
 int host_output_printed(struct host_error *error) {
     errno = 0;
-    if (fflush(stdout) == 0 && ferror(stdout) == 0) {
+    if (fflush(stdout) == 0 && ferror(stdout) == 0)
         return error->code;
-    }
     if (errno == 0) { /* an earlier write failed: one more says why */
         clearerr(stdout);
         (void)(putchar('\n') == EOF || fflush(stdout));
     }
     int reason = errno;
-    if (reason == 0 && write(STDOUT_FILENO, "\n", 1) < 0) {
+    if (reason == 0 && write(STDOUT_FILENO, "\n", 1) < 0)
         reason = errno; /* as an earlier write had it, of a longer text */
-    }
-    __fpurge(stdout); /* nor is it tried again */
+    __fpurge(stdout);   /* nor is it tried again */
     clearerr(stdout);
     return host_fail(error, HOST_INPUT, "standard output: %s; %s",
                      reason != 0 ? strerror(reason) : "writing failed",

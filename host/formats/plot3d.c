@@ -26,9 +26,8 @@ static bool has(const struct cursor *c, uint64_t bytes) {
 }
 
 static bool whole(struct cursor *c, uint64_t *value) {
-    if (!has(c, 4)) {
+    if (!has(c, 4))
         return false;
-    }
     *value = host_whole_at(c->source->data + c->at, HOST_U32, c->v.big);
     c->at += 4;
     return true;
@@ -37,9 +36,8 @@ static bool whole(struct cursor *c, uint64_t *value) {
 /* With marks every record's length stands before and after it. */
 static bool open_record(struct cursor *c, uint64_t bytes) {
     uint64_t length;
-    if (!c->v.marks) {
+    if (!c->v.marks)
         return has(c, bytes);
-    }
     return whole(c, &length) && length == bytes && has(c, bytes);
 }
 
@@ -52,9 +50,8 @@ static bool dimensions(struct cursor *c, uint64_t *points) {
     uint64_t n = 1;
     for (int d = 0; d < 3; d++) {
         uint64_t side;
-        if (!whole(c, &side) || side == 0 || side > UINT32_MAX / n) {
+        if (!whole(c, &side) || side == 0 || side > UINT32_MAX / n)
             return false;
-        }
         n *= side;
     }
     *points = n;
@@ -71,9 +68,8 @@ static int append_block(struct cursor *c, uint64_t n,
             xyz[d] =
                 host_number_at(data + (d * n + i) * bytes, c->v.type, c->v.big);
         }
-        if (host_points_append(points, xyz, 1, error) != 0) {
+        if (host_points_append(points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -86,29 +82,23 @@ static bool walk(const struct host_source *source, struct variant v,
     uint64_t blocks = 1;
     if (v.blocks &&
         (!open_record(&c, 4) || !whole(&c, &blocks) || !close_record(&c, 4) ||
-         blocks == 0 || blocks > BLOCKS_MAX || !open_record(&c, 12 * blocks))) {
+         blocks == 0 || blocks > BLOCKS_MAX || !open_record(&c, 12 * blocks)))
         return false;
-    }
-    if (!v.blocks && !open_record(&c, 12)) {
+    if (!v.blocks && !open_record(&c, 12))
         return false;
-    }
     struct cursor sizes = c; /* read again, block by block */
     c.at += 12 * (size_t)blocks;
-    if (!close_record(&c, 12 * blocks)) {
+    if (!close_record(&c, 12 * blocks))
         return false;
-    }
     for (uint64_t b = 0; b < blocks; b++) {
         uint64_t n, each = 3 * host_number_bytes(v.type) + (v.iblank ? 4 : 0);
-        if (!dimensions(&sizes, &n) || !open_record(&c, n * each)) {
+        if (!dimensions(&sizes, &n) || !open_record(&c, n * each))
             return false;
-        }
-        if (points != NULL && append_block(&c, n, points, error) != 0) {
+        if (points != NULL && append_block(&c, n, points, error) != 0)
             return false;
-        }
         c.at += (size_t)(n * each);
-        if (!close_record(&c, n * each)) {
+        if (!close_record(&c, n * each))
             return false;
-        }
     }
     return c.at == source->bytes;
 }

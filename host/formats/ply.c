@@ -54,9 +54,8 @@ static int header_property(struct ply *ply, struct host_error *error) {
         host_scan_word(&ply->scan, word, sizeof word);
         p.count = host_number_named(word);
         host_scan_word(&ply->scan, word, sizeof word);
-        if (p.count == HOST_NO_NUMBER) {
+        if (p.count == HOST_NO_NUMBER)
             return damaged(ply, error, "an unknown type; correct the header");
-        }
     }
     p.type = host_number_named(word);
     if (p.type == HOST_NO_NUMBER || e->properties == PROPERTIES_MAX) {
@@ -65,20 +64,16 @@ static int header_property(struct ply *ply, struct host_error *error) {
                        "the header");
     }
     host_scan_word(&ply->scan, word, sizeof word);
-    for (int d = 0; d < 3; d++) {
-        if (word[0] == "xyz"[d] && word[1] == '\0' &&
-            p.count == HOST_NO_NUMBER) {
+    for (int d = 0; d < 3; d++)
+        if (word[0] == "xyz"[d] && word[1] == '\0' && p.count == HOST_NO_NUMBER)
             e->axis[d] = e->properties;
-        }
-    }
     e->property[e->properties++] = p;
     return 0;
 }
 
 static int header_element(struct ply *ply, struct host_error *error) {
-    if (ply->elements == ELEMENTS_MAX) {
+    if (ply->elements == ELEMENTS_MAX)
         return damaged(ply, error, "more than 16 elements; remove some");
-    }
     struct element *e = &ply->element[ply->elements++];
     *e = (struct element){.axis = {-1, -1, -1}};
     char word[64];
@@ -113,9 +108,8 @@ static int read_header(struct ply *ply, struct host_error *error) {
                            "the header has no end_header; get the file whole");
         }
         if (host_scan_take(&ply->scan, "end_header")) {
-            if (ply->coding != TEXT) { /* the rest has no lines */
+            if (ply->coding != TEXT) /* the rest has no lines */
                 ply->scan.source = NULL;
-            }
             host_scan_next_line(&ply->scan);
             break;
         }
@@ -125,9 +119,8 @@ static int read_header(struct ply *ply, struct host_error *error) {
             : host_scan_take(&ply->scan, "property")
                 ? header_property(ply, error)
                 : 0;
-        if (code != 0) {
+        if (code != 0)
             return code;
-        }
     }
     ply->at = (const uint8_t *)ply->scan.at;
     ply->end = (const uint8_t *)ply->scan.end;
@@ -146,15 +139,12 @@ static int cut_short(struct ply *ply, struct host_error *error, uint64_t row) {
 /* One number of a row, from text or bytes. */
 static int take_number(struct ply *ply, enum host_number type, uint64_t row,
                        double *value, struct host_error *error) {
-    if (ply->coding == TEXT) {
+    if (ply->coding == TEXT)
         return host_scan_double_anywhere(&ply->scan, value, error);
-    }
     size_t bytes = host_number_bytes(type);
-    while ((size_t)(ply->end - ply->at) < bytes) {
-        if (!host_source_more(ply->source, &ply->at, &ply->end)) {
+    while ((size_t)(ply->end - ply->at) < bytes)
+        if (!host_source_more(ply->source, &ply->at, &ply->end))
             return cut_short(ply, error, row);
-        }
-    }
     *value = host_number_at(ply->at, type, ply->coding == BIG);
     ply->at += bytes;
     return 0;
@@ -163,9 +153,8 @@ static int take_number(struct ply *ply, enum host_number type, uint64_t row,
 static int take_list(struct ply *ply, const struct property *p, uint64_t row,
                      struct host_error *error) {
     double count = 0, skipped;
-    if (take_number(ply, p->count, row, &count, error) != 0) {
+    if (take_number(ply, p->count, row, &count, error) != 0)
         return error->code;
-    }
     if (!(count >= 0 && count < 0x1p32 && count == floor(count))) {
         static const char what[] =
             "a list of impossible length; correct the header's numbers of "
@@ -173,11 +162,9 @@ static int take_list(struct ply *ply, const struct property *p, uint64_t row,
         return ply->coding == TEXT ? damaged(ply, error, what)
                                    : host_source_fail(ply->source, error, what);
     }
-    for (uint64_t i = (uint64_t)count; i > 0; i--) {
-        if (take_number(ply, p->type, row, &skipped, error) != 0) {
+    for (uint64_t i = (uint64_t)count; i > 0; i--)
+        if (take_number(ply, p->type, row, &skipped, error) != 0)
             return error->code;
-        }
-    }
     return 0;
 }
 
@@ -190,9 +177,8 @@ static int read_element(struct ply *ply, const struct element *e,
             int code = p->count != HOST_NO_NUMBER
                            ? take_list(ply, p, row, error)
                            : take_number(ply, p->type, row, &value[i], error);
-            if (code != 0) {
+            if (code != 0)
                 return code;
-            }
         }
         if (ply->coding == TEXT && host_scan_more(&ply->scan)) {
             return damaged(ply, error,
@@ -203,9 +189,8 @@ static int read_element(struct ply *ply, const struct element *e,
         if (e->vertex) {
             double xyz[3] = {value[e->axis[0]], value[e->axis[1]],
                              value[e->axis[2]]};
-            if (host_points_append(points, xyz, 1, error) != 0) {
+            if (host_points_append(points, xyz, 1, error) != 0)
                 return error->code;
-            }
         }
     }
     return 0;
@@ -215,13 +200,11 @@ static int read_element(struct ply *ply, const struct element *e,
 static int check_end(struct ply *ply, struct host_error *error) {
     static const char what[] = "more follows than the rows that the header "
                                "gives; correct its numbers of rows";
-    if (ply->coding == TEXT) {
+    if (ply->coding == TEXT)
         return host_scan_end(&ply->scan, error, what);
-    }
     do {
-        while (ply->at < ply->end && isspace(*ply->at)) {
+        while (ply->at < ply->end && isspace(*ply->at))
             ply->at++;
-        }
     } while (ply->at == ply->end &&
              host_source_more(ply->source, &ply->at, &ply->end));
     return ply->at == ply->end ? 0 : host_source_fail(ply->source, error, what);
@@ -231,9 +214,8 @@ static int read_ply(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error) {
     struct ply ply = {
         .source = source, .coding = UNKNOWN, .scan = host_scan_source(source)};
-    if (read_header(&ply, error) != 0) {
+    if (read_header(&ply, error) != 0)
         return error->code;
-    }
     bool any = false;
     for (int i = 0; i < ply.elements; i++) {
         const struct element *e = &ply.element[i];
@@ -242,9 +224,8 @@ static int read_ply(const struct host_source *source, struct host_mesh *mesh,
                                     "the vertices have not all of x, y and z; "
                                     "correct the header");
         }
-        if (read_element(&ply, e, mesh->points, error) != 0) {
+        if (read_element(&ply, e, mesh->points, error) != 0)
             return error->code;
-        }
         any = any || e->vertex;
     }
     return any ? check_end(&ply, error)
@@ -258,9 +239,8 @@ static void write_ply(struct host_output *out,
                   points->count,
                   "\nproperty double x\nproperty double y\n"
                   "property double z\nend_header\n");
-    for (uint64_t i = 0; i < 3 * points->count; i++) {
+    for (uint64_t i = 0; i < 3 * points->count; i++)
         host_put_double(out, points->xyz[i], false);
-    }
 }
 
 const struct host_format host_format_ply = {

@@ -57,9 +57,8 @@ static bool ends_in_cr(const struct host_source *source) {
     const uint8_t *lf = memchr(data, '\n', source->bytes);
     const uint8_t *cr =
         memchr(data, '\r', (size_t)((lf == NULL ? end : lf) - data));
-    while (cr != NULL && cr < end && *cr == '\r') {
+    while (cr != NULL && cr < end && *cr == '\r')
         cr++;
-    }
     return cr != NULL && cr < end && cr != lf &&
            memchr(data, '\0', source->bytes) == NULL;
 }
@@ -71,17 +70,14 @@ static int mend_line_ends(struct host_source *source,
                           const struct host_format *format,
                           struct host_error *error) {
     bool mends = ends_in_cr(source);
-    if ((mends || !format->pieces) && host_source_hold(source, error) != 0) {
+    if ((mends || !format->pieces) && host_source_hold(source, error) != 0)
         return error->code;
-    }
-    if (!mends) {
+    if (!mends)
         return 0;
-    }
     if (source->owned == NULL) {
         source->owned = host_map(source->bytes);
-        if (source->owned == NULL) {
+        if (source->owned == NULL)
             return host_fail_memory(error, source->path);
-        }
         source->capacity = source->bytes;
         memcpy(source->owned, source->data, source->bytes);
         source->data = source->owned;
@@ -108,12 +104,10 @@ static int take_points(struct host_source *source,
         host_source_fail(source, error,
                          "the file holds no point; give one with points");
     }
-    if (error->code == 0) {
+    if (error->code == 0)
         check_finite(source->path, points, error);
-    }
-    if (error->code != 0) {
+    if (error->code != 0)
         host_points_free(points);
-    }
     host_source_close(source);
     return error->code;
 }
@@ -127,9 +121,8 @@ int host_points_read_as(const char *path, const char *format,
                        : host_format_told(format, HOST_READ_POINTS, error);
     bool packed =
         host_is_packed(path) || (format != NULL && host_is_packed(format));
-    if (f != NULL && host_source_begin(&source, path, packed, error) == 0) {
+    if (f != NULL && host_source_begin(&source, path, packed, error) == 0)
         take_points(&source, f, points, error);
-    }
     return error->code;
 }
 
@@ -140,9 +133,8 @@ int host_points_read(const char *path, struct host_points *points,
 
 void host_points_note(const char *path, const struct host_points *points) {
     const char *name = strcmp(path, "-") == 0 ? "stdin" : path;
-    if (points->named) {
+    if (points->named)
         host_note("%s: its first line is taken for names of columns", name);
-    }
     if (points->wide) {
         host_note("%s: the first three columns are x, y and z; those after "
                   "them are passed over%s",
@@ -160,9 +152,8 @@ int host_points_parse(const char *path, const void *data, size_t bytes,
     const struct host_format *format =
         format_of(path, HOST_READ_POINTS, "points", error);
     if (format != NULL &&
-        host_source_wrap(&source, path, data, bytes, error) == 0) {
+        host_source_wrap(&source, path, data, bytes, error) == 0)
         take_points(&source, format, points, error);
-    }
     return error->code;
 }
 
@@ -171,9 +162,8 @@ static const struct host_format *start(const char *path,
                                        struct host_points *points,
                                        struct host_error *error) {
     *tets = (struct host_tetrahedra){0};
-    if (points != NULL) {
+    if (points != NULL)
         *points = (struct host_points){0};
-    }
     return format_of(path, HOST_READ_TETRAHEDRA, "tetrahedra", error);
 }
 
@@ -189,9 +179,8 @@ static int take_tetrahedra(struct host_source *source,
     }
     if (error->code != 0) {
         host_tetrahedra_free(tets);
-        if (points != NULL) {
+        if (points != NULL)
             host_points_free(points);
-        }
     }
     host_source_close(source);
     return error->code;
@@ -202,9 +191,8 @@ int host_tetrahedra_read(const char *path, struct host_tetrahedra *tets,
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
-        host_source_begin(&source, path, host_is_packed(path), error) == 0) {
+        host_source_begin(&source, path, host_is_packed(path), error) == 0)
         take_tetrahedra(&source, format, tets, points, error);
-    }
     return error->code;
 }
 
@@ -215,9 +203,8 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
     struct host_source source;
     const struct host_format *format = start(path, tets, points, error);
     if (format != NULL &&
-        host_source_wrap(&source, path, data, bytes, error) == 0) {
+        host_source_wrap(&source, path, data, bytes, error) == 0)
         take_tetrahedra(&source, format, tets, points, error);
-    }
     return error->code;
 }
 
@@ -248,13 +235,11 @@ static int at_end(const struct host_stream *s, struct host_error *error) {
 
 int host_stream_next(struct host_stream *s, double *value,
                      struct host_error *error) {
-    if (s->text) {
+    if (s->text)
         return host_scan_double_anywhere(&s->scan, value, error);
-    }
     size_t bytes = host_number_bytes(s->type);
-    if ((size_t)(s->end - s->at) < bytes) {
+    if ((size_t)(s->end - s->at) < bytes)
         return at_end(s, error);
-    }
     *value = host_number_at(s->at, s->type, s->big);
     s->at += bytes;
     return 0;
@@ -262,13 +247,11 @@ int host_stream_next(struct host_stream *s, double *value,
 
 int host_stream_whole(struct host_stream *s, uint64_t *value,
                       struct host_error *error) {
-    if (s->text) {
+    if (s->text)
         return host_scan_unsigned(&s->scan, UINT64_MAX - 1, value, error);
-    }
     size_t bytes = host_number_bytes(s->type);
-    if ((size_t)(s->end - s->at) < bytes) {
+    if ((size_t)(s->end - s->at) < bytes)
         return at_end(s, error);
-    }
     *value = host_whole_at(s->at, s->type, s->big);
     s->at += bytes;
     return *value == UINT64_MAX
@@ -282,17 +265,14 @@ int host_stream_skip(struct host_stream *s, uint64_t count,
                      struct host_error *error) {
     if (s->text) {
         double skipped;
-        for (; count > 0; count--) {
-            if (host_scan_double_anywhere(&s->scan, &skipped, error) != 0) {
+        for (; count > 0; count--)
+            if (host_scan_double_anywhere(&s->scan, &skipped, error) != 0)
                 return error->code;
-            }
-        }
         return 0;
     }
     size_t bytes = host_number_bytes(s->type);
-    if ((size_t)(s->end - s->at) / bytes < count) {
+    if ((size_t)(s->end - s->at) / bytes < count)
         return at_end(s, error);
-    }
     s->at += (size_t)count * bytes;
     return 0;
 }
@@ -305,9 +285,8 @@ int host_stream_points(struct host_stream *s, uint64_t rows,
                        struct host_points *points, struct host_error *error) {
     if (!s->text) {
         size_t row = 3 * host_number_bytes(s->type);
-        if ((size_t)(s->end - s->at) / row < rows) {
+        if ((size_t)(s->end - s->at) / row < rows)
             return at_end(s, error);
-        }
         const uint8_t *from = s->at;
         s->at += (size_t)rows * row;
         return host_append_numbers(points, from, rows, row, s->type, s->big,
@@ -315,14 +294,11 @@ int host_stream_points(struct host_stream *s, uint64_t rows,
     }
     for (; rows > 0; rows--) {
         double xyz[3];
-        for (int d = 0; d < 3; d++) {
-            if (host_stream_next(s, &xyz[d], error) != 0) {
+        for (int d = 0; d < 3; d++)
+            if (host_stream_next(s, &xyz[d], error) != 0)
                 return error->code;
-            }
-        }
-        if (host_points_append(points, xyz, 1, error) != 0) {
+        if (host_points_append(points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -333,9 +309,8 @@ enum { VTK_QUAD = 9, VTK_TETRA = 10 };
 static int take_cell(struct host_stream *connectivity, uint64_t size,
                      uint64_t type, uint64_t first,
                      struct host_tetrahedra *tets, struct host_error *error) {
-    if (type <= VTK_QUAD) { /* as numbered, all cells without volume */
+    if (type <= VTK_QUAD) /* as numbered, all cells without volume */
         return host_stream_skip(connectivity, size, error);
-    }
     if (type != VTK_TETRA || size != 4) {
         return host_fail(error, HOST_INPUT,
                          "%s: cell %llu is no tetrahedron of 4 vertices "
@@ -346,9 +321,8 @@ static int take_cell(struct host_stream *connectivity, uint64_t size,
     }
     uint64_t v[4] = {0};
     for (int k = 0; k < 4; k++) {
-        if (host_stream_whole(connectivity, &v[k], error) != 0) {
+        if (host_stream_whole(connectivity, &v[k], error) != 0)
             return error->code;
-        }
         v[k] = v[k] < UINT32_MAX ? v[k] + first : UINT32_MAX;
     }
     return host_append_tetrahedron(tets, v, connectivity->source, error);
@@ -363,9 +337,8 @@ int host_stream_cells(struct host_stream *connectivity,
         uint64_t type = 0, size = 0;
         if (host_stream_whole(types, &type, error) != 0 ||
             host_stream_whole(offsets == NULL ? connectivity : offsets, &size,
-                              error) != 0) {
+                              error) != 0)
             return error->code;
-        }
         if (offsets != NULL) { /* where the cell ends */
             uint64_t to = size;
             if (to < from) {
@@ -376,9 +349,8 @@ int host_stream_cells(struct host_stream *connectivity,
             size = to - from;
             from = to;
         }
-        if (take_cell(connectivity, size, type, first, tets, error) != 0) {
+        if (take_cell(connectivity, size, type, first, tets, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }

@@ -51,11 +51,9 @@ size_t host_number_bytes(enum host_number type) {
 }
 
 enum host_number host_number_named(const char *name) {
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        if (strcasecmp(name, names[i].name) == 0) {
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+        if (strcasecmp(name, names[i].name) == 0)
             return names[i].type;
-        }
-    }
     return HOST_NO_NUMBER;
 }
 
@@ -123,14 +121,11 @@ int host_append_numbers(struct host_points *points, const uint8_t *from,
             memcpy(xyz, from, n * stride);
             from += n * stride;
         }
-        for (size_t i = 0; i < n && !as_here; i++, from += stride) {
-            for (size_t d = 0; d < 3; d++) {
+        for (size_t i = 0; i < n && !as_here; i++, from += stride)
+            for (size_t d = 0; d < 3; d++)
                 xyz[3 * i + d] = host_number_at(from + d * bytes, type, big);
-            }
-        }
-        if (host_points_append(points, xyz, n, error) != 0) {
+        if (host_points_append(points, xyz, n, error) != 0)
             return error->code;
-        }
         rows -= n;
     }
     return 0;
@@ -141,9 +136,8 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
                             const struct host_source *source,
                             struct host_error *error) {
     uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, error);
-    if (row == NULL) {
+    if (row == NULL)
         return error->code;
-    }
     for (int k = 0; k < 4; k++) {
         if (vertex[k] >= UINT32_MAX) {
             return host_fail(error, HOST_INPUT,
@@ -160,9 +154,8 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
 void host_put_whole(struct host_output *out, uint64_t value, size_t bytes,
                     bool big) {
     uint8_t byte[8];
-    for (size_t i = 0; i < bytes; i++) {
+    for (size_t i = 0; i < bytes; i++)
         byte[i] = (uint8_t)(value >> 8 * (big ? bytes - 1 - i : i));
-    }
     host_output_bytes(out, byte, bytes);
 }
 
@@ -177,9 +170,8 @@ void host_put_words(struct host_output *out, const uint32_t *values, size_t n) {
         host_output_bytes(out, values, n * sizeof *values);
         return;
     }
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++)
         host_put_whole(out, values[i], sizeof values[i], false);
-    }
 }
 
 void host_put_doubles(struct host_output *out, const double *values, size_t n) {
@@ -187,9 +179,8 @@ void host_put_doubles(struct host_output *out, const double *values, size_t n) {
         host_output_bytes(out, values, n * sizeof *values);
         return;
     }
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++)
         host_put_double(out, values[i], false);
-    }
 }
 
 /* --- rows ----------------------------------------------------------------- */
@@ -244,9 +235,8 @@ static bool is_digit(char c) {
 /* `to` is before `end`. */
 static unsigned commas_between(const char *from, const char *to,
                                const char *end, bool coordinate) {
-    if (to - from > 1 || *from != ',') {
+    if (to - from > 1 || *from != ',')
         return memchr(from, ',', (size_t)(to - from)) == NULL ? COMMA_NONE : 0;
-    }
     bool zero = coordinate && *to == '0' && end - to > 1 && is_digit(to[1]);
     return zero            ? COMMA_DECIMAL | COMMA_ZERO
            : is_digit(*to) ? COMMA_DECIMAL
@@ -263,12 +253,10 @@ static enum commas commas_of(const char *at, const char *end) {
     unsigned alone = 0, other = 0;
     while (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
         const char *gap = at;
-        while (at < end && strchr(" \t\r,;", *at) != NULL) {
+        while (at < end && strchr(" \t\r,;", *at) != NULL)
             at++;
-        }
-        if (at == gap && !is_digit(*at) && *at != '-' && *at != '+') {
+        if (at == gap && !is_digit(*at) && *at != '-' && *at != '+')
             return COMMAS_PART;
-        }
         if (at == gap) {
             at++;
         } else if (at < end && *at != '\n' && !host_scan_is_comment(at, end)) {
@@ -313,26 +301,21 @@ int host_take_point(struct host_scan *s, bool is_csv,
     unsigned most = is_csv ? 1 : UINT_MAX, commas = 0;
     enum next next = NEXT_NONE;
     const char *line = s->at;
-    if (is_csv && host_csv_begins_empty(s)) {
+    if (is_csv && host_csv_begins_empty(s))
         return wrong_columns(s, 0, NEXT_EMPTY, false, error);
-    }
     for (int d = 0; d < 3; d++) {
-        if (host_scan_double(s, &xyz[d], error) != 0) {
+        if (host_scan_double(s, &xyz[d], error) != 0)
             return error->code;
-        }
         const char *end = s->at;
         next = go_to_field(s, most);
-        if (next == NEXT_FIELD) {
+        if (next == NEXT_FIELD)
             commas |= commas_between(end, s->at, s->end, d < 2);
-        }
-        if (d < 2 && next != NEXT_FIELD) {
+        if (d < 2 && next != NEXT_FIELD)
             return wrong_columns(s, d + 1, next, points->count == 0, error);
-        }
     }
     if (next != NEXT_NONE) {
-        if (check_commas(s, line, commas, points, error) != 0) {
+        if (check_commas(s, line, commas, points, error) != 0)
             return error->code;
-        }
         points->wide = true;
         host_scan_next_line(s);
     } else {
@@ -403,9 +386,8 @@ static struct decimals decimals_of(double value) {
     struct decimals d = {.places = DIGITS - 1 -
                                    (int)floor((exponent - 1) * 0.30102999566)};
     unsigned __int128 power = 1;
-    for (int i = 0; i < d.places; i++) {
+    for (int i = 0; i < d.places; i++)
         power *= 10;
-    }
     unsigned __int128 whole = m * power, mask = ((unsigned __int128)1 << s) - 1;
     unsigned __int128 high = whole + power / 2;
     unsigned __int128 low =
@@ -444,18 +426,16 @@ static size_t print_fixed(char *text, bool negative, uint64_t n, int places) {
     char digits[DOUBLE_BYTES];
     size_t at = sizeof digits;
     for (int i = 0; i < places || n > 0; i++, n /= 10) {
-        if (i == places) {
+        if (i == places)
             digits[--at] = '.';
-        }
         digits[--at] = (char)('0' + n % 10);
     }
     if (sizeof digits - at == (size_t)places) {
         digits[--at] = '.';
         digits[--at] = '0';
     }
-    if (negative) {
+    if (negative)
         digits[--at] = '-';
-    }
     memcpy(text, digits + at, sizeof digits - at);
     return sizeof digits - at;
 }
@@ -475,9 +455,8 @@ static void put_double(struct host_output *out, double value) {
     char text[DOUBLE_BYTES];
     double size = fabs(value);
     if (size < fast_most && size == floor(size)) {
-        if (signbit(value)) {
+        if (signbit(value))
             host_output_text(out, "-");
-        }
         host_output_unsigned(out, (uint64_t)size);
         return;
     }
@@ -495,9 +474,8 @@ static void put_double(struct host_output *out, double value) {
 void host_put_xyz(struct host_output *out, const double *xyz) {
     for (int d = 0; d < 3; d++) {
         put_double(out, xyz[d] + 0.0);
-        if (d < 2) {
+        if (d < 2)
             host_output_text(out, " ");
-        }
     }
 }
 

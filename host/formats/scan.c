@@ -10,9 +10,8 @@ struct host_scan host_scan_start(const char *path, const void *data,
                                  size_t bytes) {
     const char *text = data;
     struct host_scan s = {path, text, text, text + bytes, 0, NULL, NULL};
-    if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) {
+    if (bytes >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0)
         s.at += 3;
-    }
     return s;
 }
 
@@ -20,18 +19,15 @@ struct host_scan host_scan_start(const char *path, const void *data,
 static void fill(struct host_scan *s) {
     const uint8_t *at = (const uint8_t *)s->at, *end = (const uint8_t *)s->end;
     const char *last = NULL;
-    for (const char *c = s->start; c < s->at; c++) {
+    for (const char *c = s->start; c < s->at; c++)
         s->lines_before += *c == '\n';
-    }
-    while (last == NULL && host_source_more(s->source, &at, &end)) {
+    while (last == NULL && host_source_more(s->source, &at, &end))
         last = memrchr(at, '\n', (size_t)(end - at));
-    }
     s->start = s->at = (const char *)at;
     s->end = (const char *)end;
     s->whole = last == NULL ? s->end : last + 1;
-    if (last == NULL) {
+    if (last == NULL)
         s->source = NULL; /* the file has ended */
-    }
 }
 
 struct host_scan host_scan_source(const struct host_source *source) {
@@ -41,9 +37,8 @@ struct host_scan host_scan_source(const struct host_source *source) {
         const char *last = memrchr(s.start, '\n', source->bytes);
         s.source = source;
         s.whole = last == NULL ? s.start : last + 1;
-        if (s.at >= s.whole) {
+        if (s.at >= s.whole)
             fill(&s);
-        }
     }
     return s;
 }
@@ -65,9 +60,8 @@ bool host_scan_is_comment(const char *at, const char *end) {
 }
 
 bool host_scan_more(struct host_scan *s) {
-    while (s->at < s->end && is_blank(*s->at)) {
+    while (s->at < s->end && is_blank(*s->at))
         s->at++;
-    }
     return s->at < s->end && *s->at != '\n' &&
            !host_scan_is_comment(s->at, s->end);
 }
@@ -75,16 +69,14 @@ bool host_scan_more(struct host_scan *s) {
 void host_scan_next_line(struct host_scan *s) {
     const char *line = memchr(s->at, '\n', (size_t)(s->end - s->at));
     s->at = line == NULL ? s->end : line + 1;
-    if (s->source != NULL && s->at >= s->whole) {
+    if (s->source != NULL && s->at >= s->whole)
         fill(s);
-    }
 }
 
 bool host_scan_skip_blank_lines(struct host_scan *s) {
     while (!host_scan_more(s)) {
-        if (s->at == s->end) {
+        if (s->at == s->end)
             return false;
-        }
         host_scan_next_line(s);
     }
     return true;
@@ -138,15 +130,13 @@ static const uint64_t power10[20] = {1,
  * even; the result is a normal number by the ranges of the caller. */
 static double rounded(uint64_t q, bool sticky, int exponent) {
     int shift = 11 - __builtin_clzll(q);
-    if (shift <= 0) {
+    if (shift <= 0)
         return ldexp((double)q, exponent); /* 53 bits or fewer; sticky = 0 */
-    }
     uint64_t mantissa = q >> shift;
     uint64_t rest = q & ((UINT64_C(1) << shift) - 1);
     uint64_t half = UINT64_C(1) << (shift - 1);
-    if (rest > half || (rest == half && (sticky || (mantissa & 1) != 0))) {
+    if (rest > half || (rest == half && (sticky || (mantissa & 1) != 0)))
         mantissa++;
-    }
     return ldexp((double)mantissa, exponent + shift);
 }
 
@@ -161,9 +151,8 @@ static double scaled(uint64_t m, int power) {
     if (power >= 0) {
         unsigned __int128 p = (unsigned __int128)m * power10[power];
         uint64_t high = (uint64_t)(p >> 64);
-        if (high == 0) {
+        if (high == 0)
             return rounded((uint64_t)p, false, 0);
-        }
         int lead = __builtin_clzll(high);
         uint64_t q = (uint64_t)((p << lead) >> 64);
         return rounded(q, (uint64_t)(p << lead) != 0, 64 - lead);
@@ -182,17 +171,14 @@ static double slow_double(const char *first, const char *last) {
     char buffer[512];
     size_t n = (size_t)(last - first);
     char *copy = n < sizeof buffer ? buffer : malloc(n + 1);
-    if (copy == NULL) {
+    if (copy == NULL)
         return NAN;
-    }
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++)
         copy[i] = first[i] == 'd' || first[i] == 'D' ? 'e' : first[i];
-    }
     copy[n] = '\0';
     double value = strtod(copy, NULL);
-    if (copy != buffer) {
+    if (copy != buffer)
         free(copy);
-    }
     return value;
 }
 
@@ -221,9 +207,8 @@ static const char *take_digits(const char *c, const char *end,
 
 static struct decimal parse_decimal(const char *c, const char *end) {
     struct decimal n = {.exact = true};
-    if (c < end && (*c == '-' || *c == '+')) {
+    if (c < end && (*c == '-' || *c == '+'))
         n.negative = *c++ == '-';
-    }
     int taken = 0;
     const char *integer = c;
     c = take_digits(c, end, &n, &taken);
@@ -235,16 +220,14 @@ static struct decimal parse_decimal(const char *c, const char *end) {
         ptrdiff_t places = c - fraction;
         n.power = places < 10000 ? -(int)places : -10000;
     }
-    if (digits == 0) {
+    if (digits == 0)
         return n;
-    }
     if (c < end && (*c == 'e' || *c == 'E' || *c == 'd' || *c == 'D')) {
         c++;
         bool down = c < end && *c == '-';
         c += c < end && (*c == '-' || *c == '+');
-        if (c == end || !is_digit(*c)) {
+        if (c == end || !is_digit(*c))
             return n;
-        }
         int power = 0;
         while (c < end && is_digit(*c)) {
             power = power < 100000 ? 10 * power + (*c - '0') : power;
@@ -262,9 +245,8 @@ static size_t word_length(struct host_scan *s);
 static bool is_binary(struct host_scan *s, struct host_error *error) {
     size_t n = word_length(s);
     const char *nul = n > 0 ? memchr(s->at, '\0', n) : NULL;
-    if (nul == NULL) {
+    if (nul == NULL)
         return false;
-    }
     host_scan_fail(s, nul, error,
                    "a NUL byte where text is due: the file is binary or UTF-16 "
                    "perhaps; give it the extension of its format, or say it "
@@ -275,9 +257,8 @@ static bool is_binary(struct host_scan *s, struct host_error *error) {
 static int no_number(struct host_scan *s, struct host_error *error) {
     char word[48], text[160];
     const char *at = s->at;
-    if (is_binary(s, error)) {
+    if (is_binary(s, error))
         return error->code;
-    }
     host_scan_word(s, word, sizeof word);
     const char *bare = word + (word[0] == '-' || word[0] == '+');
     if (word[0] == '\0') {
@@ -308,9 +289,8 @@ int host_scan_double(struct host_scan *s, double *value,
     }
     struct decimal n = parse_decimal(s->at, s->end);
     if (n.end == NULL ||
-        (n.end < s->end && !is_blank(*n.end) && !is_end(*n.end))) {
+        (n.end < s->end && !is_blank(*n.end) && !is_end(*n.end)))
         return no_number(s, error);
-    }
     if (!n.exact || (n.mantissa != 0 && (n.power < -19 || n.power > 19))) {
         *value = slow_double(s->at, n.end);
         if (!isfinite(*value)) {
@@ -345,13 +325,11 @@ int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
     }
     const char *c = s->at;
     uint64_t n = 0;
-    while (c < s->end && is_digit(*c) && n <= (UINT64_MAX - 9) / 10) {
+    while (c < s->end && is_digit(*c) && n <= (UINT64_MAX - 9) / 10)
         n = 10 * n + (uint64_t)(*c++ - '0');
-    }
     if (c == s->at || (c < s->end && !is_blank(*c) && !is_end(*c))) {
-        if (is_binary(s, error)) {
+        if (is_binary(s, error))
             return error->code;
-        }
         return host_scan_fail(s, s->at, error,
                               "a whole number is due here; correct it");
     }
@@ -368,13 +346,11 @@ int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
 /* --- Words ------------------------------------------------------------ */
 
 static size_t word_length(struct host_scan *s) {
-    if (!host_scan_more(s)) {
+    if (!host_scan_more(s))
         return 0;
-    }
     const char *c = s->at;
-    while (c < s->end && !is_blank(*c) && !is_end(*c)) {
+    while (c < s->end && !is_blank(*c) && !is_end(*c))
         c++;
-    }
     return (size_t)(c - s->at);
 }
 
@@ -388,9 +364,8 @@ void host_scan_word(struct host_scan *s, char *word, size_t size) {
 
 bool host_scan_take(struct host_scan *s, const char *word) {
     size_t n = word_length(s);
-    if (n != strlen(word) || strncasecmp(s->at, word, n) != 0) {
+    if (n != strlen(word) || strncasecmp(s->at, word, n) != 0)
         return false;
-    }
     s->at += n;
     return true;
 }

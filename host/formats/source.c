@@ -52,9 +52,8 @@ int host_source_fail(const struct host_source *source, struct host_error *error,
  * is looked up once, and only for a large file; share: the part of it. */
 static size_t most_bytes(size_t *most, size_t bytes, size_t held,
                          unsigned share) {
-    if (bytes <= ALWAYS) {
+    if (bytes <= ALWAYS)
         return ALWAYS;
-    }
     if (*most == 0) {
         uint64_t part = (host_memory_available() + held) / share;
         *most = (size_t)(part > ALWAYS ? part : ALWAYS);
@@ -102,23 +101,19 @@ int host_source_unpacks(const struct host_source *source, uint64_t packed,
 /* Room for `more` bytes, or for as many as it may have, if for any. */
 static int reserve(struct host_source *source, size_t more,
                    struct host_error *error) {
-    if (source->capacity - source->bytes >= more) {
+    if (source->capacity - source->bytes >= more)
         return 0;
-    }
     size_t wanted = 2 * source->capacity + more;
     size_t most =
         most_bytes(&source->most, wanted, source->capacity, PLAIN_SHARE);
-    if (source->bytes >= most) {
+    if (source->bytes >= most)
         return too_large(source->path, source->bytes, most, error);
-    }
     size_t capacity = wanted < most ? wanted : most;
-    if (capacity == source->capacity) {
+    if (capacity == source->capacity)
         return 0;
-    }
     void *owned = host_remap(source->owned, source->capacity, capacity);
-    if (owned == NULL) {
+    if (owned == NULL)
         return host_fail_memory(error, source->path);
-    }
     source->owned = owned;
     source->data = owned;
     source->capacity = capacity;
@@ -136,36 +131,30 @@ static int read_all(struct host_source *source, int file,
         }
         if (S_ISREG(status.st_mode) && status.st_size > 0) {
             hint = (size_t)status.st_size + 1;
-            if (source->bound > 0 && hint - 1 > source->bound) {
+            if (source->bound > 0 && hint - 1 > source->bound)
                 return too_long(source, error);
-            }
             size_t most = most_bytes(&source->most, hint, 0, PLAIN_SHARE);
-            if (hint > most) {
+            if (hint > most)
                 return too_large(source->path, hint - 1, most, error);
-            }
         }
     }
     for (;;) {
-        if (reserve(source, hint, error) != 0) {
+        if (reserve(source, hint, error) != 0)
             return error->code;
-        }
         ssize_t n = read(file, (char *)source->owned + source->bytes,
                          source->capacity - source->bytes);
-        if (n < 0 && errno == EINTR) {
+        if (n < 0 && errno == EINTR)
             continue;
-        }
         if (n < 0) {
             return host_fail(error, HOST_INPUT,
                              "%s: cannot be read (%s); check the disk",
                              source->path, strerror(errno));
         }
-        if (n == 0) {
+        if (n == 0)
             return 0;
-        }
         source->bytes += (size_t)n;
-        if (source->bound > 0 && source->bytes > source->bound) {
+        if (source->bound > 0 && source->bytes > source->bound)
             return too_long(source, error);
-        }
         host_progress_add((uint64_t)n);
         hint = (size_t)1 << 16;
     }
@@ -181,9 +170,8 @@ static bool fault(struct host_feed *feed, const char *path, const char *what) {
 /* Whether there are packed bytes left. */
 static bool take_packed(struct host_feed *feed, const char *path) {
     ssize_t n = 0;
-    if (feed->z.avail_in > 0 || feed->file < 0) {
+    if (feed->z.avail_in > 0 || feed->file < 0)
         return feed->z.avail_in > 0;
-    }
     do {
         n = read(feed->file, feed->packed, sizeof feed->packed);
     } while (n < 0 && errno == EINTR);
@@ -221,9 +209,8 @@ static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
     feed->z.next_out = to;
     feed->z.avail_out = (uInt)room;
     while (!feed->ended && feed->fault.code == 0 && feed->z.avail_out == room) {
-        if (feed->between && !begins_another(feed, path)) {
+        if (feed->between && !begins_another(feed, path))
             break;
-        }
         if (!take_packed(feed, path)) {
             (void)fault(feed, path,
                         "the packed data is cut short; get the file whole");
@@ -231,9 +218,8 @@ static size_t unpack(struct host_feed *feed, const char *path, uint8_t *to,
         }
         int status = inflate(&feed->z, Z_NO_FLUSH);
         feed->between = status == Z_STREAM_END;
-        if (status != Z_OK && status != Z_BUF_ERROR && status != Z_STREAM_END) {
+        if (status != Z_OK && status != Z_BUF_ERROR && status != Z_STREAM_END)
             (void)fault(feed, path, DAMAGED);
-        }
     }
     return room - feed->z.avail_out;
 }
@@ -263,9 +249,8 @@ static bool move_window(const struct host_source *source, const uint8_t **at,
 
 bool host_source_more(const struct host_source *source, const uint8_t **at,
                       const uint8_t **end) {
-    if (source->feed == NULL) {
+    if (source->feed == NULL)
         return false;
-    }
     if (*end - *at >= WINDOW_MAX) {
         return fault(source->feed, source->path,
                      "a line of more than 16 MB; give a file of this format");
@@ -292,9 +277,8 @@ int host_source_all(const struct host_source *source, const uint8_t **at,
 
 int host_source_fault(const struct host_source *source,
                       struct host_error *error) {
-    if (source->feed != NULL && source->feed->fault.code != 0) {
+    if (source->feed != NULL && source->feed->fault.code != 0)
         *error = source->feed->fault;
-    }
     return error->code;
 }
 
@@ -306,9 +290,8 @@ static int check_end(const struct host_source *source,
     uint8_t end[4];
     if (feed->size < sizeof end ||
         pread(feed->file, end, sizeof end, (off_t)(feed->size - sizeof end)) !=
-            (ssize_t)sizeof end) {
+            (ssize_t)sizeof end)
         return 0;
-    }
     size_t bytes = (size_t)end[0] | (size_t)end[1] << 8 | (size_t)end[2] << 16 |
                    (size_t)end[3] << 24;
     size_t most = most_bytes(&feed->most, bytes, 0, PACKED_SHARE);
@@ -324,9 +307,8 @@ int host_source_hold(struct host_source *source, struct host_error *error) {
         source->data = at;
         source->bytes = (size_t)(end - at);
     }
-    if (error->code != 0) {
+    if (error->code != 0)
         host_source_close(source);
-    }
     return error->code;
 }
 
@@ -339,13 +321,11 @@ static int begin_unpacking(struct host_source *source, int file,
     struct host_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL || (feed->window = host_map(WINDOW)) == NULL ||
         inflateInit2(&feed->z, 15 + 16) != Z_OK) {
-        if (feed != NULL) {
+        if (feed != NULL)
             host_unmap(feed->window, WINDOW);
-        }
         free(feed);
-        if (file > 0) {
+        if (file > 0)
             (void)close(file);
-        }
         return host_fail_memory(error, "unpacking");
     }
     feed->capacity = WINDOW;
@@ -353,9 +333,8 @@ static int begin_unpacking(struct host_source *source, int file,
     feed->z.next_in = (z_const Bytef *)source->data;
     feed->z.avail_in = (uInt)source->bytes;
     feed->taken = source->bytes;
-    if (file >= 0 && fstat(file, &status) == 0 && S_ISREG(status.st_mode)) {
+    if (file >= 0 && fstat(file, &status) == 0 && S_ISREG(status.st_mode))
         feed->size = (uint64_t)status.st_size;
-    }
     source->feed = feed;
     const uint8_t *at = feed->window, *end = at;
     /* The first window is filled, as readers take headers from it. */
@@ -369,12 +348,10 @@ static int begin_unpacking(struct host_source *source, int file,
 }
 
 static int finish(struct host_source *source, struct host_error *error) {
-    if (error->code == 0 && source->bytes == 0) {
+    if (error->code == 0 && source->bytes == 0)
         host_source_fail(source, error, "the file is empty; give another");
-    }
-    if (error->code != 0) {
+    if (error->code != 0)
         host_source_close(source);
-    }
     return error->code;
 }
 
@@ -393,9 +370,8 @@ static int open_source(struct host_source *source, const char *path,
         begin_unpacking(source, file, error);
     } else {
         read_all(source, file, error);
-        if (!standard) {
+        if (!standard)
             (void)close(file);
-        }
     }
     return finish(source, error);
 }
@@ -440,9 +416,8 @@ void host_source_close(struct host_source *source) {
     if (feed != NULL) {
         (void)inflateEnd(&feed->z);
         host_unmap(feed->window, feed->capacity);
-        if (feed->file > 0) {
+        if (feed->file > 0)
             (void)close(feed->file);
-        }
         free(feed);
     }
     host_unmap(source->owned, source->capacity);

@@ -16,12 +16,10 @@ enum {
 static int read_binary(const struct host_source *source, uint64_t facets,
                        struct host_points *points, struct host_error *error) {
     const uint8_t *facet = source->data + START_BYTES;
-    for (; facets > 0; facets--, facet += FACET_BYTES) {
+    for (; facets > 0; facets--, facet += FACET_BYTES)
         if (host_append_numbers(points, facet + NORMAL_BYTES, 3, CORNER_BYTES,
-                                HOST_F32, false, error) != 0) {
+                                HOST_F32, false, error) != 0)
             return error->code;
-        }
-    }
     return 0;
 }
 
@@ -46,24 +44,19 @@ static int take_facet(struct host_scan *s, struct host_points *points,
     }
     if (status != 0 ||
         expect(s, "outer", "'outer loop' is due; correct it", error) != 0 ||
-        expect(s, "loop", "'loop' is due; correct it", error) != 0) {
+        expect(s, "loop", "'loop' is due; correct it", error) != 0)
         return error->code;
-    }
     for (int corner = 0; corner < 3; corner++) {
         if (expect(s, "vertex",
                    "'vertex' is due, three times a facet; correct it, or get "
                    "the file whole",
-                   error) != 0) {
+                   error) != 0)
             return error->code;
-        }
-        for (int d = 0; d < 3; d++) {
-            if (host_scan_double_anywhere(s, &xyz[d], error) != 0) {
+        for (int d = 0; d < 3; d++)
+            if (host_scan_double_anywhere(s, &xyz[d], error) != 0)
                 return error->code;
-            }
-        }
-        if (host_points_append(points, xyz, 1, error) != 0) {
+        if (host_points_append(points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     return expect(s, "endloop", "'endloop' is due; correct it", error) != 0
                ? error->code
@@ -96,19 +89,16 @@ static int read_stl(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error) {
     uint64_t facets = 0;
     bool whole = source->bytes >= START_BYTES;
-    if (whole) {
+    if (whole)
         facets = host_whole_at(source->data + HEADER_BYTES, HOST_U32, false);
-    }
-    if (whole && source->bytes - START_BYTES == FACET_BYTES * facets) {
+    if (whole && source->bytes - START_BYTES == FACET_BYTES * facets)
         return read_binary(source, facets, mesh->points, error);
-    }
     struct host_scan s =
         host_scan_start(source->path, source->data, source->bytes);
     const uint64_t due = START_BYTES + FACET_BYTES * facets;
     struct host_scan first = s;
-    if (host_scan_skip_blank_lines(&first) && host_scan_take(&first, "solid")) {
+    if (host_scan_skip_blank_lines(&first) && host_scan_take(&first, "solid"))
         return read_text(s, mesh->points, error);
-    }
     return host_fail(error, HOST_INPUT,
                      "%s: neither text that begins with 'solid', nor binary: "
                      "%zu bytes where %llu facets take %llu; get the file "

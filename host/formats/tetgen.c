@@ -15,9 +15,8 @@ static int read_node(const struct host_source *source, struct host_mesh *mesh,
     struct host_scan s = host_scan_source(source);
     uint64_t count, dimensions, base = 0;
     if (host_scan_unsigned(&s, UINT32_MAX - 1, &count, error) != 0 ||
-        host_scan_unsigned(&s, UINT32_MAX, &dimensions, error) != 0) {
+        host_scan_unsigned(&s, UINT32_MAX, &dimensions, error) != 0)
         return error->code;
-    }
     if (dimensions != 3) {
         return host_scan_fail(&s, s.at, error,
                               "the points have not 3 dimensions; give a .node "
@@ -26,9 +25,8 @@ static int read_node(const struct host_source *source, struct host_mesh *mesh,
     host_scan_next_line(&s);
     for (uint64_t i = 0; i < count; i++) {
         uint64_t number;
-        if (host_scan_unsigned(&s, UINT32_MAX, &number, error) != 0) {
+        if (host_scan_unsigned(&s, UINT32_MAX, &number, error) != 0)
             return error->code;
-        }
         base = i == 0 ? number : base;
         if (number != base + i || base > 1) {
             return host_scan_fail(&s, s.at, error,
@@ -36,15 +34,12 @@ static int read_node(const struct host_source *source, struct host_mesh *mesh,
                                   "without gaps; renumber them");
         }
         double xyz[3];
-        for (int d = 0; d < 3; d++) {
-            if (host_scan_double(&s, &xyz[d], error) != 0) {
+        for (int d = 0; d < 3; d++)
+            if (host_scan_double(&s, &xyz[d], error) != 0)
                 return error->code;
-            }
-        }
         host_scan_next_line(&s); /* attributes and boundary marker */
-        if (host_points_append(mesh->points, xyz, 1, error) != 0) {
+        if (host_points_append(mesh->points, xyz, 1, error) != 0)
             return error->code;
-        }
     }
     mesh->points->base = (uint32_t)base;
     return host_scan_end(&s, error,
@@ -85,27 +80,23 @@ struct neighbours {
 
 static uint32_t twin(const struct host_group *group, size_t i) {
     const struct host_facet *f = group->facet;
-    if (i > 0 && f[i - 1].others == f[i].others) {
+    if (i > 0 && f[i - 1].others == f[i].others)
         return f[i - 1].tet;
-    }
-    if (i + 1 < group->count && f[i + 1].others == f[i].others) {
+    if (i + 1 < group->count && f[i + 1].others == f[i].others)
         return f[i + 1].tet;
-    }
     return UINT32_MAX;
 }
 
 static int first_sweep(struct neighbours *n, struct host_error *error) {
     for (uint32_t p = 0; p < n->adjacency.vertices; p++) {
-        if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0) {
+        if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0)
             return error->code;
-        }
         for (size_t i = 0; i < n->group.count; i++) {
             const struct host_facet *f = &n->group.facet[i];
             uint32_t other = twin(&n->group, i);
             n->hull_facets += other == UINT32_MAX;
-            if (f->corner == 0) {
+            if (f->corner == 0)
                 n->opposite_lowest[f->tet] = other;
-            }
         }
     }
     return 0;
@@ -117,24 +108,20 @@ static int second_group(struct neighbours *n, uint32_t p,
     size_t count = n->adjacency.first_by_lowest[p + 1] - first;
     if (n->capacity < count) {
         void *grown = realloc(n->opposite, 2 * count * sizeof *n->opposite);
-        if (grown == NULL) {
+        if (grown == NULL)
             return host_fail_memory(error, "the tetrahedra at a vertex");
-        }
         n->opposite = grown;
         n->capacity = 2 * count;
     }
-    if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0) {
+    if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0)
         return error->code;
-    }
     for (size_t i = 0; i < n->group.count; i++) {
         const struct host_facet *f = &n->group.facet[i];
-        if (f->corner != 0) {
+        if (f->corner != 0)
             n->opposite[f->tet - first][f->corner] = twin(&n->group, i);
-        }
     }
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         n->opposite[i][0] = n->opposite_lowest[first + i];
-    }
     return 0;
 }
 
@@ -180,9 +167,8 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
         host_put_line(neigh, "", tets->count, " 4\n");
         host_put_line(face, "", n.hull_facets, " 1\n");
         for (uint32_t p = 0; p < points->count; p++) {
-            if (second_group(&n, p, error) != 0) {
+            if (second_group(&n, p, error) != 0)
                 break;
-            }
             write_neighbours(neigh, face, &n, p, points->base, &facets);
         }
     }
@@ -200,9 +186,8 @@ static int read_ele(const struct host_source *source, struct host_mesh *mesh,
     struct host_scan s = host_scan_source(source);
     uint64_t count, corners, base = 0;
     if (host_scan_unsigned(&s, UINT64_MAX / 64, &count, error) != 0 ||
-        host_scan_unsigned(&s, UINT32_MAX, &corners, error) != 0) {
+        host_scan_unsigned(&s, UINT32_MAX, &corners, error) != 0)
         return error->code;
-    }
     if (corners != 4) {
         return host_scan_fail(&s, s.at, error,
                               "elements of other than 4 vertices; give "
@@ -211,9 +196,8 @@ static int read_ele(const struct host_source *source, struct host_mesh *mesh,
     host_scan_next_line(&s);
     for (uint64_t i = 0; i < count; i++) {
         uint64_t number, v[4];
-        if (host_scan_unsigned(&s, UINT64_MAX / 16, &number, error) != 0) {
+        if (host_scan_unsigned(&s, UINT64_MAX / 16, &number, error) != 0)
             return error->code;
-        }
         base = i == 0 ? number : base;
         if (base > 1 || number != base + i) {
             return host_scan_fail(&s, s.at, error,
@@ -226,13 +210,11 @@ static int read_ele(const struct host_source *source, struct host_mesh *mesh,
                                       "fewer than 4 vertices; complete the "
                                       "line");
             }
-            if (host_scan_unsigned(&s, UINT64_MAX / 16, &v[k], error) != 0) {
+            if (host_scan_unsigned(&s, UINT64_MAX / 16, &v[k], error) != 0)
                 return error->code;
-            }
         }
-        if (host_take_element(mesh, v, base, source, &s, error) != 0) {
+        if (host_take_element(mesh, v, base, source, &s, error) != 0)
             return error->code;
-        }
         host_scan_next_line(&s); /* attributes */
     }
     return host_scan_end(&s, error,
@@ -246,9 +228,8 @@ static int write_ele(struct host_output *out, struct host_output *beside,
                      struct host_error *error) {
     enum { NODE, NEIGH, FACE };
     if (beside != NULL) {
-        if (beside[NODE].file >= 0) {
+        if (beside[NODE].file >= 0)
             write_node_beside(&beside[NODE], points);
-        }
         write_topology(&beside[NEIGH], &beside[FACE], points, tets, error);
     }
     host_put_line(out, "", tets->count, " 4 0\n");

@@ -41,18 +41,15 @@ static size_t decode(const uint8_t *from, size_t bytes, uint8_t *to,
     for (size_t i = 0; i < bytes && done < most; i++) {
         uint8_t c = from[i];
         int value = value_of(c);
-        if (c == ' ' || c == '\n' || c == '\r' || c == '\t') {
+        if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
             continue;
-        }
-        if (value < 0 && (c != '=' || count < 2)) {
+        if (value < 0 && (c != '=' || count < 2))
             break;
-        }
         padding += c == '=';
         bits = bits << 6 | (uint32_t)(value < 0 ? 0 : value);
         if (++count == 4) {
-            for (int k = 0; k < 3 - padding && done < most; k++) {
+            for (int k = 0; k < 3 - padding && done < most; k++)
                 to[done++] = (uint8_t)(bits >> (16 - 8 * k));
-            }
             bits = 0;
             count = padding = 0;
         }
@@ -71,9 +68,8 @@ struct packed {
 static int plain(struct vtk_array *out, const struct packed *p, size_t most,
                  struct host_error *error) {
     size_t limit = p->bytes;
-    if (reserve(out, most < limit ? most : limit, error) != 0) {
+    if (reserve(out, most < limit ? most : limit, error) != 0)
         return error->code;
-    }
     if (p->coding->base64) {
         out->bytes = decode(p->from, p->bytes, out->data, out->capacity);
     } else {
@@ -114,9 +110,8 @@ static int inflate_blocks(struct vtk_array *out, const struct packed *p,
         if (packed > in->bytes - at || n > out->capacity - out->bytes ||
             uncompress(out->data + out->bytes, &n, in->data + at,
                        (uLong)packed) != Z_OK ||
-            n != expected) {
+            n != expected)
             return damaged(p, error);
-        }
         at += (size_t)packed;
         out->bytes += n;
     }
@@ -132,9 +127,8 @@ static int unpack_blocks(struct vtk_array *out, const struct packed *p,
     uint64_t blocks = 0, packed = 0;
     if (plain(&head, p, word, error) == 0) {
         blocks = header_word(&head, 0, p->coding);
-        if (blocks > p->bytes / word) {
+        if (blocks > p->bytes / word)
             damaged(p, error);
-        }
     }
     vtk_array_free(&head);
     if (error->code == 0 && blocks > 0 &&
@@ -145,14 +139,13 @@ static int unpack_blocks(struct vtk_array *out, const struct packed *p,
         }
         uint64_t size = header_word(&head, 1, p->coding);
         if (packed > p->bytes || size > packed * INFLATION_MAX + 1024 ||
-            size * blocks > packed * INFLATION_MAX * 2 + 1024 * blocks) {
+            size * blocks > packed * INFLATION_MAX * 2 + 1024 * blocks)
             damaged(p, error);
-        } else if (host_source_unpacks(p->source, packed, size * blocks,
-                                       error) == 0 &&
-                   plain(&in, p, head.bytes + (size_t)packed, error) == 0 &&
-                   reserve(out, (size_t)(size * blocks), error) == 0) {
+        else if (host_source_unpacks(p->source, packed, size * blocks, error) ==
+                     0 &&
+                 plain(&in, p, head.bytes + (size_t)packed, error) == 0 &&
+                 reserve(out, (size_t)(size * blocks), error) == 0)
             inflate_blocks(out, p, &head, &in, blocks, error);
-        }
     }
     vtk_array_free(&head);
     vtk_array_free(&in);
@@ -166,9 +159,8 @@ static int unpack_plain(struct vtk_array *out, const struct packed *p,
     uint64_t bytes = 0;
     if (plain(&head, p, word, error) == 0) {
         bytes = header_word(&head, 0, p->coding);
-        if (bytes > p->bytes) {
+        if (bytes > p->bytes)
             damaged(p, error);
-        }
     }
     vtk_array_free(&head);
     if (error->code == 0 && plain(out, p, word + (size_t)bytes, error) == 0) {
@@ -190,8 +182,7 @@ int vtk_array_unpack(struct vtk_array *array, const struct host_source *source,
         }
     }
     *array = (struct vtk_array){0};
-    if (coding->compressed) {
+    if (coding->compressed)
         return unpack_blocks(array, &p, error);
-    }
     return unpack_plain(array, &p, error);
 }

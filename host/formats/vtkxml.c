@@ -51,11 +51,9 @@ static void fail(struct xml *x, const char *what) {
 }
 
 static const char *attribute(const char **attributes, const char *name) {
-    for (; *attributes != NULL; attributes += 2) {
-        if (strcmp(attributes[0], name) == 0) {
+    for (; *attributes != NULL; attributes += 2)
+        if (strcmp(attributes[0], name) == 0)
             return attributes[1];
-        }
-    }
     return "";
 }
 
@@ -87,16 +85,13 @@ static void start_array(struct xml *x, const char **attributes) {
     const char *name = attribute(attributes, "Name");
     const char *format = attribute(attributes, "format");
     enum want want = WANTS;
-    if (x->in_points) {
+    if (x->in_points)
         want = POINTS;
-    }
-    for (int i = CONNECTIVITY; i <= TYPES && x->in_cells; i++) {
+    for (int i = CONNECTIVITY; i <= TYPES && x->in_cells; i++)
         want = strcmp(name, names[i]) == 0 ? (enum want)i : want;
-    }
     if (want == WANTS || (want == POINTS && x->mesh->points == NULL) ||
-        (want != POINTS && x->mesh->tets == NULL)) {
+        (want != POINTS && x->mesh->tets == NULL))
         return;
-    }
     struct array *a = &x->array[want];
     enum host_number type = host_number_named(attribute(attributes, "type"));
     if (a->there || type == HOST_NO_NUMBER) {
@@ -155,27 +150,25 @@ static void start_piece(struct xml *x, const char **attributes) {
 static void XMLCALL start_element(void *context, const char *name,
                                   const char **attributes) {
     struct xml *x = context;
-    if (x->reading != WANTS) {
+    if (x->reading != WANTS)
         x->nested++; /* information about the array: not its text */
-    } else if (strcmp(name, "VTKFile") == 0) {
+    else if (strcmp(name, "VTKFile") == 0)
         start_file(x, attributes);
-    } else if (strcmp(name, "Piece") == 0) {
+    else if (strcmp(name, "Piece") == 0)
         start_piece(x, attributes);
-    } else if (strcmp(name, "Points") == 0) {
+    else if (strcmp(name, "Points") == 0)
         x->in_points = true;
-    } else if (strcmp(name, "Cells") == 0) {
+    else if (strcmp(name, "Cells") == 0)
         x->in_cells = true;
-    } else if (strcmp(name, "DataArray") == 0) {
+    else if (strcmp(name, "DataArray") == 0)
         start_array(x, attributes);
-    }
 }
 
 static void XMLCALL characters(void *context, const char *text, int length) {
     struct xml *x = context;
     size_t n = (size_t)length;
-    if (x->reading == WANTS || x->nested > 0 || x->error->code != 0) {
+    if (x->reading == WANTS || x->nested > 0 || x->error->code != 0)
         return;
-    }
     if (x->text_bytes == 0) {
         x->array[x->reading].lines_before =
             XML_GetCurrentLineNumber(x->parser) - 1;
@@ -224,9 +217,8 @@ static struct host_stream stream_of(struct xml *x, enum want want) {
 
 static void piece_points(struct xml *x) {
     struct array *a = &x->array[POINTS];
-    if (x->mesh->points == NULL || (!a->there && x->piece_points == 0)) {
+    if (x->mesh->points == NULL || (!a->there && x->piece_points == 0))
         return;
-    }
     static const char wrong[] =
         "the numbers in Points are not 3 times NumberOfPoints; correct that, "
         "or get the file whole";
@@ -239,29 +231,24 @@ static void piece_points(struct xml *x) {
     if (!a->text) {
         uint64_t row = 3 * host_number_bytes(a->type);
         rows = x->counted ? rows : a->bytes.bytes / row;
-        if (a->bytes.bytes / row != rows || a->bytes.bytes % row != 0) {
+        if (a->bytes.bytes / row != rows || a->bytes.bytes % row != 0)
             fail(x, wrong);
-        }
     } else if (!x->counted) {
-        while (x->error->code == 0 && host_scan_skip_blank_lines(&s.scan)) {
+        while (x->error->code == 0 && host_scan_skip_blank_lines(&s.scan))
             host_stream_points(&s, 1, x->mesh->points, x->error);
-        }
     }
-    if (x->error->code == 0) {
+    if (x->error->code == 0)
         host_stream_points(&s, rows, x->mesh->points, x->error);
-    }
-    if (x->error->code == 0 && !host_stream_ended(&s)) {
+    if (x->error->code == 0 && !host_stream_ended(&s))
         fail(x, wrong);
-    }
 }
 
 static void end_piece(struct xml *x) {
     uint64_t first = x->points_before;
     x->in_piece = false;
     x->points_before += x->piece_points;
-    if (x->error->code == 0) {
+    if (x->error->code == 0)
         piece_points(x);
-    }
     if (x->error->code == 0 && x->mesh->tets != NULL && x->piece_cells > 0) {
         struct host_stream c = stream_of(x, CONNECTIVITY);
         struct host_stream o = stream_of(x, OFFSETS);
@@ -282,28 +269,26 @@ static void end_piece(struct xml *x) {
         }
     }
     for (int i = 0; i < WANTS; i++) {
-        if (x->array[i].text) {
+        if (x->array[i].text)
             free(x->array[i].bytes.data);
-        } else {
+        else
             vtk_array_free(&x->array[i].bytes);
-        }
         x->array[i] = (struct array){0};
     }
 }
 
 static void XMLCALL end_element(void *context, const char *name) {
     struct xml *x = context;
-    if (x->nested > 0) {
+    if (x->nested > 0)
         x->nested--;
-    } else if (x->reading != WANTS) {
+    else if (x->reading != WANTS)
         end_array(x);
-    } else if (strcmp(name, "Points") == 0) {
+    else if (strcmp(name, "Points") == 0)
         x->in_points = false;
-    } else if (strcmp(name, "Cells") == 0) {
+    else if (strcmp(name, "Cells") == 0)
         x->in_cells = false;
-    } else if (strcmp(name, "Piece") == 0) {
+    else if (strcmp(name, "Piece") == 0)
         end_piece(x);
-    }
 }
 
 /* Finds the appended data, which need not be XML, and returns how many bytes
@@ -312,9 +297,8 @@ static size_t find_appended(struct xml *x) {
     const char *begin = (const char *)x->source->data;
     size_t bytes = x->source->bytes;
     const char *tag = memmem(begin, bytes, "<AppendedData", 13);
-    if (tag == NULL) {
+    if (tag == NULL)
         return bytes;
-    }
     size_t rest = bytes - (size_t)(tag - begin);
     const char *close = memchr(tag, '>', rest);
     const char *mark =
@@ -350,9 +334,8 @@ static void parse(struct xml *x, size_t bytes) {
         fail(x, "there is no Piece; the file is cut short or no VTK file of "
                 "points");
     }
-    if (x->error->code == 0 && x->in_piece) {
+    if (x->error->code == 0 && x->in_piece)
         fail(x, "the file ends within a piece; it is cut short, get it whole");
-    }
 }
 
 static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
@@ -362,9 +345,8 @@ static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
                     .error = error,
                     .parser = XML_ParserCreate(NULL),
                     .reading = WANTS};
-    if (x.parser == NULL) {
+    if (x.parser == NULL)
         return host_fail_memory(error, "the XML parser");
-    }
     size_t bytes = find_appended(&x);
     parse(&x, bytes);
     x.piece_points = x.piece_cells = 0;
@@ -414,19 +396,16 @@ static void write_cells_of_points(struct host_output *out,
                                      "</UnstructuredGrid>\n");
     host_output_text(out, "<AppendedData encoding=\"raw\">\n_");
     host_put_whole(out, 24 * n, 8, false);
-    for (uint64_t i = 0; i < 3 * n; i++) {
+    for (uint64_t i = 0; i < 3 * n; i++)
         host_put_double(out, points->xyz[i], false);
-    }
     for (uint64_t array = 0; array < 2; array++) {
         host_put_whole(out, 8 * n, 8, false);
-        for (uint64_t i = 0; i < n; i++) {
+        for (uint64_t i = 0; i < n; i++)
             host_put_whole(out, i + array, 8, false);
-        }
     }
     host_put_whole(out, n, 8, false);
-    for (uint64_t i = 0; i < n && !polydata; i++) {
+    for (uint64_t i = 0; i < n && !polydata; i++)
         host_put_whole(out, 1, 1, false); /* VTK_VERTEX */
-    }
     host_output_text(out, "\n</AppendedData>\n</VTKFile>\n");
 }
 
@@ -477,23 +456,18 @@ static int write_tetrahedra(struct host_output *out, struct host_output *beside,
         (unsigned long long)at[2]);
     host_output_text(out, text);
     host_put_whole(out, bytes[0], 8, false);
-    for (uint64_t i = 0; i < 3 * n; i++) {
+    for (uint64_t i = 0; i < 3 * n; i++)
         host_put_double(out, points->xyz[i] + 0.0, false);
-    }
     host_put_whole(out, bytes[1], 8, false);
-    for (uint64_t i = 0; i < m; i++) {
-        for (int k = 0; k < 4; k++) {
+    for (uint64_t i = 0; i < m; i++)
+        for (int k = 0; k < 4; k++)
             host_put_whole(out, tets->v[i][k], word, false);
-        }
-    }
     host_put_whole(out, bytes[2], 8, false);
-    for (uint64_t i = 0; i < m; i++) {
+    for (uint64_t i = 0; i < m; i++)
         host_put_whole(out, 4 * (i + 1), word, false);
-    }
     host_put_whole(out, bytes[3], 8, false);
-    for (uint64_t i = 0; i < m; i++) {
+    for (uint64_t i = 0; i < m; i++)
         host_output_bytes(out, "\x0a", 1); /* VTK_TETRA */
-    }
     host_output_text(out, "\n</AppendedData>\n</VTKFile>\n");
     return error->code;
 }

@@ -39,9 +39,8 @@ int host_points_write_as(const char *path, const char *format,
     const struct host_format *f =
         format == NULL ? host_format_of(path, HOST_WRITE_POINTS)
                        : host_format_told(format, HOST_WRITE_POINTS, error);
-    if (f == NULL) {
+    if (f == NULL)
         return refuse(path, "points", HOST_WRITE_POINTS, error);
-    }
     host_progress_phase("writing", "MB");
     if (host_output_open(&out, path, error) == 0) {
         f->write_points(&out, points);
@@ -74,17 +73,14 @@ static const char *beside(const char *path, unsigned k) {
 const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size) {
     size_t length = strlen(path);
-    if (strcmp(path, "-") == 0 || length >= size) {
+    if (strcmp(path, "-") == 0 || length >= size)
         return NULL;
-    }
-    if (k == 0) {
+    if (k == 0)
         return path;
-    }
     const char *extension = beside(path, k - 1);
     const char *dot = strrchr(path, '.'); /* the format was known by it */
-    if (extension == NULL || dot == NULL) {
+    if (extension == NULL || dot == NULL)
         return NULL;
-    }
     int n = snprintf(name, size, "%.*s%s", (int)(dot - path), path, extension);
     return n < 0 || (size_t)n >= size ? NULL : name;
 }
@@ -104,9 +100,8 @@ int host_write_probe(const char *path, const char *input,
     const char *file = path;
     for (unsigned k = 0; file != NULL && error->code == 0; k++) {
         file = k == 0 ? path : host_write_file(path, k, name, sizeof name);
-        if (file != NULL && (k == 0 || !host_write_leaves(input, file))) {
+        if (file != NULL && (k == 0 || !host_write_leaves(input, file)))
             host_output_probe(file, error);
-        }
     }
     return error->code;
 }
@@ -119,12 +114,10 @@ int host_write(const char *path, const char *input,
     const struct host_format *format =
         host_format_of(path, HOST_WRITE_TETRAHEDRA);
     unsigned others = 0, opened = 0;
-    if (format == NULL) {
+    if (format == NULL)
         return host_write_check(path, error);
-    }
-    while (beside(path, others) != NULL) {
+    while (beside(path, others) != NULL)
         others++;
-    }
     host_progress_phase("writing", "MB");
     /* Itself comes last: where it is, those beside it are. */
     for (; opened <= others; opened++) {
@@ -137,11 +130,10 @@ int host_write(const char *path, const char *input,
                       path);
             break;
         }
-        if (opened < others && host_write_leaves(input, file)) {
+        if (opened < others && host_write_leaves(input, file))
             out[opened] = (struct host_output){.path = file, .file = -1};
-        } else if (host_output_open(&out[opened], file, error) != 0) {
+        else if (host_output_open(&out[opened], file, error) != 0)
             break;
-        }
     }
     if (error->code == 0) {
         format->write_tetrahedra(&out[others], others > 0 ? out : NULL, points,
@@ -176,15 +168,13 @@ static char *name_of(int opened, const char *path) {
 static char *name_of_nothing(const char *path) {
     struct stat made;
     int file = open(path, O_WRONLY | O_CREAT | O_NONBLOCK | O_CLOEXEC, 0);
-    if (file < 0) {
+    if (file < 0)
         return NULL;
-    }
     char *name = name_of(file, path);
     int reason = errno;
     if (name != NULL && fstat(file, &made) == 0 && S_ISREG(made.st_mode) &&
-        (made.st_mode & 0777) == 0 && made.st_size == 0) {
+        (made.st_mode & 0777) == 0 && made.st_size == 0)
         (void)unlink(name);
-    }
     (void)close(file);
     errno = reason;
     return name;
@@ -197,9 +187,8 @@ char *host_target(const char *path) {
         return lstat(path, &status) == 0 ? name_of_nothing(path)
                                          : strdup(path); /* not there yet */
     }
-    if (file < 0) {
+    if (file < 0)
         return NULL;
-    }
     char *name = name_of(file, path);
     int reason = errno;
     (void)close(file);
@@ -229,12 +218,10 @@ static bool is_standard(const struct host_claim *c) {
 /* False where nothing is at its name and no directory is there for it. */
 static bool look(struct host_claim *c) {
     c->there = true;
-    if (is_standard(c)) {
+    if (is_standard(c))
         return fstat(c->input ? STDIN_FILENO : STDOUT_FILENO, &c->status) == 0;
-    }
-    if (stat(c->name, &c->status) == 0) {
+    if (stat(c->name, &c->status) == 0)
         return true;
-    }
     c->there = false;
     size_t length = (size_t)(last_name(c->target) - c->target);
     char *directory = length > 0 ? strndup(c->target, length) : strdup(".");
@@ -245,14 +232,12 @@ static bool look(struct host_claim *c) {
 
 /* Devices, such as terminals, take what comes. */
 static bool is_same(const struct host_claim *a, const struct host_claim *b) {
-    if (!a->input && !b->input && is_standard(a) && is_standard(b)) {
+    if (!a->input && !b->input && is_standard(a) && is_standard(b))
         return true;
-    }
     if (!a->known || !b->known || a->there != b->there ||
         a->status.st_dev != b->status.st_dev ||
-        a->status.st_ino != b->status.st_ino) {
+        a->status.st_ino != b->status.st_ino)
         return false;
-    }
     return a->there ? S_ISREG(a->status.st_mode) || S_ISFIFO(a->status.st_mode)
                     : strcmp(last_name(a->target), last_name(b->target)) == 0;
 }
@@ -280,9 +265,8 @@ static int claim(struct host_claims *claims, struct host_claim new,
     if (claims->count == claims->capacity) {
         unsigned capacity = 2 * claims->capacity + 8;
         void *grown = realloc(claims->claim, capacity * sizeof new);
-        if (grown == NULL) {
+        if (grown == NULL)
             return host_fail_memory(error, "the names of files");
-        }
         claims->claim = grown;
         claims->capacity = capacity;
     }
@@ -291,18 +275,14 @@ static int claim(struct host_claims *claims, struct host_claim new,
     claims->count++;
     c->name = strdup(name);
     c->target = c->input ? strdup(name) : host_target(name);
-    if (c->target == NULL && errno != ENOMEM) {
+    if (c->target == NULL && errno != ENOMEM)
         c->target = strdup(name);
-    }
-    if (c->name == NULL || c->target == NULL) {
+    if (c->name == NULL || c->target == NULL)
         return host_fail_memory(error, "the names of files");
-    }
     c->known = look(c); /* where it is not, opening it will tell why */
-    for (struct host_claim *other = claims->claim; other < c; other++) {
-        if (!c->input && is_same(c, other)) {
+    for (struct host_claim *other = claims->claim; other < c; other++)
+        if (!c->input && is_same(c, other))
             claims_refuse(c, other, error);
-        }
-    }
     return error->code;
 }
 
@@ -320,9 +300,8 @@ int host_claims_write(struct host_claims *claims, const char *option,
     const char *file = path;
     for (unsigned k = 0; file != NULL && error->code == 0; k++) {
         file = k == 0 ? path : host_write_file(path, k, name, sizeof name);
-        if (file != NULL && (k == 0 || !host_write_leaves(input, file))) {
+        if (file != NULL && (k == 0 || !host_write_leaves(input, file)))
             claim(claims, c, file, error);
-        }
     }
     return error->code;
 }

@@ -12,9 +12,8 @@ static int read_text(const struct host_source *source, bool is_csv,
     struct host_scan s = host_scan_source(source);
     struct host_csv csv = {0};
     double xyz[3];
-    if (host_csv_header(&csv, &s, error) != 0) {
+    if (host_csv_header(&csv, &s, error) != 0)
         return error->code;
-    }
     points->named = csv.fields > 0;
     while (host_scan_skip_blank_lines(&s)) {
         int status = csv.fields == 0
@@ -22,9 +21,8 @@ static int read_text(const struct host_source *source, bool is_csv,
                      : host_csv_row(&csv, &s, xyz, error) == 0
                          ? host_points_append(points, xyz, 1, error)
                          : error->code;
-        if (status != 0) {
+        if (status != 0)
             return status;
-        }
     }
     return 0;
 }
@@ -77,9 +75,8 @@ static bool take_count(struct host_scan *s, uint64_t *count) {
     struct host_scan line = *s;
     uint64_t number;
     if (host_scan_unsigned(&line, UINT64_MAX / 16, &number, &none) != 0 ||
-        host_scan_more(&line)) {
+        host_scan_more(&line))
         return false;
-    }
     *s = line;
     *count = number;
     return true;
@@ -101,17 +98,15 @@ static int read_pts(const struct host_source *source, struct host_mesh *mesh,
     uint64_t rows = 0, count = 0;
     bool more = host_scan_skip_blank_lines(&s);
     const bool counted = more && take_count(&s, &count);
-    while (host_scan_skip_blank_lines(&s)) {
-        if (counted && rows == count && take_count(&s, &count)) {
+    while (host_scan_skip_blank_lines(&s))
+        if (counted && rows == count && take_count(&s, &count))
             rows = 0;
-        } else if (counted && rows == count) {
+        else if (counted && rows == count)
             return wrong_count(&s, rows + 1, count, error);
-        } else if (host_take_point(&s, false, mesh->points, error) != 0) {
+        else if (host_take_point(&s, false, mesh->points, error) != 0)
             return error->code;
-        } else {
+        else
             rows++;
-        }
-    }
     return counted && rows < count ? wrong_count(&s, rows, count, error) : 0;
 }
 

@@ -150,12 +150,11 @@ static void join_part(void *context, unsigned part) {
     uint64_t vertices = j->adjacency->vertices;
     uint32_t p = (uint32_t)(vertices * part / j->parts);
     uint32_t last = (uint32_t)(vertices * (part + 1) / j->parts);
-    for (; p < last && !facets->failed && !host_call_cancelled(); p++) {
+    for (; p < last && !facets->failed && !host_call_cancelled(); p++)
         if (host_adjacency_group(j->adjacency, p, &group, &error) != 0)
             facets->failed = true;
         else
             join_group(j, facets, &group);
-    }
     host_group_free(&group);
 }
 

@@ -26,12 +26,10 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
             return;
         first[tets->v[i][rank] + 1]++;
     }
-    for (uint32_t p = 0; p < a->vertices; p++) {
+    for (uint32_t p = 0; p < a->vertices; p++)
         first[p + 1] += first[p];
-    }
-    if (order == NULL) {
+    if (order == NULL)
         return;
-    }
     for (uint64_t i = 0; i < tets->count; i++) {
         if (i % POLL_ROWS == 0 && host_call_cancelled())
             return;
@@ -89,15 +87,13 @@ void host_group_free(struct host_group *group) {
 static int reserve(struct host_group *group, size_t count,
                    struct host_error *error) {
     group->count = 0;
-    if (group->capacity >= count) {
+    if (group->capacity >= count)
         return 0;
-    }
     struct host_facet *grown =
         host_remap(group->facet, group->capacity * sizeof *group->facet,
                    2 * count * sizeof *group->facet);
-    if (grown == NULL) {
+    if (grown == NULL)
         return host_fail_memory(error, "the facets at a vertex");
-    }
     group->facet = grown;
     group->capacity = 2 * count;
     return 0;
@@ -105,9 +101,8 @@ static int reserve(struct host_group *group, size_t count,
 
 static int compare(const void *p, const void *q) {
     const struct host_facet *a = p, *b = q;
-    if (a->others != b->others) {
+    if (a->others != b->others)
         return a->others < b->others ? -1 : 1;
-    }
     return a->tet < b->tet ? -1 : a->tet > b->tet;
 }
 
@@ -139,9 +134,8 @@ int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
                          struct host_group *group, struct host_error *error) {
     uint32_t i = a->first_by_lowest[p], end = a->first_by_lowest[p + 1];
     uint32_t j = a->first_by_second[p], last = a->first_by_second[p + 1];
-    if (reserve(group, 3 * (size_t)(end - i) + (last - j), error) != 0) {
+    if (reserve(group, 3 * (size_t)(end - i) + (last - j), error) != 0)
         return error->code;
-    }
     for (; i < end; i++) {
         const uint32_t *v = a->tets->v[i];
         add(group, v[2], v[3], i, 1);
@@ -160,7 +154,6 @@ void host_facet_outward(const uint32_t tet[4], uint32_t corner,
                         uint32_t facet[3]) {
     static const uint8_t outward[4][3] = {
         {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 3; i++)
         facet[i] = tet[outward[corner][i]];
-    }
 }

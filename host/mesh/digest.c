@@ -26,7 +26,6 @@ void host_digest(const struct host_tetrahedra *tets,
     uint8_t sum[SHA256_DIGEST_SIZE];
     sha256_digest(&sha, sizeof sum, sum);
     char *out = digest->text + sprintf(digest->text, "sha256:");
-    for (size_t i = 0; i < sizeof sum; i++) {
+    for (size_t i = 0; i < sizeof sum; i++)
         out += sprintf(out, "%02x", sum[i]);
-    }
 }

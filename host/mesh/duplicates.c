@@ -62,9 +62,8 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
         uint64_t slot = table->slot[at];
         if ((slot & UINT64_C(0xffffffff00000000)) == mark) {
             uint32_t other = (uint32_t)slot - 1;
-            if (same(s->xyz + 3 * (size_t)other, s->xyz + 3 * (size_t)row)) {
+            if (same(s->xyz + 3 * (size_t)other, s->xyz + 3 * (size_t)row))
                 return other;
-            }
         }
     }
     table->slot[at] = mark | (row + 1); /* rows are below 2^32 - 1 */
@@ -97,12 +96,10 @@ static void search_part(void *context, unsigned part) {
         uint32_t other = enter(s, table, waiting[taken % AHEAD], mine);
         taken++;
         distinct += other == mine;
-        if (s->lowest != NULL) {
+        if (s->lowest != NULL)
             s->lowest[mine] = other;
-        }
-        if (s->doubled != NULL && other != mine) {
+        if (s->doubled != NULL && other != mine)
             s->doubled[mine] = 1;
-        }
     }
     s->distinct[part] = distinct;
 }
@@ -113,21 +110,18 @@ static bool run_search(struct search *s) {
                : threads > PARTS_MAX ? PARTS_MAX
                                      : threads;
     size_t slots = 64;
-    while (slots < s->rows / s->parts * 3 / 2 + 64) {
+    while (slots < s->rows / s->parts * 3 / 2 + 64)
         slots *= 2;
-    }
     bool enough = true;
     for (unsigned i = 0; i < s->parts; i++) {
         s->table[i].slots = slots;
         s->table[i].slot = host_map(slots * sizeof(uint64_t));
         enough = enough && s->table[i].slot != NULL;
     }
-    if (enough) {
+    if (enough)
         host_fork_all(s->parts, search_part, s);
-    }
-    for (unsigned i = 0; i < s->parts; i++) {
+    for (unsigned i = 0; i < s->parts; i++)
         host_unmap(s->table[i].slot, slots * sizeof(uint64_t));
-    }
     return enough;
 }
 
@@ -141,9 +135,8 @@ static uint64_t part_start(const struct search *s, unsigned part) {
 static void count_part(void *context, unsigned part) {
     struct search *s = context;
     uint64_t count = 0, last = part_start(s, part + 1);
-    for (uint64_t row = part_start(s, part); row < last; row++) {
+    for (uint64_t row = part_start(s, part); row < last; row++)
         count += s->doubled[row] == 0;
-    }
     s->first[part + 1] = count;
 }
 
@@ -154,9 +147,8 @@ static void fill_part(void *context, unsigned part) {
     uint64_t last = part_start(s, part + 1);
     for (uint64_t row = part_start(s, part); row < last; row++) {
         const double *p = s->xyz + 3 * row;
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             negative_zeros += p[d] == 0.0 && signbit(p[d]);
-        }
         if (s->doubled[row] == 0) {
             *to++ =
                 (struct host_item){{p[0] + 0.0, p[1] + 0.0, p[2] + 0.0}, row};
@@ -171,13 +163,11 @@ static void fill_items(struct search *s, struct host_distinct *distinct) {
     s->items = distinct->items;
     s->parts = s->rows < COPY_ROWS ? 1 : s->parts;
     host_fork_all(s->parts, count_part, s);
-    for (unsigned i = 0; i < s->parts; i++) {
+    for (unsigned i = 0; i < s->parts; i++)
         s->first[i + 1] += s->first[i];
-    }
     host_fork_all(s->parts, fill_part, s);
-    for (unsigned i = 0; i < s->parts; i++) {
+    for (unsigned i = 0; i < s->parts; i++)
         distinct->negative_zeros += s->negative_zeros[i];
-    }
     for (int d = 0; d < 3; d++) {
         distinct->lo[d] = INFINITY;
         distinct->hi[d] = -INFINITY;
@@ -207,16 +197,14 @@ int host_distinct_make(struct host_distinct *distinct, const double *xyz,
         host_unmap(s.doubled, (size_t)rows);
         return host_fail(error, HOST_BROKEN, "host: cancelled");
     }
-    for (unsigned i = 0; i < s.parts; i++) {
+    for (unsigned i = 0; i < s.parts; i++)
         distinct->count += (size_t)s.distinct[i];
-    }
     distinct->capacity = distinct->count;
     distinct->items = host_map(distinct->capacity * sizeof *distinct->items);
-    if (distinct->items == NULL) {
+    if (distinct->items == NULL)
         host_fail_memory(error, "the points");
-    } else {
+    else
         fill_items(&s, distinct);
-    }
     host_unmap(s.doubled, (size_t)rows);
     return error->code;
 }
@@ -232,10 +220,8 @@ uint64_t host_distinct_rows(
     uint32_t *lowest) {
     struct search s = {.xyz = xyz, .rows = rows, .lowest = lowest};
     uint64_t distinct = 0;
-    if (run_search(&s)) {
-        for (unsigned i = 0; i < s.parts; i++) {
+    if (run_search(&s))
+        for (unsigned i = 0; i < s.parts; i++)
             distinct += s.distinct[i];
-        }
-    }
     return distinct;
 }

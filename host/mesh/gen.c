@@ -56,9 +56,8 @@ static void direction(struct random *r, double v[3]) {
         }
     } while (square > 1 || square < 0x1p-20);
     double length = sqrt(square);
-    for (int d = 0; d < 3; d++) {
+    for (int d = 0; d < 3; d++)
         v[d] /= length;
-    }
 }
 
 static void sphere(struct maker *m) {
@@ -69,9 +68,8 @@ static void sphere(struct maker *m) {
 }
 
 static void hub(struct maker *m) {
-    if (put(m, 0, 0, 0)) {
+    if (put(m, 0, 0, 0))
         sphere(m);
-    }
 }
 
 /* Twelve bubbles in the unit cube, nine points of ten in their thin shells, the
@@ -81,9 +79,8 @@ static void bubbles(struct maker *m) {
     double centre[BUBBLES][3], radius[BUBBLES], v[3];
     for (int b = 0; b < BUBBLES; b++) {
         radius[b] = 0.02 + 0.1 * draw(&m->random);
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             centre[b][d] = radius[b] + (1 - 2 * radius[b]) * draw(&m->random);
-        }
     }
     bool more = true;
     while (more) {
@@ -95,9 +92,8 @@ static void bubbles(struct maker *m) {
             uint64_t b = next(&m->random) % BUBBLES;
             direction(&m->random, v);
             double r = radius[b] * (0.98 + 0.02 * draw(&m->random));
-            for (int d = 0; d < 3; d++) {
+            for (int d = 0; d < 3; d++)
                 v[d] = centre[b][d] + r * v[d];
-            }
         }
         more = put(m, v[0], v[1], v[2]);
     }
@@ -106,9 +102,8 @@ static void bubbles(struct maker *m) {
 /* The smallest side with side^3 * ratio >= n. */
 static uint64_t side_for(uint64_t n, uint64_t times, uint64_t by) {
     uint64_t side = 2;
-    while (side * side * (side * times / by) < n) {
+    while (side * side * (side * times / by) < n)
         side++;
-    }
     return side;
 }
 
@@ -245,9 +240,8 @@ static double hill(const struct maker *m, uint64_t octave, double x, double y) {
 static void terrain(struct maker *m) {
     uint64_t side = 2, i = 0;
     double x, y, height;
-    while (side * side < m->n) {
+    while (side * side < m->n)
         side++;
-    }
     do {
         const uint64_t column = i % side, row = i / side;
         x = (double)column;
@@ -317,9 +311,8 @@ int host_gen(const char *kind, uint64_t n, uint64_t seed,
             struct maker m = {n, seed, {seed}, points, error};
             (void)next(&m.random);
             kinds[i].function(&m);
-            if (error->code != 0) {
+            if (error->code != 0)
                 host_points_free(points);
-            }
             return error->code;
         }
     }

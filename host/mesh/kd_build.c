@@ -91,9 +91,8 @@ static int less(const struct host_item *a, const struct host_item *b,
                 const int order[3], double sign) {
     for (int i = 0; i < 3; i++) {
         double p = sign * a->c[order[i]], q = sign * b->c[order[i]];
-        if (p != q) {
+        if (p != q)
             return p < q;
-        }
     }
     return 0;
 }
@@ -122,14 +121,12 @@ static void sort_keys(double *key, size_t n) {
         for (size_t i = gap; i < n; i++) {
             double t = key[i];
             size_t j = i;
-            for (; j >= gap && t < key[j - gap]; j -= gap) {
+            for (; j >= gap && t < key[j - gap]; j -= gap)
                 key[j] = key[j - gap];
-            }
             key[j] = t;
         }
-        if (gap == 1) {
+        if (gap == 1)
             return;
-        }
     }
 }
 
@@ -150,11 +147,10 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
     sort_keys(key, s);
     size_t margin = s >= 64 ? s / 20 : s >= 16 ? 1 : 0;
     size_t rank = (size_t)((double)k / (double)n * (double)s);
-    if (2 * k < n) {
+    if (2 * k < n)
         rank += margin;
-    } else {
+    else
         rank = rank > margin ? rank - margin : 0;
-    }
     return key[rank >= s ? s - 1 : rank];
 }
 
@@ -250,7 +246,6 @@ static void build(void *argument) {
 void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
                     unsigned threads, host_brick_sink *sink, void *context) {
     struct task task = {items, n, first_brick, threads, 0, sink, context};
-    if (n > 0) {
+    if (n > 0)
         build(&task);
-    }
 }

@@ -41,9 +41,8 @@ static size_t owned_shift(const struct cut *c, const double lo[3],
                           const double hi[3], int d) {
     int sides = 2 - (int)(c->above >> d & 1) - (int)(c->below >> d & 1);
     double length = 0.5 * hi[d] - 0.5 * lo[d], across = 1;
-    for (int e = 0; e < 3; e++) {
+    for (int e = 0; e < 3; e++)
         across *= e == d ? 1 : (0.5 * hi[e] - 0.5 * lo[e]) / length;
-    }
     double points = (double)c->n;
     double shift = sides * 0.26 * cbrt(points * points * across);
     return shift < points / 8 ? (size_t)shift : c->n / 8;
@@ -81,9 +80,8 @@ static void cut_regions(void *argument) {
         host_kd_box(items, c->n, lo, hi);
         d = c->n > 0 ? host_kd_longest(lo, hi) : 0;
         k = half_rank(c->n);
-        if (c->partition == HOST_OWNED && k > 0) {
+        if (c->partition == HOST_OWNED && k > 0)
             k -= owned_shift(c, lo, hi, d);
-        }
         host_kd_rank(items, c->n, k, d, 0);
         host_kd_box(items + k, c->n - k, lo, hi);
         wall = k < c->n ? lo[d] : c->hi[d];
@@ -151,9 +149,8 @@ static void build_regions(void *argument) {
     lower.regions = upper.regions = s->regions / 2;
     upper.region += lower.regions;
     lower.n = 0;
-    for (uint32_t i = 0; i < lower.regions; i++) {
+    for (uint32_t i = 0; i < lower.regions; i++)
         lower.n += s->order->region[s->region + i].points;
-    }
     upper.first += lower.n, upper.n -= lower.n;
     if (s->threads > 1 && s->n >= FORK_POINTS) {
         struct host_fork fork;
@@ -215,9 +212,8 @@ static void make_pages(void *context, unsigned part) {
         count = count > INCODE_FANOUT ? INCODE_FANOUT : count;
         host_lump_join(all, first, count);
         incode_boxes_init(boxes, all->lo, all->hi);
-        for (uint32_t c = 0; c < count; c++) {
+        for (uint32_t c = 0; c < count; c++)
             incode_boxes_set(boxes, c, first[c].lo, first[c].hi);
-        }
     }
 }
 
@@ -267,9 +263,8 @@ static void choose_cells(struct host_order *order) {
     double small = longest / 0x1p30, large = longest * 2;
     for (int i = 0; i < 60 && longest > 0; i++) {
         double side = 0.5 * small + 0.5 * large;
-        if (!(side > 0)) {
+        if (!(side > 0))
             break; /* denormal extents: one cell does */
-        }
         uint32_t cells[3];
         double product = 1;
         for (int d = 0; d < 3; d++) {
@@ -290,9 +285,8 @@ static int make_grid(struct host_order *order, struct host_error *error) {
     size_t cells = (size_t)order->cells[0] * order->cells[1] * order->cells[2];
     order->first_of_cell = host_map((cells + 1) * sizeof(uint32_t));
     order->by_cell = host_map((size_t)order->points * sizeof(uint32_t));
-    if (order->first_of_cell == NULL || order->by_cell == NULL) {
+    if (order->first_of_cell == NULL || order->by_cell == NULL)
         return host_fail_memory(error, "the lists of the uniform grid");
-    }
     uint32_t *first = order->first_of_cell;
     for (int pass = 0; pass < 2; pass++) {
         for (uint32_t b = order->bricks; b-- > 0;) {
@@ -302,16 +296,14 @@ static int make_grid(struct host_order *order, struct host_error *error) {
                 host_vertex(order, v, p);
                 uint32_t cell =
                     incode_cell_of(order->lo, order->hi, order->cells, p);
-                if (pass == 0) {
+                if (pass == 0)
                     first[cell]++;
-                } else {
+                else
                     order->by_cell[--first[cell]] = v;
-                }
             }
         }
-        for (size_t cell = 1; pass == 0 && cell <= cells; cell++) {
+        for (size_t cell = 1; pass == 0 && cell <= cells; cell++)
             first[cell] += first[cell - 1];
-        }
     }
     return 0;
 }
@@ -357,9 +349,8 @@ static int allocate(struct host_order *order, struct host_error *error) {
     order->boxes = host_map((order->tree.base[order->tree.levels] - bricks) *
                             sizeof *order->boxes);
     if (order->brick == NULL || order->fill == NULL || order->row == NULL ||
-        order->boxes == NULL) {
+        order->boxes == NULL)
         return host_fail_memory(error, "the order of the points");
-    }
     return 0;
 }
 
@@ -387,15 +378,13 @@ static int build_items(struct host_order *order, struct host_item *items,
     }
     order->bricks = (uint32_t)bricks;
     incode_tree_init(&order->tree, order->bricks, 0);
-    if (allocate(order, error) != 0) {
+    if (allocate(order, error) != 0)
         return error->code;
-    }
     size_t lumps =
         order->tree.base[order->tree.levels] * sizeof(struct host_lump);
     struct host_lump *lump = host_map(lumps);
-    if (lump == NULL) {
+    if (lump == NULL)
         return host_fail_memory(error, "the boxes of the points");
-    }
     struct spread spread = {.order = order,
                             .items = items,
                             .lump = lump,
@@ -416,9 +405,8 @@ int host_order_make(struct host_order *order, const char *where,
     *order = (struct host_order){
         .rows = rows, .regions = regions, .regions_made = regions};
     struct host_distinct distinct;
-    if (host_distinct_make(&distinct, xyz, rows, error) != 0) {
+    if (host_distinct_make(&distinct, xyz, rows, error) != 0)
         return error->code;
-    }
     order->points = (uint32_t)distinct.count;
     order->duplicates = rows - distinct.count;
     order->negative_zeros = distinct.negative_zeros;
@@ -432,11 +420,10 @@ int host_order_make(struct host_order *order, const char *where,
     memcpy(order->lo, distinct.lo, sizeof order->lo);
     memcpy(order->hi, distinct.hi, sizeof order->hi);
     order->region = host_map(regions * sizeof *order->region);
-    if (order->region == NULL) {
+    if (order->region == NULL)
         host_fail_memory(error, "the regions");
-    } else if (error->code == 0) {
+    else if (error->code == 0)
         build_items(order, distinct.items, partition, error);
-    }
     host_distinct_free(&distinct);
     if (error->code == 0 && !host_call_cancelled())
         check_dimension(order, where, error);
@@ -482,9 +469,8 @@ static size_t copy_words(const uint32_t *from, size_t count, uint32_t page,
     size_t n = first < count ? count - first : 0;
     n = n > INCODE_PAGE_WORDS ? INCODE_PAGE_WORDS : n;
     memset(buffer, 0xff, sizeof(struct incode_words));
-    if (n > 0) {
+    if (n > 0)
         memcpy(buffer, from + first, n * sizeof *from);
-    }
     return sizeof(struct incode_words);
 }
 
@@ -529,9 +515,8 @@ static void add_some(struct incode_complex *x, const struct host_order *order,
         const struct incode_brick *brick = &order->brick[b];
         for (; added < count; added++) {
             uint64_t slot = added * points / count - rank;
-            if (slot >= order->fill[b]) {
+            if (slot >= order->fill[b])
                 break;
-            }
             const double p[3] = {brick->x[slot], brick->y[slot],
                                  brick->z[slot]};
             (void)incode_complex_add(x, p, added);
@@ -547,13 +532,11 @@ static bool begin(struct incode_complex *x, struct incode_tally *tally,
     uint32_t four[4] = {1, 1 + count / 2, 0, 0};
     for (uint32_t i = 1; i <= count && four[3] == 0; i++) {
         const double *a = p[four[0]].p, *b = p[four[1]].p;
-        if (four[2] == 0 && !incode_collinear(a, b, p[i].p)) {
+        if (four[2] == 0 && !incode_collinear(a, b, p[i].p))
             four[2] = i;
-        }
         if (four[2] != 0 &&
-            incode_orient3d(tally, a, b, p[four[2]].p, p[i].p) != 0) {
+            incode_orient3d(tally, a, b, p[four[2]].p, p[i].p) != 0)
             four[3] = i;
-        }
     }
     return four[3] != 0 && incode_complex_begin(x, tally, four);
 }
@@ -572,9 +555,8 @@ static bool insert_all(struct incode_complex *x, struct incode_tally *tally,
     for (unsigned round = 0; round <= ROUNDS; round++) {
         for (uint32_t v = 1; v <= count; v++) {
             if (round_of(v) == round && !incode_complex_is_vertex(x, v) &&
-                !incode_complex_insert(x, tally, v, near)) {
+                !incode_complex_insert(x, tally, v, near))
                 return false;
-            }
             near = incode_complex_is_vertex(x, v) ? v : near;
         }
     }
@@ -589,9 +571,8 @@ static uint32_t widest(const struct incode_complex *x, int32_t *change,
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
         uint32_t first = count, last = 0;
-        if (incode_cell_is_free(c) || incode_cell_is_infinite(c)) {
+        if (incode_cell_is_free(c) || incode_cell_is_infinite(c))
             continue;
-        }
         for (unsigned k = 0; k < 4; k++) {
             uint32_t id = x->point[c->v[k]].id;
             first = id < first ? id : first;
@@ -633,9 +614,8 @@ static uint32_t open_of(const struct host_order *order, uint32_t count) {
 uint64_t host_order_open(const struct host_order *order) {
     uint32_t count = order->points < SAMPLE ? order->points : SAMPLE;
     double all = open_of(order, count), part = open_of(order, count / STEP);
-    if (all < 1 || part < 1) {
+    if (all < 1 || part < 1)
         return 0;
-    }
     double power = log(all / part) / log(STEP);
     power = power < 0.5 ? 0.5 : power > 1.0 ? 1.0 : power;
     return (uint64_t)(all * pow((double)order->points / count, power));

@@ -49,9 +49,8 @@ int host_points_append(struct host_points *points, const double *xyz,
                          "allow; split the input");
     }
     if (points->capacity - points->count < rows &&
-        grow(points, rows, error) != 0) {
+        grow(points, rows, error) != 0)
         return error->code;
-    }
     memcpy(points->xyz + 3 * points->count, xyz, rows * ROW_BYTES);
     points->count += rows;
     return 0;

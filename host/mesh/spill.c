@@ -46,9 +46,8 @@ void host_spill_clear(struct host_spill *spill) {
 void host_spill_free(struct host_spill *spill) {
     host_unmap(spill->blocks, spill->blocks_mapped * sizeof *spill->blocks);
     host_unmap(spill->table, spill->table_size * sizeof *spill->table);
-    if (spill->file >= 0) {
+    if (spill->file >= 0)
         close(spill->file);
-    }
     memset(spill, 0, sizeof *spill);
     spill->file = -1;
 }
@@ -96,15 +95,13 @@ static int store(struct host_spill *s, uint32_t block,
 static int open_file(struct host_spill *s, struct host_error *error) {
     const char *directory = getenv("TMPDIR");
     char name[512];
-    if (directory == NULL || strlen(directory) > 400) {
+    if (directory == NULL || strlen(directory) > 400)
         directory = "/tmp";
-    }
     strcpy(name, directory);
     strcat(name, "/incode-XXXXXX");
     s->file = mkostemp(name, O_CLOEXEC);
-    if (s->file < 0) {
+    if (s->file < 0)
         return file_failed(error);
-    }
     unlink(name);
     return 0;
 }
@@ -116,9 +113,8 @@ static int new_block(struct host_spill *s, uint32_t *block,
     *block = s->free;
     if (s->free != HOST_SPILL_END) {
         struct host_spill_block old;
-        if (load(s, s->free, &old, error) != 0) {
+        if (load(s, s->free, &old, error) != 0)
             return error->code;
-        }
         s->free = old.next;
         return store(s, *block, &copy, error);
     }
@@ -129,15 +125,13 @@ static int new_block(struct host_spill *s, uint32_t *block,
         void *moved =
             host_remap(s->blocks, s->blocks_mapped * sizeof *s->blocks,
                        grown * sizeof *s->blocks);
-        if (moved == NULL) {
+        if (moved == NULL)
             return host_fail_memory(error, "spilled faces");
-        }
         s->blocks = moved;
         s->blocks_mapped = grown;
     }
-    if (*block >= s->blocks_memory && s->file < 0 && open_file(s, error) != 0) {
+    if (*block >= s->blocks_memory && s->file < 0 && open_file(s, error) != 0)
         return error->code;
-    }
     s->blocks_used++;
     return store(s, *block, &copy, error);
 }
@@ -146,9 +140,8 @@ static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
                                      uint32_t brick) {
     uint32_t at = (brick * 2654435761u ^ node * 40503u) % s->table_size;
     while (s->table[at].used &&
-           (s->table[at].node != node || s->table[at].brick != brick)) {
+           (s->table[at].node != node || s->table[at].brick != brick))
         at = (at + 1) % s->table_size;
-    }
     return &s->table[at];
 }
 
@@ -161,11 +154,9 @@ static int grow_table(struct host_spill *s, struct host_error *error) {
         *s = old;
         return host_fail_memory(error, "spilled faces");
     }
-    for (uint32_t i = 0; i < old.table_size; i++) {
-        if (old.table[i].used) {
+    for (uint32_t i = 0; i < old.table_size; i++)
+        if (old.table[i].used)
             *find(s, old.table[i].node, old.table[i].brick) = old.table[i];
-        }
-    }
     host_unmap(old.table, old.table_size * sizeof *old.table);
     return 0;
 }
@@ -179,21 +170,18 @@ static int append(struct host_spill *s, struct host_spill_list *list,
     struct host_spill_block tail;
     bool empty = in_blocks(list) == 0;
     tail.end = 0;
-    if (!empty && load(s, list->tail, &tail, error) != 0) {
+    if (!empty && load(s, list->tail, &tail, error) != 0)
         return error->code;
-    }
     if (empty || tail.end == HOST_SPILL_BLOCK_FACES) {
         uint32_t block;
-        if (new_block(s, &block, error) != 0) {
+        if (new_block(s, &block, error) != 0)
             return error->code;
-        }
         if (empty) {
             list->head = block;
         } else {
             tail.next = block;
-            if (store(s, list->tail, &tail, error) != 0) {
+            if (store(s, list->tail, &tail, error) != 0)
                 return error->code;
-            }
         }
         list->tail = block;
         memset(&tail, 0, sizeof tail);
@@ -226,24 +214,21 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
         struct host_spill_entry *entry = find(spill, node, brick);
         if (!entry->used) {
             if (2 * (spill->table_used + 1) > spill->table_size &&
-                grow_table(spill, error) != 0) {
+                grow_table(spill, error) != 0)
                 return error->code;
-            }
             entry = find(spill, node, brick);
             spill->table_used++;
             *entry =
                 (struct host_spill_entry){node, brick, empty_list(brick), true};
         }
-        if (faces[i].v[1] == INCODE_NONE) {
+        if (faces[i].v[1] == INCODE_NONE)
             mark(spill, &entry->list, faces[i].v[0]);
-        } else if (append(spill, &entry->list, faces[i], error) != 0) {
+        else if (append(spill, &entry->list, faces[i], error) != 0)
             return error->code;
-        }
     }
     spill->faces_total += count;
-    if (spill->faces > spill->faces_max) {
+    if (spill->faces > spill->faces_max)
         spill->faces_max = spill->faces;
-    }
     return 0;
 }
 
@@ -270,9 +255,8 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
     while (list->faces > 0 && *count < max) {
         struct host_spill_block block;
         uint32_t at = list->head;
-        if (load(spill, at, &block, error) != 0) {
+        if (load(spill, at, &block, error) != 0)
             return error->code;
-        }
         while (block.first < block.end && *count < max) {
             faces[(*count)++] = block.faces[block.first++];
             list->faces--;
@@ -283,9 +267,8 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
             block.next = spill->free;
             spill->free = at;
         }
-        if (store(spill, at, &block, error) != 0) {
+        if (store(spill, at, &block, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }
@@ -298,12 +281,10 @@ static int copy_list(const struct host_spill *s,
     struct host_spill_block block;
     uint64_t left = in_blocks(list);
     for (uint32_t at = list->head; left > 0; at = block.next) {
-        if (load(s, at, &block, error) != 0) {
+        if (load(s, at, &block, error) != 0)
             return error->code;
-        }
-        for (unsigned i = block.first; i < block.end; i++, left--) {
+        for (unsigned i = block.first; i < block.end; i++, left--)
             faces[(*count)++] = block.faces[i];
-        }
     }
     return 0;
 }
@@ -318,15 +299,13 @@ int host_spill_copy(const struct host_spill *spill, uint32_t node,
         all += entry->used && entry->node == node ? in_blocks(&entry->list) : 0;
     }
     *faces = malloc((size_t)all * sizeof **faces);
-    if (*faces == NULL) {
+    if (*faces == NULL)
         return host_fail_memory(error, "a look at spilled faces");
-    }
     for (uint32_t i = 0; i < spill->table_size; i++) {
         const struct host_spill_entry *entry = &spill->table[i];
         if (entry->used && entry->node == node &&
-            copy_list(spill, &entry->list, *faces, count, error) != 0) {
+            copy_list(spill, &entry->list, *faces, count, error) != 0)
             return error->code;
-        }
     }
     return 0;
 }

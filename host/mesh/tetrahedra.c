@@ -28,9 +28,8 @@ uint32_t (*host_tetrahedra_room(struct host_tetrahedra *tets, uint64_t n,
 }
 
 void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count) {
-    if (count < tets->count) {
+    if (count < tets->count)
         tets->count = count;
-    }
 }
 
 void host_tetrahedra_trim(struct host_tetrahedra *tets) {
@@ -137,9 +136,8 @@ static uint32_t word(const row_t r, int w) {
 
 static bool less(const row_t p, const row_t q) {
     uint64_t a = (uint64_t)p[0] << 32 | p[1], b = (uint64_t)q[0] << 32 | q[1];
-    if (a != b) {
+    if (a != b)
         return a < b;
-    }
     a = (uint64_t)word(p, 2) << 32 | word(p, 3);
     b = (uint64_t)word(q, 2) << 32 | word(q, 3);
     return a != b ? a < b : p[2] < q[2];
@@ -150,9 +148,8 @@ static void insertion_sort(row_t *v, size_t n) {
         row_t t;
         memcpy(t, v[i], sizeof t);
         size_t j = i;
-        for (; j > 0 && less(t, v[j - 1]); j--) {
+        for (; j > 0 && less(t, v[j - 1]); j--)
             memcpy(v[j], v[j - 1], sizeof t);
-        }
         memcpy(v[j], t, sizeof t);
     }
 }
@@ -232,11 +229,10 @@ exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
 }
 
 static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS]) {
-    if (d.word == 0) {
+    if (d.word == 0)
         exchange_by(v, n, 0, d, end);
-    } else {
+    else
         exchange_by(v, n, d.word, d, end);
-    }
 }
 
 /* Sorts by a digit and goes on below it.  Depth: at most 16. */
@@ -247,13 +243,12 @@ static void flag_sort(row_t *v, size_t n, struct digit digit, int bits) {
         return;
     for (size_t b = 0; b < buckets; first = end[b++]) {
         size_t m = end[b] - first;
-        if (m > INSERTION_MAX) {
+        if (m > INSERTION_MAX)
             flag_sort(v + first, m, digit, bits);
-        } else if (digit.word > 0) {
+        else if (digit.word > 0)
             sort_star(v + first, m);
-        } else {
+        else
             insertion_sort(v + first, m);
-        }
     }
 }
 
@@ -269,9 +264,8 @@ static uint32_t middle(row_t *v, size_t n) {
     for (size_t i = 0; i < SAMPLE; i++) {
         uint32_t k = v[n / SAMPLE * i][0];
         size_t j = i;
-        for (; j > 0 && k < key[j - 1]; j--) {
+        for (; j > 0 && k < key[j - 1]; j--)
             key[j] = key[j - 1];
-        }
         key[j] = k;
     }
     return key[SAMPLE / 2];
@@ -308,9 +302,8 @@ static void sort_rows(void *argument) {
         return;
     }
     uint32_t top = 1;
-    for (size_t i = 0; i < s->n; i++) {
+    for (size_t i = 0; i < s->n; i++)
         top |= s->v[i][0];
-    }
     /* The first word in as few digits as there may be, of equal size. */
     int used = 32 - __builtin_clz(top);
     int digits = (used + DIGIT_BITS - 1) / DIGIT_BITS;

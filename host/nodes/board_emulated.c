@@ -36,24 +36,20 @@ static void *map(int fd) {
 static int fill(int fd) {
     static uint8_t erased[1 << 16];
     memset(erased, 0xff, sizeof erased);
-    for (size_t at = 0; at < HOST_FLASH_BYTES; at += sizeof erased) {
+    for (size_t at = 0; at < HOST_FLASH_BYTES; at += sizeof erased)
         if (pwrite(fd, erased, sizeof erased, (off_t)at) !=
-            (ssize_t)sizeof erased) {
+            (ssize_t)sizeof erased)
             return -1;
-        }
-    }
     return 0;
 }
 
 /* A chip as it is sold, erased, or a card with a table: 0, or -1 and errno. */
 static int host_chip_make(int fd, bool card) {
-    if (fill(fd) != 0) {
+    if (fill(fd) != 0)
         return -1;
-    }
     void *bytes = card ? map(fd) : NULL;
-    if (bytes == MAP_FAILED) {
+    if (bytes == MAP_FAILED)
         return -1;
-    }
     if (bytes != NULL) {
         struct loader_card table = LOADER_CARD_IN(bytes);
         (void)loader_card_format(&table);
@@ -122,9 +118,8 @@ static int host_chip_install(int fd, bool card, const char *path,
                              struct host_error *error) {
     struct host_source source;
     if (host_source_open_bounded(&source, path, LOADER_IMAGE_MAX, "an image",
-                                 error) != 0) {
+                                 error) != 0)
         return error->code;
-    }
     void *bytes = map(fd);
     if (bytes == MAP_FAILED) {
         host_fail(error, HOST_BROKEN, "flash: %s; free some memory",
@@ -172,14 +167,11 @@ static void become(const void *context, unsigned node) {
     const struct host_cluster *c = &cube->cluster;
     struct host_emulator emulator = cube->board[node].emulator;
     emulator.errors = cube->errors;
-    for (unsigned d = 0; d < c->dimension; d++) {
-        if (emulator.uart[1 + d].wire.path == NULL) {
+    for (unsigned d = 0; d < c->dimension; d++)
+        if (emulator.uart[1 + d].wire.path == NULL)
             emulator.uart[1 + d].wire.fd = c->wires.end[node][d];
-        }
-    }
-    if (node == 0 && emulator.uart[0].wire.path == NULL) {
+    if (node == 0 && emulator.uart[0].wire.path == NULL)
         emulator.uart[0].wire.fd = c->wires.end[0][c->dimension];
-    }
     host_emulator_become(&emulator, node);
 }
 
@@ -228,15 +220,13 @@ static int make_flash(struct board *board, unsigned node,
     bool card = board->emulator.bare->card;
     snprintf(name, sizeof name, "flash%u", node);
     board->flash = open_file(name, options, error);
-    if (board->flash < 0) {
+    if (board->flash < 0)
         return error->code;
-    }
     if ((fstat(board->flash, &about) != 0 ||
          about.st_size != HOST_FLASH_BYTES) &&
         host_chip_make(board->flash, card) != 0) {
-        if (options->directory == NULL) {
+        if (options->directory == NULL)
             return refuse(name, error);
-        }
         (void)refuse_file(name, options, error);
         (void)unlinkat(options->folder, name, 0); /* half a chip fills what is
                                                      full */
@@ -255,9 +245,8 @@ static int make_log(struct board *board, unsigned node,
     char name[32];
     snprintf(name, sizeof name, "console%u.log", node);
     board->said = open_file(name, options, error);
-    if (board->said >= 0 && ftruncate(board->said, 0) != 0) {
+    if (board->said >= 0 && ftruncate(board->said, 0) != 0)
         refuse(name, error);
-    }
     board->emulator.uart[0].log.fd = board->said;
     return error->code;
 }
@@ -300,9 +289,8 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
                       struct host_error *error) {
     struct board *board = &cube->board[node];
     host_console_init(&board->console, node, bare->machine);
-    if (host_emulator_find(bare, &board->emulator, error) != 0) {
+    if (host_emulator_find(bare, &board->emulator, error) != 0)
         return error->code;
-    }
     if (options->directory != NULL) {
         name_files(cube, node, options);
     } else if (unix_file_pair(board->monitor) != 0) {
@@ -311,9 +299,8 @@ static int make_board(struct cube *cube, const struct host_bare *bare,
         host_qmp_init(&board->qmp, board->monitor[0]);
         board->emulator.qmp.fd = board->monitor[1];
     }
-    if (node != 0 && make_log(board, node, options, error) != 0) {
+    if (node != 0 && make_log(board, node, options, error) != 0)
         return error->code;
-    }
     return make_flash(board, node, options, error);
 }
 
@@ -343,9 +330,8 @@ static void hear_consoles(struct cube *cube) {
     for (unsigned i = 1; i < cube->cluster.nodes; i++) {
         struct board *board = &cube->board[i];
         ssize_t got;
-        if (board->said < 0) {
+        if (board->said < 0)
             continue;
-        }
         while ((got = pread(board->said, bytes, sizeof bytes, board->heard)) >
                0) {
             board->heard += got;
@@ -361,9 +347,8 @@ static int make_trouble(struct cube *cube, struct host_error *error) {
         [HOST_TROUBLE_CONT] = HOST_QMP_CONT};
     enum host_trouble_kind kind;
     unsigned node;
-    if (!host_trouble_due(&cube->troubled, host_now_us(), &kind, &node)) {
+    if (!host_trouble_due(&cube->troubled, host_now_us(), &kind, &node))
         return 0;
-    }
     if (kind == HOST_TROUBLE_KILL) {
         (void)host_child_kill(&cube->cluster.process[node]);
         return 0;
@@ -381,15 +366,12 @@ static void tell_errors(const struct cube *cube) {
         size > (off_t)sizeof text - 1 ? size - ((off_t)sizeof text - 1) : 0;
     ssize_t got = pread(cube->errors, text, sizeof text - 1, from);
     text[got > 0 ? got : 0] = '\0';
-    for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL;) {
+    for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL;)
         said = strncmp(line, "qemu", 4) == 0 ? line : said;
-    }
-    for (unsigned i = 0; i < cube->cluster.nodes && *image == '\0'; i++) {
+    for (unsigned i = 0; i < cube->cluster.nodes && *image == '\0'; i++)
         image = cube->board[i].emulator.kernel;
-    }
-    if (said != NULL) {
+    if (said != NULL)
         host_note("%s; is %s whole? make firmware makes it", said, image);
-    }
 }
 
 static int machine_check(void *context, struct host_error *error) {
@@ -473,9 +455,8 @@ static int host_emulated_start(const struct host_board *board,
     mine.context = cube;
     mine.serial_baud = bare->serial_baud;
     cube->errors = memfd_create("errors", MFD_CLOEXEC);
-    if (cube->errors < 0 || fcntl(cube->errors, F_SETFL, O_APPEND) != 0) {
+    if (cube->errors < 0 || fcntl(cube->errors, F_SETFL, O_APPEND) != 0)
         (void)refuse("errors", error);
-    }
     if (error->code != 0 ||
         host_cluster_start(&cube->cluster, &mine, error) != 0) {
         close_boards(cube);

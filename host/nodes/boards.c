@@ -28,11 +28,9 @@ const char *host_board_name(unsigned i) {
 
 const struct host_board *host_board_named(const char *name) {
     const struct host_board *board;
-    for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++) {
-        if (strcmp(name, board->name) == 0) {
+    for (unsigned i = 0; (board = host_board_row(i)) != NULL; i++)
+        if (strcmp(name, board->name) == 0)
             break;
-        }
-    }
     return board;
 }
 
@@ -50,9 +48,8 @@ static const struct host_board *take_board(const struct host_cube_file *file,
         snprintf(text + used, sizeof text - used, "%s\"%s\"",
                  i == 0 ? "" : " or ", host_board_name(i));
     }
-    if (board == NULL) {
+    if (board == NULL)
         host_cube_wrong(file, where, error, text);
-    }
     return board;
 }
 
@@ -68,9 +65,8 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
                                "nodes = ( { node = 0; .. }, .. );");
     }
     const config_setting_t *board = config_setting_get_member(group, "board");
-    if (host_cube_check_names(file, group, names, error) != 0) {
+    if (host_cube_check_names(file, group, names, error) != 0)
         return error->code;
-    }
     if (!host_cube_take_number(group, "node", 0, (int)file->nodes - 1, &node) ||
         node < 0 || config_setting_length(group) < 2) {
         return host_cube_wrong(file, group, error,
@@ -83,9 +79,8 @@ static int read_node(struct host_cube_file *file, const config_setting_t *group,
                                "nodes: a node twice; name each once");
     }
     named[node] = true;
-    if (board != NULL) {
+    if (board != NULL)
         file->board_of[node] = take_board(file, board, error);
-    }
     return error->code != 0 ? error->code
            : host_cube_read_ssh(file, group, (unsigned)node, error) != 0
                ? error->code
@@ -101,9 +96,8 @@ int host_cube_read_boards(struct host_cube_file *file,
     memset(named, 0, sizeof named);
     file->board =
         all == NULL ? host_board_row(0) : take_board(file, all, error);
-    for (unsigned i = 0; i < file->nodes; i++) {
+    for (unsigned i = 0; i < file->nodes; i++)
         file->board_of[i] = file->board;
-    }
     if (list != NULL && !config_setting_is_list(list)) {
         return host_cube_wrong(file, list, error,
                                "nodes: no list; write nodes = ( { node = 1; "
@@ -191,11 +185,9 @@ int host_cube_check_boards(struct host_cube_file *file,
     for (unsigned i = 0; i < file->wires && error->code == 0; i++) {
         const struct host_cube_wire *wire = &file->wire[i];
         const unsigned ends[] = {wire->node, wire->to};
-        for (int k = 0; k < 2; k++) {
-            if (host_cube_is_bare(file, ends[k])) {
+        for (int k = 0; k < 2; k++)
+            if (host_cube_is_bare(file, ends[k]))
                 (void)check_wire(file, wire, ends[k], error);
-            }
-        }
     }
     return error->code;
 }
@@ -211,9 +203,8 @@ static int start(const struct host_board *board,
     mine.program = program;
     if (host_cluster_program(options->program, board->program, program,
                              sizeof program, error) != 0 ||
-        host_cluster_start(&cluster, &mine, error) != 0) {
+        host_cluster_start(&cluster, &mine, error) != 0)
         return error->code;
-    }
     started->machine = host_cluster_machine(&cluster);
     started->limited = cluster.limited;
     started->memory_held = cluster.limited

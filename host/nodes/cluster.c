@@ -55,16 +55,12 @@ const char *host_link_name(unsigned i) {
 const struct host_link *host_link_named(const char *name) {
     const struct host_link *link;
     unsigned i;
-    for (i = 0; (link = host_link_row(i)) != NULL; i++) {
-        if (strcmp(name, link->name) == 0) {
+    for (i = 0; (link = host_link_row(i)) != NULL; i++)
+        if (strcmp(name, link->name) == 0)
             return link;
-        }
-    }
-    for (i = 0; i < sizeof of_files / sizeof of_files[0]; i++) {
-        if (strcmp(name, of_files[i].name) == 0) {
+    for (i = 0; i < sizeof of_files / sizeof of_files[0]; i++)
+        if (strcmp(name, of_files[i].name) == 0)
             return &of_files[i];
-        }
-    }
     return NULL;
 }
 
@@ -82,13 +78,11 @@ bool host_trouble_due(struct host_troubled *troubled, uint64_t now_us,
     }
     for (unsigned k = 0; k < HOST_TROUBLES; k++) {
         uint64_t every_us = t->trouble.every_us[k];
-        if (t->last_us[k] == 0) {
+        if (t->last_us[k] == 0)
             t->last_us[k] = now_us;
-        }
         if (every_us == 0 || t->turn[k] == t->nodes ||
-            now_us - t->last_us[k] < every_us) {
+            now_us - t->last_us[k] < every_us)
             continue;
-        }
         t->last_us[k] = now_us;
         *kind = (enum host_trouble_kind)k;
         *node = t->turn[k]++;
@@ -117,9 +111,8 @@ static int make_between_nodes(struct host_wires *wires,
     for (unsigned i = 0; i < nodes; i++) {
         for (unsigned d = 0; d < dimension; d++) {
             unsigned other = i ^ 1u << d;
-            if (other < i) {
+            if (other < i)
                 continue;
-            }
             if (link->pair(pair) != 0) {
                 return host_fail(error, HOST_CUBE,
                                  "wire between nodes %u and %u: %s; are %s "
@@ -160,29 +153,24 @@ int host_wires_make(struct host_wires *wires, const struct host_link *link,
     memset(wires, -1, sizeof *wires);
     wires->host_path[0] = '\0';
     int status = make_between_nodes(wires, link, nodes, dimension, error);
-    for (unsigned i = 0; status == 0 && i < host_ports; i++) {
+    for (unsigned i = 0; status == 0 && i < host_ports; i++)
         status = make_to_host(wires, link, dimension, i, error);
-    }
-    if (status != 0) {
+    if (status != 0)
         host_wires_close(wires);
-    }
     return status;
 }
 
 /* Closes the nodes' ends here, once the nodes have theirs. */
 static void host_wires_close_nodes(struct host_wires *wires) {
-    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++) {
-        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+    for (unsigned i = 0; i < HOST_PROCESSES_MAX; i++)
+        for (unsigned d = 0; d < CUBE_LINKS_MAX; d++)
             close_end(&wires->end[i][d]);
-        }
-    }
 }
 
 void host_wires_close(struct host_wires *wires) {
     host_wires_close_nodes(wires);
-    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++) {
+    for (unsigned i = 0; i < CUBE_HOST_PORTS_MAX; i++)
         close_end(&wires->host[i]);
-    }
 }
 
 /* --- cluster -------------------------------------------------------------- */
@@ -274,9 +262,8 @@ static void become_node(const void *context, unsigned node) {
     if (set_limit(RLIMIT_CORE, 0) &&
         (!c->limited ||
          (set_limit(RLIMIT_STACK, HOST_STACK_BYTES) &&
-          set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES)))) {
+          set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES))))
         execve(c->path, argv, c->limited ? no_environment : environ);
-    }
 }
 
 static int start_node(struct host_cluster *c, unsigned node,
@@ -314,9 +301,8 @@ static int take_wires(struct host_cluster *c, struct host_error *error) {
 /* Half of all numbers may follow, so that no start's epoch is 0. */
 static uint32_t first_epoch(void) {
     uint32_t epoch;
-    if (getrandom(&epoch, sizeof epoch, 0) != (ssize_t)sizeof epoch) {
+    if (getrandom(&epoch, sizeof epoch, 0) != (ssize_t)sizeof epoch)
         epoch = (uint32_t)host_now_us();
-    }
     return epoch % (UINT32_MAX / 2) + 1;
 }
 
@@ -326,9 +312,8 @@ static uint32_t first_epoch(void) {
  * terminals is as on real wires. */
 static unsigned host_ports(const struct host_cluster_options *options) {
     if (options->become != NULL || options->link->terminals ||
-        options->one_wire) {
+        options->one_wire)
         return 1;
-    }
     return options->nodes < CUBE_HOST_PORTS_MAX ? options->nodes
                                                 : CUBE_HOST_PORTS_MAX;
 }
@@ -347,27 +332,21 @@ int host_cluster_start(struct host_cluster *cluster,
     /* Not where others wait for the processor. */
     cluster->awake_us = options->nodes < host_threads() ? AWAKE_US : 0;
     cluster->epoch = first_epoch();
-    while (1u << cluster->dimension < options->nodes) {
+    while (1u << cluster->dimension < options->nodes)
         cluster->dimension++;
-    }
     if (host_cluster_program(options->program, "incode-node", cluster->path,
-                             sizeof cluster->path, error) != 0) {
+                             sizeof cluster->path, error) != 0)
         return error->code;
-    }
     int status = host_wires_make(&cluster->wires, options->link, cluster->nodes,
                                  cluster->dimension, cluster->ports, error);
-    if (status == 0) {
+    if (status == 0)
         status = take_wires(cluster, error);
-    }
     cluster->host_epoch = cluster->epoch;
-    for (unsigned i = 0; status == 0 && i < cluster->nodes; i++) {
-        if ((options->left_out >> i & 1) == 0) {
+    for (unsigned i = 0; status == 0 && i < cluster->nodes; i++)
+        if ((options->left_out >> i & 1) == 0)
             status = start_node(cluster, i, error);
-        }
-    }
-    if (status != 0) {
+    if (status != 0)
         host_cluster_stop(cluster);
-    }
     return status;
 }
 
@@ -375,19 +354,16 @@ int host_cluster_start(struct host_cluster *cluster,
  * often: child.h. */
 static int host_cluster_check(struct host_cluster *cluster,
                               struct host_error *error) {
-    if (!host_child_any_died()) {
+    if (!host_child_any_died())
         return 0;
-    }
     for (unsigned i = 0; i < cluster->nodes; i++) {
         struct host_process *process = &cluster->process[i];
         unsigned link = host_link_to(i, 0, cluster->dimension);
-        if (!host_child_died(process)) {
+        if (!host_child_died(process))
             continue;
-        }
         if (host_child_check(process, i, link, error) != 0 ||
-            start_node(cluster, i, error) != 0) {
+            start_node(cluster, i, error) != 0)
             return error->code;
-        }
         cluster->restarts++;
     }
     return 0;
@@ -407,16 +383,13 @@ static bool host_cluster_ended(struct host_cluster *cluster) {
 
 /* Ends what still runs and waits for it.  Also after a failed start. */
 static void host_cluster_stop(struct host_cluster *cluster) {
-    for (unsigned i = 0; i < cluster->nodes; i++) {
+    for (unsigned i = 0; i < cluster->nodes; i++)
         (void)host_child_kill(&cluster->process[i]);
-    }
-    for (unsigned i = 0; i < cluster->nodes; i++) {
+    for (unsigned i = 0; i < cluster->nodes; i++)
         host_child_wait(&cluster->process[i]);
-    }
     host_wires_close(&cluster->wires);
-    for (unsigned i = 0; i < cluster->ports; i++) {
+    for (unsigned i = 0; i < cluster->ports; i++)
         host_port_close(&cluster->port[i]);
-    }
 }
 
 /* --- as a machine --------------------------------------------------------- */
@@ -470,9 +443,8 @@ struct host_machine host_cluster_machine(struct host_cluster *cluster) {
     machine.serial_baud = cluster->options.serial_baud;
     machine.pipe = host_port_pipe(&cluster->port[0]);
     machine.host_ports = (uint8_t)cluster->ports;
-    for (unsigned i = 0; i < cluster->ports; i++) {
+    for (unsigned i = 0; i < cluster->ports; i++)
         machine.wires[i] = host_port_pipe(&cluster->port[i]);
-    }
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = machine_check;
@@ -515,14 +487,12 @@ static int receive_slowly(void *context, uint8_t *bytes, size_t size) {
     struct host_throttled_wire *wire = context;
     struct host_throttled *t = wire->throttled;
     uint64_t passed = now_us(t) - t->start_us;
-    if (t->throttle.stall_us_max != 0 && draw(&t->random) % 32 == 0) {
+    if (t->throttle.stall_us_max != 0 && draw(&t->random) % 32 == 0)
         sleep_us(draw(&t->random) % t->throttle.stall_us_max);
-    }
     if (t->throttle.bytes_a_second != 0 && passed < t->throttle.slow_us) {
         uint64_t allowed = passed * t->throttle.bytes_a_second / 1000000 + 1;
-        if (t->taken >= allowed) {
+        if (t->taken >= allowed)
             return 0;
-        }
         size = allowed - t->taken < size ? (size_t)(allowed - t->taken) : size;
     }
     int got = wire->pipe.receive(wire->pipe.context, bytes, size);
@@ -533,11 +503,10 @@ static int receive_slowly(void *context, uint8_t *bytes, size_t size) {
 /* Bytes that may not be read yet must not wake. */
 static void idle(void *context, uint64_t wait_us) {
     struct host_throttled *t = context;
-    if (t->throttle.bytes_a_second != 0) {
+    if (t->throttle.bytes_a_second != 0)
         sleep_us(wait_us < RATE_IDLE_US ? wait_us : RATE_IDLE_US);
-    } else {
+    else
         t->machine.idle(t->machine.context, wait_us);
-    }
 }
 
 static int check(void *context, struct host_error *error) {

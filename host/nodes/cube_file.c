@@ -40,15 +40,13 @@ static int read_key(struct host_cube_file *file, const config_setting_t *where,
     int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
     struct key_file_text fault = key_file_text(state);
     file->has_key = state == KEY_FILE_GOOD || state == KEY_FILE_SEEN;
-    if (fault.what == NULL) {
+    if (fault.what == NULL)
         return 0;
-    }
     snprintf(message, sizeof message, "key %s: %s%s%s; %s", file->key_path,
              fault.what, reason == 0 ? "" : ": ",
              reason == 0 ? "" : strerror(reason), fault.next);
-    if (!file->has_key) {
+    if (!file->has_key)
         return host_cube_wrong(file, where, error, message);
-    }
     host_note("%s:%u: %s", file->path, config_setting_source_line(where),
               message);
     return 0;
@@ -121,9 +119,8 @@ static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
     file->dead_s = (unsigned)dead;
     if (read_memory(file, root, error) != 0 ||
         host_cube_read_boards(file, root, error) != 0 ||
-        read_start(file, root, error) != 0) {
+        read_start(file, root, error) != 0)
         return error->code;
-    }
     return key == NULL ? 0 : read_key(file, key, error);
 }
 
@@ -138,9 +135,8 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
     const config_setting_t *root = config_root_setting(config);
     const config_setting_t *links = config_setting_get_member(root, "links");
     if (host_cube_check_names(file, root, names, error) != 0 ||
-        read_nodes(file, root, error) != 0) {
+        read_nodes(file, root, error) != 0)
         return error->code;
-    }
     if (links == NULL || !config_setting_is_list(links)) {
         return host_cube_wrong(
             file, links, error,
@@ -154,9 +150,8 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
                                "once");
     }
     file->wire = calloc(count + 1, sizeof *file->wire);
-    if (file->wire == NULL) {
+    if (file->wire == NULL)
         return host_fail_memory(error, "the cube file");
-    }
     for (unsigned i = 0; i < count; i++) {
         config_setting_t *group = config_setting_get_elem(links, i);
         if (!config_setting_is_group(group)) {
@@ -165,9 +160,8 @@ static int read_settings(struct host_cube_file *file, const config_t *config,
                                    "write links = ( { node = 0; to = "
                                    "\"host\"; .. }, .. );");
         }
-        if (host_cube_read_wire(file, group, error) != 0) {
+        if (host_cube_read_wire(file, group, error) != 0)
             return error->code;
-        }
     }
     return host_cube_check_wires(file, links, error) != 0 ||
                    host_cube_check_boards(file, root, error) != 0 ||
@@ -190,9 +184,8 @@ static int open_text(const char *path, struct host_error *error) {
     } else {
         return fd;
     }
-    if (fd >= 0) {
+    if (fd >= 0)
         close(fd);
-    }
     return -1;
 }
 
@@ -206,9 +199,8 @@ static char *read_text(const char *path, struct host_error *error) {
         got = read(fd, text + size, TEXT_MAX + 1 - size);
         size += got > 0 ? (size_t)got : 0;
     }
-    if (fd < 0) {
+    if (fd < 0)
         return NULL;
-    }
     if (text == NULL) {
         host_fail_memory(error, "the cube file");
     } else if (got < 0) {
@@ -238,9 +230,8 @@ int host_cube_file_parse(struct host_cube_file *file, const char *path,
     int status;
     memset(file, 0, sizeof *file);
     file->path = path;
-    if (host_cube_scan(path, text, error) != 0) {
+    if (host_cube_scan(path, text, error) != 0)
         return error->code;
-    }
     config_init(&config);
     if (config_read_string(&config, text) == CONFIG_TRUE) {
         status = read_settings(file, &config, error);
@@ -251,9 +242,8 @@ int host_cube_file_parse(struct host_cube_file *file, const char *path,
                       config_error_line(&config), config_error_text(&config));
     }
     config_destroy(&config);
-    if (status != 0) {
+    if (status != 0)
         host_cube_file_free(file);
-    }
     return status;
 }
 
@@ -298,9 +288,8 @@ static const char *skip(const char *at) {
         } while (*at != '\0' && *at != '"');
         return at + (*at == '"');
     }
-    if (*at == '#' || (at[0] == '/' && at[1] == '/')) {
+    if (*at == '#' || (at[0] == '/' && at[1] == '/'))
         return at + strcspn(at, "\n");
-    }
     if (at[0] == '/' && at[1] == '*') {
         const char *end = strstr(at + 2, "*/");
         return end == NULL ? at + strlen(at) : end + 2;
@@ -314,9 +303,8 @@ static const char *take(struct scan *s) {
     case '(':
     case '[':
     case '{':
-        if (s->depth == DEPTH_MAX) {
+        if (s->depth == DEPTH_MAX)
             return "too many brackets in each other; give three at most";
-        }
         s->settings[++s->depth] = 0;
         return NULL;
     case ')':
@@ -346,13 +334,11 @@ static int host_cube_scan(const char *path, const char *text,
     while (*s.at != '\0') {
         const char *end = skip(s.at);
         const char *why = end == s.at ? take(&s) : NULL;
-        if (why != NULL) {
+        if (why != NULL)
             return host_fail(error, HOST_INPUT, "%s:%u: %s", path, s.line, why);
-        }
         end += end == s.at ? 1 : 0;
-        for (; s.at < end; s.at++) {
+        for (; s.at < end; s.at++)
             s.line += *s.at == '\n' ? 1 : 0;
-        }
     }
     return 0;
 }
@@ -375,9 +361,8 @@ int host_cube_check_names(const struct host_cube_file *file,
             config_setting_get_elem(group, (unsigned)i);
         const char *name = config_setting_name(member);
         bool known = false;
-        for (unsigned k = 0; names[k] != NULL; k++) {
+        for (unsigned k = 0; names[k] != NULL; k++)
             known = known || strcmp(names[k], name) == 0;
-        }
         if (!known) {
             char text[160];
             snprintf(text, sizeof text,
@@ -397,9 +382,8 @@ bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
     long long n = config_setting_get_int64(setting);
     int type = config_setting_type(setting);
     if ((type != CONFIG_TYPE_INT && type != CONFIG_TYPE_INT64) || n < lo ||
-        n > hi) {
+        n > hi)
         return false;
-    }
     *value = (int)n;
     return true;
 }
@@ -425,9 +409,8 @@ int host_cube_beside(const struct host_cube_file *file,
                      const config_setting_t *where, char *path, size_t size) {
     const char *name = config_setting_get_string(where);
     const char *slash = strrchr(file->path, '/');
-    if (name == NULL || name[0] == '\0') {
+    if (name == NULL || name[0] == '\0')
         return -1;
-    }
     int folder =
         name[0] == '/' || slash == NULL ? 0 : (int)(slash - file->path) + 1;
     int length = snprintf(path, size, "%.*s%s", folder, file->path, name);
@@ -466,9 +449,8 @@ static bool is_destination(const char *text) {
 /* A line feed would end a line of a unit of systemd. */
 static bool is_folder(const char *text) {
     bool good = text[0] != '\0';
-    for (const char *at = text; *at != '\0'; at++) {
+    for (const char *at = text; *at != '\0'; at++)
         good = good && (uint8_t)*at >= ' ' && *at != 0x7f;
-    }
     return good;
 }
 
@@ -479,9 +461,8 @@ int host_cube_read_ssh(struct host_cube_file *file,
     const config_setting_t *folder = config_setting_get_member(group, "folder");
     const char *text = to == NULL ? NULL : config_setting_get_string(to);
     const char *path = folder == NULL ? "" : config_setting_get_string(folder);
-    if (to == NULL && folder == NULL) {
+    if (to == NULL && folder == NULL)
         return 0;
-    }
     if (text == NULL || strlen(text) >= HOST_SSH_MAX || !is_destination(text)) {
         return host_cube_wrong(file, to == NULL ? folder : to, error,
                                "ssh: not who and where; write \"pi@10.0.0.11\" "
@@ -493,12 +474,10 @@ int host_cube_read_ssh(struct host_cube_file *file,
                                "folder: not a folder of the board; write "
                                "\"/opt/incode\", or leave it out");
     }
-    if (file->ssh == NULL) {
+    if (file->ssh == NULL)
         file->ssh = calloc(file->nodes, sizeof *file->ssh);
-    }
-    if (file->ssh == NULL) {
+    if (file->ssh == NULL)
         return host_fail_memory(error, "the cube file");
-    }
     strcpy(file->ssh[node].to, text);
     strcpy(file->ssh[node].folder, path);
     file->ssh[node].line = config_setting_source_line(group);
@@ -536,9 +515,8 @@ enum { TEXT_BYTES = 2 * SECURE_KEY_BYTES + 1 };
 static bool draw_digits(char text[TEXT_BYTES]) {
     static const char digits[] = "0123456789abcdef";
     uint8_t key[SECURE_KEY_BYTES];
-    if (getrandom(key, sizeof key, 0) != (ssize_t)sizeof key) {
+    if (getrandom(key, sizeof key, 0) != (ssize_t)sizeof key)
         return false;
-    }
     for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
         text[2 * i] = digits[key[i] >> 4];
         text[2 * i + 1] = digits[key[i] & 15];
@@ -551,9 +529,8 @@ static bool draw_digits(char text[TEXT_BYTES]) {
 static bool write_all(int fd, const char *text, size_t size) {
     while (size > 0) {
         ssize_t written = write(fd, text, size);
-        if (written < 0 && errno != EINTR) {
+        if (written < 0 && errno != EINTR)
             return false;
-        }
         text += written > 0 ? written : 0;
         size -= written > 0 ? (size_t)written : 0;
     }
@@ -580,12 +557,10 @@ int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
         reason = errno;
         good = false;
     }
-    if (good) {
+    if (good)
         return 0;
-    }
-    if (fd >= 0) {
+    if (fd >= 0)
         (void)unlink(path);
-    }
     return host_fail(error, HOST_INPUT,
                      "%s: %s; give a name where a file can be written", path,
                      strerror(reason));

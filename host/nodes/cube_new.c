@@ -50,9 +50,8 @@ unsigned host_cube_node_options(
                    {"--serial-baud", file->serial_baud, 0},
                    {"--host-port", node != 0 && host != NULL ? 1 : 0, 0}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
-        if (numbers[i].value == numbers[i].usual) {
+        if (numbers[i].value == numbers[i].usual)
             continue;
-        }
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%s", numbers[i].name);
         snprintf(options[n++], HOST_NODE_OPTION_BYTES, "%llu",
                  (unsigned long long)numbers[i].value);
@@ -68,9 +67,8 @@ unsigned host_cube_node_options(
             d == file->dimension
                 ? host
                 : host_cube_between(file, node, node ^ 1u << d, &count);
-        if (wire == NULL) {
+        if (wire == NULL)
             continue;
-        }
         if (wire->insecure && insecure == NULL) {
             snprintf(options[n++], HOST_NODE_OPTION_BYTES, "--insecure");
             insecure = options[n++];
@@ -97,15 +95,13 @@ const char *host_cube_start_line(const struct host_cube_file *file,
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     unsigned count = host_cube_node_options(file, node, options);
     const char *program = file->board_of[node]->program;
-    if (program == NULL || host_text_quote(line, size, program) != 0) {
+    if (program == NULL || host_text_quote(line, size, program) != 0)
         return NULL;
-    }
     for (unsigned k = 0; k < count; k++) {
         size_t used = strlen(line);
-        if (size - used < 2 || host_text_quote(line + used + 1, size - used - 1,
-                                               options[k]) != 0) {
+        if (size - used < 2 ||
+            host_text_quote(line + used + 1, size - used - 1, options[k]) != 0)
             return NULL;
-        }
         line[used] = ' ';
     }
     return line;
@@ -113,11 +109,10 @@ const char *host_cube_start_line(const struct host_cube_file *file,
 
 const char *host_cube_wire_name(const struct host_cube_wire *wire, char *name,
                                 size_t size) {
-    if (wire->serial) {
+    if (wire->serial)
         snprintf(name, size, "%s", wire->device[1]);
-    } else {
+    else
         host_cube_print_address(&wire->via, name, size);
-    }
     return name;
 }
 
@@ -131,9 +126,8 @@ static void print_bare(const struct host_cube_file *file, unsigned node) {
            node, board->name, board->bare->image);
     for (unsigned k = 0; k < 2; k++) {
         const struct host_cube_wire *wire = host_cube_host_wire(file, k);
-        if (wire != NULL && wire->node == node) {
+        if (wire != NULL && wire->node == node)
             printf("host, ");
-        }
     }
     printf("console");
     for (unsigned d = 0; d < file->dimension; d++) {
@@ -153,9 +147,8 @@ static int host_cube_print(const char *path, struct host_error *error) {
     /* A byte becomes "$(printf '\\377')" at most. */
     static char line[20 * HOST_NODE_OPTIONS_MAX * HOST_NODE_OPTION_BYTES];
     static struct host_cube_file file;
-    if (host_cube_file_read(&file, path, error) != 0) {
+    if (host_cube_file_read(&file, path, error) != 0)
         return error->code;
-    }
     for (unsigned i = 0; i < file.nodes; i++) {
         if (host_cube_is_bare(&file, i)) {
             print_bare(&file, i);
@@ -255,9 +248,8 @@ static void host_of(const struct cube_new *c, unsigned k,
 /* That stands in quotation marks of a cube file as it is. */
 static bool is_word(const char *text) {
     bool good = true;
-    for (const char *at = text; *at != '\0'; at++) {
+    for (const char *at = text; *at != '\0'; at++)
         good = good && *at > ' ' && *at < 0x7f && *at != '"' && *at != '\\';
-    }
     return good;
 }
 
@@ -316,9 +308,8 @@ static int check(struct cube_new *c) {
                          "/dev/ttyUSB0, or usb:SERIAL of an adapter",
                          c->device);
     }
-    if (c->hosts != NULL && check_hosts(c) != 0) {
+    if (c->hosts != NULL && check_hosts(c) != 0)
         return c->error->code;
-    }
     c->dimension = (unsigned)__builtin_ctz(c->nodes);
     if (bare && c->nodes > host_bare_nodes_max(c->board->bare)) {
         return host_fail(c->error, HOST_USAGE,
@@ -379,9 +370,8 @@ static void put_local(FILE *out, const struct cube_new *c) {
     (void)fputs("# The host starts these nodes itself, on its own machine.\n"
                 "start = [",
                 out);
-    for (unsigned i = 0; i < c->nodes; i++) {
+    for (unsigned i = 0; i < c->nodes; i++)
         (void)fprintf(out, "%s%u", i == 0 ? "" : ", ", i);
-    }
     (void)fputs("];\nlinks = (\n"
                 "    { node = 0; to = \"host\"; unix = \"host.socket\"; }",
                 out);
@@ -451,9 +441,8 @@ static int make_key(const struct cube_new *c, char *path, size_t size) {
 static int write_new(const struct cube_new *c) {
     char key[4096] = "";
     if (c->hosts != NULL && access(c->output, F_OK) != 0 &&
-        make_key(c, key, sizeof key) != 0) {
+        make_key(c, key, sizeof key) != 0)
         return c->error->code;
-    }
     int fd = host_create(c->output, 0644);
     FILE *out = fd < 0 ? NULL : fdopen(fd, "w");
     if (out == NULL) {
@@ -506,8 +495,7 @@ int host_cube_command(int argc, char **argv, struct host_error *error) {
         NULL};
     struct cube_new c = {.error = error};
     if (host_options_parse(&argp, argc, argv, 0, &c, error) != 0 ||
-        check(&c) != 0) {
+        check(&c) != 0)
         return error->code;
-    }
     return c.nodes > 0 ? write_new(&c) : host_cube_print(c.file, error);
 }

@@ -80,13 +80,11 @@ static int read_net(const struct host_cube_file *file,
                     struct host_error *error) {
     const config_setting_t *at = config_setting_get_member(group, "tcp");
     const config_setting_t *via = config_setting_get_member(group, "via");
-    if (host_cube_resolve(file, at, &wire->at, error) != 0) {
+    if (host_cube_resolve(file, at, &wire->at, error) != 0)
         return error->code;
-    }
     wire->via = wire->at;
-    if (via != NULL && host_cube_resolve(file, via, &wire->via, error) != 0) {
+    if (via != NULL && host_cube_resolve(file, via, &wire->via, error) != 0)
         return error->code;
-    }
     return read_guard(file, group, wire, error);
 }
 
@@ -164,9 +162,8 @@ int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
     wire->line = config_setting_source_line(group);
     if (host_cube_check_names(file, group, names, error) != 0 ||
         read_end(file, group, "node", &wire->node, error) != 0 ||
-        read_end(file, group, "to", &wire->to, error) != 0) {
+        read_end(file, group, "to", &wire->to, error) != 0)
         return error->code;
-    }
     if (wire->to != CUBE_HOST &&
         __builtin_popcount(wire->node ^ wire->to) != 1) {
         return host_cube_wrong(
@@ -186,15 +183,13 @@ int host_cube_read_wire(struct host_cube_file *file, config_setting_t *group,
                      serial  ? "serial"
                      : local ? "unix"
                              : "tcp",
-                     error) != 0) {
+                     error) != 0)
         return error->code;
-    }
     int status = serial  ? read_line(file, group, wire, error)
                  : local ? read_path(file, group, wire, error)
                          : read_net(file, group, wire, error);
-    if (serial && (file->serial_baud == 0 || wire->baud < file->serial_baud)) {
+    if (serial && (file->serial_baud == 0 || wire->baud < file->serial_baud))
         file->serial_baud = wire->baud;
-    }
     file->wires++;
     return status;
 }
@@ -216,11 +211,9 @@ host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
 
 const struct host_cube_wire *
 host_cube_host_wire(const struct host_cube_file *file, unsigned k) {
-    for (unsigned i = 0; i < file->wires; i++) {
-        if (file->wire[i].to == CUBE_HOST && k-- == 0) {
+    for (unsigned i = 0; i < file->wires; i++)
+        if (file->wire[i].to == CUBE_HOST && k-- == 0)
             return &file->wire[i];
-        }
-    }
     return NULL;
 }
 
@@ -246,9 +239,8 @@ static bool same_address(const struct host_cube_file *file,
                          const struct host_cube_wire *a,
                          const struct host_cube_wire *b) {
     if (a->serial || b->serial || a->at.size != b->at.size ||
-        memcmp(&a->at.to, &b->at.to, a->at.size) != 0) {
+        memcmp(&a->at.to, &b->at.to, a->at.size) != 0)
         return false;
-    }
     return tcp_address_path(&a->at) != NULL ? meet(file, a, b)
            : tcp_address_is_any(&a->at)
                ? owner(file, a->node) == owner(file, b->node)
@@ -264,20 +256,18 @@ static const char *same_device(const struct host_cube_file *file,
         unsigned left = i / 2 == 0 ? a->node : a->to;
         unsigned right = i % 2 == 0 ? b->node : b->to;
         if (owner(file, left) == owner(file, right) &&
-            strcmp(a->device[i / 2], b->device[i % 2]) == 0) {
+            strcmp(a->device[i / 2], b->device[i % 2]) == 0)
             found = a->device[i / 2];
-        }
     }
     return found;
 }
 
 /* "nodes 0 and 1", "node 0 and the host" */
 static void name_wire(const struct host_cube_wire *wire, char text[40]) {
-    if (wire->to == CUBE_HOST) {
+    if (wire->to == CUBE_HOST)
         snprintf(text, 40, "node %u and the host", wire->node);
-    } else {
+    else
         snprintf(text, 40, "nodes %u and %u", wire->node, wire->to);
-    }
 }
 
 void host_cube_name_wire(const struct host_cube_file *file,
@@ -298,9 +288,8 @@ const struct host_link *host_cube_link(const struct host_cube_file *file) {
                 ? "uart"
             : tcp_address_path(&w->at) != NULL ? "unix"
                                                : "tcp";
-        if (first != NULL && strcmp(first, name) != 0) {
+        if (first != NULL && strcmp(first, name) != 0)
             return host_link_named("mixed");
-        }
         first = name;
     }
     return host_link_named(first);
@@ -394,11 +383,9 @@ const char *host_line_name(enum host_line_kind kind) {
 const struct host_cube_pin *host_cube_pin(const struct host_cube_file *file,
                                           unsigned node,
                                           enum host_line_kind kind) {
-    for (unsigned i = 0; i < file->pins; i++) {
-        if (file->pin[i].node == node && file->pin[i].kind == kind) {
+    for (unsigned i = 0; i < file->pins; i++)
+        if (file->pin[i].node == node && file->pin[i].kind == kind)
             return &file->pin[i];
-        }
-    }
     return NULL;
 }
 
@@ -458,9 +445,8 @@ static bool take_name(const config_setting_t *setting,
                       char name[HOST_PIN_NAME_MAX]) {
     const char *text =
         setting == NULL ? NULL : config_setting_get_string(setting);
-    if (text == NULL || *text == '\0' || strlen(text) >= HOST_PIN_NAME_MAX) {
+    if (text == NULL || *text == '\0' || strlen(text) >= HOST_PIN_NAME_MAX)
         return false;
-    }
     memcpy(name, text, strlen(text) + 1);
     return true;
 }
@@ -469,9 +455,8 @@ static bool take_name(const config_setting_t *setting,
 static bool take_line(const config_setting_t *setting,
                       struct host_cube_pin *pin) {
     int offset = 0;
-    if (take_name(setting, pin->name)) {
+    if (take_name(setting, pin->name))
         return true;
-    }
     bool good =
         setting != NULL && host_cube_is_number(setting, 0, 65535, &offset);
     pin->offset = (unsigned)offset;
@@ -500,9 +485,8 @@ static int read_chip_line(struct host_cube_file *file,
                      "17; active_low = true; }",
                      error);
     }
-    if (host_cube_check_names(file, group, names, error) != 0) {
+    if (host_cube_check_names(file, group, names, error) != 0)
         return error->code;
-    }
     if (!take_name(config_setting_get_member(group, "chip"), pin.chip)) {
         what = "chip: not given, or no name of 1 to 63 bytes; write chip = "
                "\"gpiochip0\"; or its label, as gpioinfo shows it";
@@ -543,14 +527,12 @@ static int read_modem_line(struct host_cube_file *file,
                            struct host_error *error) {
     struct host_cube_pin pin = {.node = wire->node, .rts = rts};
     const char *text = config_setting_get_string(setting), *what = NULL;
-    for (unsigned i = 0; i < file->wires; i++) {
+    for (unsigned i = 0; i < file->wires; i++)
         pin.wire += file->wire[i].to == CUBE_HOST ? 1 : 0;
-    }
-    if (text != NULL && strcmp(text, kinds[HOST_LINE_BOOT]) == 0) {
+    if (text != NULL && strcmp(text, kinds[HOST_LINE_BOOT]) == 0)
         pin.kind = HOST_LINE_BOOT;
-    } else if (text == NULL || strcmp(text, kinds[HOST_LINE_RESET]) != 0) {
+    else if (text == NULL || strcmp(text, kinds[HOST_LINE_RESET]) != 0)
         what = "does neither; give \"reset\" or \"boot\"";
-    }
     if (wire->to != CUBE_HOST || pin.wire > 1) {
         what = "not at a wire of the host, which sets its own ports alone; "
                "leave it out";
@@ -572,8 +554,7 @@ static int host_cube_read_modem(struct host_cube_file *file,
     const config_setting_t *rts = config_setting_get_member(group, "rts");
     wire->dtr_low = dtr != NULL;
     wire->rts_low = rts != NULL;
-    if (dtr != NULL && read_modem_line(file, dtr, wire, false, error) != 0) {
+    if (dtr != NULL && read_modem_line(file, dtr, wire, false, error) != 0)
         return error->code;
-    }
     return rts == NULL ? 0 : read_modem_line(file, rts, wire, true, error);
 }

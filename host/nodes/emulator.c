@@ -29,9 +29,8 @@ static int find_program(const struct host_bare *bare, char path[PATH_MAX],
         int length = (int)strcspn(folders, ":");
         int size =
             snprintf(path, PATH_MAX, "%.*s/%s", length, folders, bare->program);
-        if (length > 0 && size < PATH_MAX && access(path, X_OK) == 0) {
+        if (length > 0 && size < PATH_MAX && access(path, X_OK) == 0)
             return 0;
-        }
         folders += length + (folders[length] == ':');
     }
     return host_fail(error, HOST_CUBE,
@@ -55,9 +54,8 @@ static int find_image(const char *image, char path[PATH_MAX],
     *slash = '\0';
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
         snprintf(path, PATH_MAX, "%s/%s/%s", here, folders[i], image);
-        if (access(path, R_OK) == 0) {
+        if (access(path, R_OK) == 0)
             return 0;
-        }
     }
     return host_fail(error, HOST_CUBE,
                      "%s/firmware/%s: %s; make the board's firmware with: make "
@@ -72,13 +70,11 @@ int host_emulator_find(const struct host_bare *bare,
     emulator->bare = bare;
     emulator->flash.fd = emulator->qmp.fd = emulator->errors = -1;
     emulator->folder = -1;
-    for (unsigned i = 0; i < HOST_UARTS_MAX; i++) {
+    for (unsigned i = 0; i < HOST_UARTS_MAX; i++)
         emulator->uart[i].wire.fd = emulator->uart[i].log.fd = -1;
-    }
     if (find_program(bare, emulator->program, error) != 0 ||
-        find_image(bare->image, emulator->image, error) != 0) {
+        find_image(bare->image, emulator->image, error) != 0)
         return error->code;
-    }
     return find_image(bare->loader, emulator->kernel, error);
 }
 
@@ -88,13 +84,11 @@ bool host_firmware_find(const char *board, char path[PATH_MAX]) {
     char here[PATH_MAX];
     if (row == NULL || row->bare == NULL ||
         find_image(row->bare->image, path, &error) != 0 ||
-        getcwd(here, sizeof here) == NULL) {
+        getcwd(here, sizeof here) == NULL)
         return false;
-    }
     size_t above = strlen(here);
-    if (strncmp(path, here, above) == 0 && path[above] == '/') {
+    if (strncmp(path, here, above) == 0 && path[above] == '/')
         memmove(path, path + above + 1, strlen(path + above + 1) + 1);
-    }
     return true;
 }
 
@@ -136,13 +130,11 @@ static void add_file(struct words *w, const char *name,
         return;
     }
     for (const char *at = place.path; *at != '\0'; at++) {
-        if (used + 3 > ARGUMENT_BYTES) {
+        if (used + 3 > ARGUMENT_BYTES)
             break;
-        }
         text[used++] = *at;
-        if (*at == ',') {
+        if (*at == ',')
             text[used++] = ',';
-        }
     }
     text[used] = '\0';
 }
@@ -184,9 +176,8 @@ static void add_flash(struct words *w, struct host_place flash, bool card) {
 static void stay_on_one(unsigned turn) {
     cpu_set_t allowed, one;
     CPU_ZERO(&one);
-    if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) {
+    if (sched_getaffinity(0, sizeof allowed, &allowed) != 0)
         return;
-    }
     turn %= (unsigned)CPU_COUNT(&allowed);
     for (size_t i = 0; i < CPU_SETSIZE; i++) {
         if (CPU_ISSET(i, &allowed) && turn-- == 0) {
@@ -203,12 +194,10 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn) {
     const struct host_emulator *e = emulator;
     struct words *w = &words;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
-    if (e->folder >= 0) {
+    if (e->folder >= 0)
         (void)fcntl(e->folder, F_SETFD, 0);
-    }
-    if (e->errors >= 0) {
+    if (e->errors >= 0)
         (void)dup2(e->errors, STDERR_FILENO);
-    }
     add(w, "%s", e->bare->program);
     add(w, "-M");
     add(w, "%s", e->bare->machine);
@@ -288,9 +277,8 @@ static json_t *hear(struct host_qmp *qmp, uint64_t due_us,
             qmp->skipping = false;
             qmp->used -= size + 1;
             memmove(qmp->line, end + 1, qmp->used);
-            if (object != NULL) {
+            if (object != NULL)
                 return object;
-            }
             continue;
         }
         if (qmp->used == sizeof qmp->line) {
@@ -318,11 +306,10 @@ static int await(struct host_qmp *qmp, const char *good, const char *bad,
     json_t *object;
     int found = -1;
     while (found < 0 && (object = hear(qmp, due_us, error)) != NULL) {
-        if (json_object_get(object, good) != NULL) {
+        if (json_object_get(object, good) != NULL)
             found = 0;
-        } else if (json_object_get(object, bad) != NULL) {
+        else if (json_object_get(object, bad) != NULL)
             found = 1;
-        }
         json_decref(object);
     }
     return found;
@@ -332,9 +319,8 @@ static int request(struct host_qmp *qmp, const char *name, uint64_t due_us,
                    struct host_error *error) {
     char text[64];
     snprintf(text, sizeof text, "{\"execute\":\"%s\"}\n", name);
-    if (say(qmp, text, due_us, error) != 0) {
+    if (say(qmp, text, due_us, error) != 0)
         return error->code;
-    }
     int answer = await(qmp, "return", "error", due_us, error);
     return answer <= 0 ? error->code : fail(error, "it refuses the request");
 }
@@ -348,9 +334,8 @@ int host_qmp_ask(struct host_qmp *qmp, enum host_qmp_request what,
     error->code = 0;
     if (!qmp->ready) {
         if (await(qmp, "QMP", "QMP", due_us, error) < 0 ||
-            request(qmp, "qmp_capabilities", due_us, error) != 0) {
+            request(qmp, "qmp_capabilities", due_us, error) != 0)
             return error->code;
-        }
         qmp->ready = true;
     }
     return request(qmp, names[what], due_us, error);

@@ -41,9 +41,8 @@ int host_child_start(struct host_process *process,
                          child->node, strerror(errno));
     }
     pid_t host = getpid(), started = fork();
-    if (started == 0) {
+    if (started == 0)
         become(child, host, report[1]);
-    }
     reason = errno;
     close(report[1]);
     if (started < 0) {
@@ -70,9 +69,8 @@ int host_child_start(struct host_process *process,
 static bool reap(struct host_process *process, int flags) {
     int status;
     if (process->pid == 0 ||
-        waitpid(process->pid, &status, flags) != process->pid) {
+        waitpid(process->pid, &status, flags) != process->pid)
         return false;
-    }
     process->pid = 0;
     process->status = status;
     return true;
@@ -173,9 +171,8 @@ static void take(struct host_console *c) {
     c->used -= c->used > 0 && c->text[c->used - 1] == ' ';
     c->text[c->used] = '\0';
     char *rest = strstr(c->text, RESTARTING);
-    if (rest == NULL) {
+    if (rest == NULL)
         return;
-    }
     *rest = '\0';
     rest += strlen(RESTARTING);
     int length = snprintf(before, sizeof before, "incode: %s: ", c->board);
@@ -190,28 +187,25 @@ static void take(struct host_console *c) {
 static void hear(struct host_console *c, uint8_t byte) {
     bool blank = byte == '\n' || byte == '\r' || byte == '\t' || byte == ' ';
     if (byte == 0) {
-        if (c->at == HOST_CONSOLE_RECORD && c->used > 0) {
+        if (c->at == HOST_CONSOLE_RECORD && c->used > 0)
             take(c);
-        }
         c->at = HOST_CONSOLE_ZERO;
     } else if (c->at == HOST_CONSOLE_ZERO) {
         c->at = byte == RECORD ? HOST_CONSOLE_RECORD : HOST_CONSOLE_OTHER;
         c->used = 0;
     } else if (c->at == HOST_CONSOLE_RECORD) {
-        if (!blank && (byte < ' ' || byte > '~')) {
+        if (!blank && (byte < ' ' || byte > '~'))
             c->at = HOST_CONSOLE_OTHER;
-        } else if (c->used < HOST_CONSOLE_TEXT && (!blank || c->used > 0) &&
-                   (!blank || c->text[c->used - 1] != ' ')) {
+        else if (c->used < HOST_CONSOLE_TEXT && (!blank || c->used > 0) &&
+                 (!blank || c->text[c->used - 1] != ' '))
             c->text[c->used++] = blank ? ' ' : (char)byte;
-        }
     }
 }
 
 void host_console_hear(struct host_console *console, const uint8_t *bytes,
                        size_t size) {
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         hear(console, bytes[i]);
-    }
 }
 
 static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
@@ -222,9 +216,8 @@ static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
 static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct host_console *c = context;
     int got = c->beneath.receive(c->beneath.context, bytes, size);
-    if (got > 0) {
+    if (got > 0)
         host_console_hear(c, bytes, (size_t)got);
-    }
     return got;
 }
 
@@ -246,9 +239,8 @@ int host_resolve(const char *text, struct tcp_address *address, char *why,
     char host[256];
     const char *colon = strrchr(text, ':');
     uint64_t port = 0;
-    if (tcp_address_parse(address, text) == 0) {
+    if (tcp_address_parse(address, text) == 0)
         return 0;
-    }
     if (colon == NULL || (size_t)(colon - text) >= sizeof host ||
         host_parse_number(colon + 1, 1, 65535, &port) != 0) {
         snprintf(why, size,
@@ -281,9 +273,8 @@ int host_port_serial(struct host_port *port,
                      const struct serial_port_settings *settings,
                      struct host_error *error) {
     memset(port, 0, sizeof *port);
-    if (serial_port_open(&port->serial, settings) != 0) {
+    if (serial_port_open(&port->serial, settings) != 0)
         return host_fail(error, HOST_CUBE, "%s", port->serial.fault);
-    }
     port->kind = HOST_PORT_SERIAL;
     return 0;
 }
@@ -308,9 +299,8 @@ struct link_pipe host_port_pipe(struct host_port *port) {
 
 static void unplug(struct host_port *port) {
     uint64_t now_us = host_now_us();
-    if (port->unplugged_us == 0 || port->serial.pipe.fd < 0) {
+    if (port->unplugged_us == 0 || port->serial.pipe.fd < 0)
         port->unplugged_us = now_us;
-    }
     if (now_us - port->unplugged_us >= port->unplug_us) {
         port->unplugged_us = now_us;
         serial_close(port->serial.pipe.fd);
@@ -345,21 +335,18 @@ void host_port_idle(struct host_port *ports, unsigned count, uint64_t wait_us) {
         struct host_port *port = &ports[i];
         struct serial_pipe *pipe = &port->serial.pipe;
         bool serial = port->kind == HOST_PORT_SERIAL;
-        if (serial && serial_wait_us(pipe) < wait_us) {
+        if (serial && serial_wait_us(pipe) < wait_us)
             wait_us = serial_wait_us(pipe);
-        }
         used += add_events(port, fds + used);
-        if (serial && port->unplug_us != 0) {
+        if (serial && port->unplug_us != 0)
             unplug(port);
-        }
     }
     wait_files(fds, used, wait_us, 0);
 }
 
 void host_port_rest(struct host_port *port, uint64_t rest_us) {
-    if (port->kind == HOST_PORT_NET) {
+    if (port->kind == HOST_PORT_NET)
         tcp_wire_rest(&port->net, rest_us);
-    }
 }
 
 int host_port_fault(const struct host_port *port) {

@@ -25,9 +25,8 @@ static void become_node(const void *context, unsigned node) {
     char *no_environment[] = {NULL};
     unsigned count = host_cube_node_options(r->file, node, options);
     snprintf(name, sizeof name, "%s", r->file->board_of[node]->program);
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         argv[1 + i] = options[i];
-    }
     execve(r->program, argv, no_environment);
 }
 
@@ -51,9 +50,8 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
                                          .dtr = !wire->dtr_low,
                                          .rts = !wire->rts_low};
         memcpy(s.name, wire->device[1], sizeof s.name);
-        if (host_port_serial(port, &s, error) != 0) {
+        if (host_port_serial(port, &s, error) != 0)
             return error->code;
-        }
     } else {
         struct tcp_wire_config config = {.address = wire->via};
         config.ends = &r->ends[r->ports];
@@ -68,9 +66,8 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
                       "key FILE",
                       name);
         }
-        if (host_port_net(port, &config, error) != 0) {
+        if (host_port_net(port, &config, error) != 0)
             return error->code;
-        }
     }
     r->ports++;
     return 0;
@@ -78,11 +75,9 @@ static int open_port(struct host_remote *r, const struct host_cube_wire *wire,
 
 const struct host_board *
 host_remote_started(const struct host_cube_file *file) {
-    for (unsigned i = 0; i < file->nodes; i++) {
-        if (file->local[i]) {
+    for (unsigned i = 0; i < file->nodes; i++)
+        if (file->local[i])
             return file->board_of[i];
-        }
-    }
     return NULL;
 }
 
@@ -100,12 +95,11 @@ static void tell_where(const struct host_cube_file *file, char *where) {
     static const char option[] = "--cube ";
     enum { HEAD = sizeof option - 1 };
     memcpy(where, option, sizeof option);
-    if (strncmp(file->path, "--", 2) == 0) {
+    if (strncmp(file->path, "--", 2) == 0)
         snprintf(where, HOST_REMOTE_WHERE, "%s", file->path);
-    } else if (host_text_quote(where + HEAD, HOST_REMOTE_WHERE - HEAD,
-                               file->path) != 0) {
+    else if (host_text_quote(where + HEAD, HOST_REMOTE_WHERE - HEAD,
+                             file->path) != 0)
         snprintf(where + HEAD, HOST_REMOTE_WHERE - HEAD, "FILE");
-    }
 }
 
 int host_remote_start(struct host_remote *remote,
@@ -123,19 +117,14 @@ int host_remote_start(struct host_remote *remote,
     host_remote_wire(file, wire);
     host_offer_begin(&remote->offer, wire);
     int status = host_remote_free(file, 0, error);
-    for (unsigned i = 0; i < file->nodes && status == 0; i++) {
-        if (file->local[i]) {
+    for (unsigned i = 0; i < file->nodes && status == 0; i++)
+        if (file->local[i])
             status = start_node(remote, i, error);
-        }
-    }
-    for (unsigned k = 0; k < HOST_PORTS_MAX && status == 0; k++) {
-        if (host_cube_host_wire(file, k) != NULL) {
+    for (unsigned k = 0; k < HOST_PORTS_MAX && status == 0; k++)
+        if (host_cube_host_wire(file, k) != NULL)
             status = open_port(remote, host_cube_host_wire(file, k), error);
-        }
-    }
-    if (status != 0) {
+    if (status != 0)
         host_remote_stop(remote);
-    }
     return status;
 }
 
@@ -165,9 +154,8 @@ void host_remote_wire(const struct host_cube_file *file,
     char path[PATH_BYTES], text[SERIAL_NAME_MAX];
     const char *socket = wire == NULL ? NULL : tcp_address_path(&wire->via);
     name[0] = '\0';
-    if (wire == NULL) {
+    if (wire == NULL)
         return;
-    }
     if (wire->serial || socket != NULL) {
         put_path(wire->serial ? wire->device[1] : socket, path);
         snprintf(name, HOST_WIRE_NAME, "%s:%s",
@@ -215,13 +203,11 @@ void host_remote_stop(struct host_remote *remote) {
     for (unsigned i = 0; i < remote->file->wires; i++) {
         const struct host_cube_wire *wire = &remote->file->wire[i];
         if (remote->file->local[wire->node] &&
-            tcp_address_path(&wire->at) != NULL) {
+            tcp_address_path(&wire->at) != NULL)
             unix_file_remove(&wire->at);
-        }
     }
-    while (remote->ports > 0) {
+    while (remote->ports > 0)
         host_port_close(&remote->port[--remote->ports]);
-    }
 }
 
 /* --- as a machine --------------------------------------------------------- */
@@ -238,18 +224,15 @@ static void machine_idle(void *context, uint64_t wait_us) {
 
 static int machine_check(void *context, struct host_error *error) {
     struct host_remote *r = context;
-    if (!host_child_any_died()) {
+    if (!host_child_any_died())
         return 0;
-    }
     for (unsigned i = 0; i < r->file->nodes; i++) {
         unsigned link = host_link_to(i, 0, r->file->dimension);
-        if (!host_child_died(&r->process[i])) {
+        if (!host_child_died(&r->process[i]))
             continue;
-        }
         if (host_child_check(&r->process[i], i, link, error) != 0 ||
-            start_node(r, i, error) != 0) {
+            start_node(r, i, error) != 0)
             return error->code;
-        }
         r->restarts++;
     }
     return 0;
@@ -271,11 +254,9 @@ static bool machine_kill(void *context, unsigned node) {
 
 /* Which of the host's own wires leads to the node; -1: none. */
 static int port_to(const struct host_remote *r, unsigned node) {
-    for (unsigned i = 0; i < r->ports; i++) {
-        if (host_cube_host_wire(r->file, i)->node == node) {
+    for (unsigned i = 0; i < r->ports; i++)
+        if (host_cube_host_wire(r->file, i)->node == node)
             return (int)i;
-        }
-    }
     return -1;
 }
 
@@ -283,9 +264,8 @@ static const char *machine_doubt(void *context, unsigned node) {
     static char text[TCP_PATH_MAX + 160];
     const struct host_remote *r = context;
     int port = port_to(r, node);
-    if (port < 0) {
+    if (port < 0)
         return NULL;
-    }
     int fault = host_port_fault(&r->port[port]);
     struct tcp_wire_doubt doubt = host_port_doubt(&r->port[port]);
     if (doubt.what != NULL) {
@@ -333,9 +313,8 @@ static const char *machine_address(void *context, unsigned node) {
 
 static void machine_rest(void *context, uint64_t rest_us) {
     struct host_remote *r = context;
-    for (unsigned i = 0; i < r->ports; i++) {
+    for (unsigned i = 0; i < r->ports; i++)
         host_port_rest(&r->port[i], rest_us);
-    }
 }
 
 /* Nothing tells of nodes elsewhere, and those here begin anew. */
@@ -363,9 +342,8 @@ static struct link_pipe pipe_of(struct host_remote *r, unsigned port) {
     const struct host_cube_wire *wire = host_cube_host_wire(r->file, port);
     unsigned node = wire->node;
     struct link_pipe pipe = host_port_pipe(&r->port[port]);
-    if (!host_cube_is_bare(r->file, node) && wire->line != 0) {
+    if (!host_cube_is_bare(r->file, node) && wire->line != 0)
         return pipe;
-    }
     host_console_init(&r->console[port], node, r->file->board_of[node]->name);
     return host_console_pipe(&r->console[port], pipe);
 }
@@ -379,9 +357,8 @@ struct host_machine host_remote_machine(struct host_remote *remote) {
     machine.dimension = remote->file->dimension;
     machine.serial_baud = remote->file->serial_baud;
     machine.absent_s = absent_s(remote->file);
-    while (machine.epoch == 0) {
+    while (machine.epoch == 0)
         (void)!getrandom(&machine.epoch, sizeof machine.epoch, 0);
-    }
     machine.pipe = pipe_of(remote, 0);
     if (second != NULL) {
         machine.spare_node = second->node;

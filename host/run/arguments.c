@@ -125,19 +125,16 @@ static const struct argp_option options_of_run[] = {
 static bool host_arguments_given(const struct host_arguments *p, int key);
 
 static int of_cube(const struct host_arguments *p) {
-    for (int key = KEY_STRATEGY; key < KEY_THREADS; key++) {
-        if (host_arguments_given(p, key)) {
+    for (int key = KEY_STRATEGY; key < KEY_THREADS; key++)
+        if (host_arguments_given(p, key))
             return key;
-        }
-    }
     return 0;
 }
 
 static const char *option_name(int key) {
     const struct argp_option *o = options_of_run;
-    while (o->key != key) {
+    while (o->key != key)
         o++;
-    }
     return o->name;
 }
 
@@ -164,9 +161,8 @@ static int choose(struct host_arguments *p, const char *option,
     char allowed[sizeof p->error->text] = "";
     size_t used = 0;
     for (unsigned i = 0; name(i) != NULL; i++) {
-        if (strcmp(value, name(i)) == 0) {
+        if (strcmp(value, name(i)) == 0)
             return (int)i;
-        }
         if (used < sizeof allowed) { /* what the error has room for */
             used += (size_t)snprintf(allowed + used, sizeof allowed - used,
                                      "%s%s", i == 0 ? "" : ", ", name(i));
@@ -270,9 +266,8 @@ static bool parse_sharing(int key, const char *value,
                {"jobs-per-worker", &s->jobs_per_worker, 1, INCODE_LISTS_MAX}};
     int i = key - KEY_CLUSTER;
     uint64_t n = 0;
-    if (i < 0 || i >= (int)(sizeof row / sizeof row[0])) {
+    if (i < 0 || i >= (int)(sizeof row / sizeof row[0]))
         return false;
-    }
     (void)host_option_number(row[i].name, value, row[i].min, row[i].max, &n,
                              p->error);
     *row[i].into = (unsigned)n;
@@ -384,13 +379,11 @@ static error_t parse_report(int key, const char *value,
 static error_t parse_option(int key, char *value, struct argp_state *state) {
     struct host_arguments *p = state->input;
     uint64_t n = 0;
-    if (key >= KEY_STRATEGY && key < KEY_END) {
+    if (key >= KEY_STRATEGY && key < KEY_END)
         p->given |= UINT64_C(1) << (key - KEY_STRATEGY);
-    }
     if (parse_names(key, value, p) || parse_sharing(key, value, p) ||
-        parse_testing(key, value, p)) {
+        parse_testing(key, value, p))
         return 0;
-    }
     switch (key) {
     case 'o':
         parse_output(p, value);
@@ -459,17 +452,13 @@ static int parse_run(int argc, char **argv, unsigned flags,
     struct host_arguments parse = {options, error, 0, 0};
     host_run_defaults(options);
     int status = host_options_parse(&argp, argc, argv, flags, &parse, error);
-    if (status != 0) {
+    if (status != 0)
         return status;
-    }
-    if (options->throttle.bytes_a_second != 0 &&
-        options->throttle.slow_us == 0) {
+    if (options->throttle.bytes_a_second != 0 && options->throttle.slow_us == 0)
         options->throttle.slow_us = 30000000;
-    }
     if (options->strategy != NULL && options->strategy->linda != NULL &&
-        host_arguments_given(&parse, KEY_LINDA)) {
+        host_arguments_given(&parse, KEY_LINDA))
         options->strategy = host_strategy_linda(parse.linda);
-    }
     options->direct = of_cube(&parse) == 0;
     return check_threads(&parse) != 0 ? error->code
                                       : host_arguments_together(&parse);
@@ -501,14 +490,12 @@ static const char *board_help(unsigned i) {
 static char *list_rows(const char *text, const char *(*name)(unsigned i),
                        const char *(*help)(unsigned i), const char *usual) {
     size_t size = strlen(text) + 1;
-    for (unsigned i = 0; name(i) != NULL; i++) {
+    for (unsigned i = 0; name(i) != NULL; i++)
         size += strlen(name(i)) + strlen(help(i)) + sizeof " (; the default),";
-    }
     char *whole = malloc(size);
     size_t used = 0;
-    if (whole == NULL) {
+    if (whole == NULL)
         return NULL;
-    }
     used += (size_t)snprintf(whole, size, "%s", text);
     for (unsigned i = 0; name(i) != NULL; i++) {
         used += (size_t)snprintf(whole + used, size - used, "%s %s (%s%s)",

@@ -70,9 +70,8 @@ static void parse_board(struct emulate *e, const char *value) {
     e->board = NULL;
     for (unsigned i = 0; host_board_name(i) != NULL; i++) {
         const struct host_board *board = host_board_row(i);
-        if (board->bare == NULL) {
+        if (board->bare == NULL)
             continue;
-        }
         size_t used = strlen(allowed);
         snprintf(allowed + used, sizeof allowed - used, "%s%s",
                  used == 0 ? "" : ", ", board->name);
@@ -180,9 +179,8 @@ static int take_directory(struct emulate *e) {
                          e->file);
     }
     e->folder = host_folder_open(e->directory, e->error);
-    if (e->folder < 0) {
+    if (e->folder < 0)
         return e->error->code;
-    }
     if (flock(e->folder, LOCK_EX | LOCK_NB) != 0) {
         return host_fail(
             e->error, HOST_INPUT,
@@ -199,13 +197,11 @@ static int take_directory(struct emulate *e) {
 static int check_file(const struct emulate *e) {
     char text[sizeof FIRST_LINE] = "";
     int file = open(e->file, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0 && errno != ELOOP) {
+    if (file < 0 && errno != ELOOP)
         return 0;
-    }
     ssize_t size = file < 0 ? -1 : read(file, text, sizeof text - 1);
-    if (file >= 0) {
+    if (file >= 0)
         (void)close(file);
-    }
     return size == 0 || (size > 0 && strcmp(text, FIRST_LINE) == 0)
                ? 0
                : host_fail(e->error, HOST_INPUT,
@@ -222,9 +218,8 @@ static bool is_linux(const struct emulate *e, unsigned node) {
 static void put_link(struct host_output *out, const char *folder, unsigned node,
                      int to, const char *name) {
     char line[PATH_MAX + 100], other[16] = "\"host\"";
-    if (to >= 0) {
+    if (to >= 0)
         snprintf(other, sizeof other, "%d", to);
-    }
     snprintf(line, sizeof line,
              "%s    { node = %u; to = %s; unix = \"%s/%s\"; }",
              to < 0 ? "" : ",\n", node, other, folder, name);
@@ -257,9 +252,8 @@ static int write_file(const struct emulate *e) {
     unsigned dimension = (unsigned)__builtin_ctz(e->nodes);
     const char *slash = strrchr(e->directory, '/');
     const char *folder = slash == NULL ? e->directory : slash + 1;
-    if (host_output_open(&out, e->file, e->error) != 0) {
+    if (host_output_open(&out, e->file, e->error) != 0)
         return e->error->code;
-    }
     snprintf(text, sizeof text,
              FIRST_LINE ": it removes this file when it "
                         "ends.\ndimension = %u;\nboard = \"%s\";\n",
@@ -302,9 +296,8 @@ static void expect_end(void) {
         bool kept = signals[i] == SIGHUP &&
                     sigaction(SIGHUP, NULL, &before) == 0 &&
                     before.sa_handler == SIG_IGN;
-        if (!kept) {
+        if (!kept)
             (void)sigaction(signals[i], &action, NULL);
-        }
     }
 }
 
@@ -356,9 +349,8 @@ static void say_next(const struct emulate *e) {
     char image[PATH_MAX], from[PATH_MAX], file[PATH_MAX];
     bool known = host_firmware_find(e->board->name, image) &&
                  host_text_quote(from, sizeof from, image) == 0;
-    if (host_text_quote(file, sizeof file, e->file) != 0) {
+    if (host_text_quote(file, sizeof file, e->file) != 0)
         snprintf(file, sizeof file, "FILE");
-    }
     printf("%u node%s of %s: ", e->nodes, host_text_s(e->nodes),
            e->board->name);
     if (e->empty) {
@@ -389,9 +381,8 @@ int host_emulate(int argc, char **argv, struct host_error *error) {
     struct host_started started = {0};
     e.error = error;
     if (host_options_parse(&argp, argc, argv, 0, &e, error) != 0 ||
-        check(&e) != 0 || check_file(&e) != 0 || take_directory(&e) != 0) {
+        check(&e) != 0 || check_file(&e) != 0 || take_directory(&e) != 0)
         return error->code;
-    }
     expect_end();
     if (start(&e, &started) != 0) {
         remove_leftovers(&e);

@@ -26,9 +26,8 @@ static void open_standard(void) {
     do {
         file = open("/dev/null", O_RDONLY);
     } while (file >= 0 && file <= STDERR_FILENO);
-    if (file > STDERR_FILENO) {
+    if (file > STDERR_FILENO)
         (void)close(file);
-    }
 }
 
 void host_begin(const char *name) {
@@ -85,9 +84,8 @@ int host_launch_rank(void) {
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         const char *text = getenv(names[i]);
         uint64_t rank;
-        if (text != NULL && host_parse_number(text, 0, INT32_MAX, &rank) == 0) {
+        if (text != NULL && host_parse_number(text, 0, INT32_MAX, &rank) == 0)
             return (int)rank;
-        }
     }
     return -1;
 }
@@ -123,9 +121,8 @@ static int call_launcher(void) {
     const char *name = getenv(SOCKET_NAME);
     struct ucred peer;
     socklen_t size = sizeof peer;
-    if (name == NULL || strlen(name) + 2 > sizeof address.sun_path) {
+    if (name == NULL || strlen(name) + 2 > sizeof address.sun_path)
         return -1;
-    }
     socklen_t length = address_of(name, &address);
     int fd = socket(AF_UNIX, SOCK_STREAM, 0);
     if (fd < 0 || connect(fd, (struct sockaddr *)&address, length) != 0 ||
@@ -150,9 +147,8 @@ static void take_streams(void) {
                              .msg_control = &control,
                              .msg_controllen = sizeof control};
     int streams[STREAMS], fd = call_launcher();
-    if (fd < 0) {
+    if (fd < 0)
         return;
-    }
     if (recvmsg(fd, &message, 0) == 1) {
         struct cmsghdr *header = CMSG_FIRSTHDR(&message);
         if (header != NULL && header->cmsg_type == SCM_RIGHTS &&
@@ -171,12 +167,10 @@ static void take_streams(void) {
 int host_launch_become(int rank, char **argv, struct host_error *error) {
     char path[4096];
     const char *name = rank == 0 ? "incode-mpi" : "incode-node-mpi";
-    if (beside(name, path, sizeof path, error) != 0) {
+    if (beside(name, path, sizeof path, error) != 0)
         return error->code;
-    }
-    if (rank == 0) {
+    if (rank == 0)
         take_streams();
-    }
     (void)execv(path, argv);
     return host_fail(error, HOST_CUBE,
                      "%s: %s; it belongs beside incode on each machine, run "
@@ -224,11 +218,9 @@ static bool placed(void) {
                                         "LOADL_STEP_ID",
                                         "OMPI_MCA_orte_default_hostfile",
                                         "OMPI_MCA_plm_rsh_agent"};
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
-        if (getenv(names[i]) != NULL) {
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
+        if (getenv(names[i]) != NULL)
             return true;
-        }
-    }
     return false;
 }
 
@@ -242,18 +234,15 @@ static char **command_for(char **argv, char *ranks, char *self) {
                                     "--mca", "btl", "self,vader",
                                     "--mca", "plm", "isolated"};
     size_t count = 0, at = 0;
-    while (argv[count] != NULL) {
+    while (argv[count] != NULL)
         count++;
-    }
     char **command = calloc(count + 32, sizeof *command);
-    if (command == NULL) {
+    if (command == NULL)
         return NULL;
-    }
     memcpy(command, always, sizeof always);
     at += sizeof always / sizeof always[0];
-    if (geteuid() == 0) {
+    if (geteuid() == 0)
         command[at++] = as_root[0];
-    }
     if (!placed()) {
         memcpy(command + at, at_home, sizeof at_home);
         at += sizeof at_home / sizeof at_home[0];
@@ -274,9 +263,8 @@ static _Noreturn void become_mpirun(pid_t parent, char **argv, unsigned nodes,
     int null = open("/dev/null", O_RDONLY);
     (void)setpgid(0, 0);
     prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (getppid() != parent || length <= 0 || null < 0) {
+    if (getppid() != parent || length <= 0 || null < 0)
         _exit(127);
-    }
     self[length] = '\0';
     mpi_environment();
     dup2(null, STDIN_FILENO);
@@ -284,9 +272,8 @@ static _Noreturn void become_mpirun(pid_t parent, char **argv, unsigned nodes,
     dup2(said, STDERR_FILENO);
     snprintf(ranks, sizeof ranks, "%u", nodes + 1);
     char **command = command_for(argv, ranks, self);
-    if (command != NULL) {
+    if (command != NULL)
         (void)execvp(command[0], command);
-    }
     (void)fprintf(stderr, "%s", strerror(errno));
     _exit(127);
 }
@@ -300,9 +287,8 @@ static int start_mpirun(struct launch *l, char **argv, unsigned nodes,
                          strerror(errno));
     }
     l->mpirun = fork();
-    if (l->mpirun == 0) {
+    if (l->mpirun == 0)
         become_mpirun(self, argv, nodes, pair[1]);
-    }
     close(pair[1]);
     l->said_file = pair[0];
     if (l->mpirun < 0) {
@@ -318,12 +304,10 @@ static int input_for_host(bool wanted) {
     int pair[2];
     char bytes[4096];
     ssize_t n;
-    if (!isatty(STDIN_FILENO)) {
+    if (!isatty(STDIN_FILENO))
         return dup(STDIN_FILENO);
-    }
-    if (!wanted || pipe2(pair, O_CLOEXEC) != 0) {
+    if (!wanted || pipe2(pair, O_CLOEXEC) != 0)
         return open("/dev/null", O_RDONLY | O_CLOEXEC);
-    }
     pid_t self = getpid();
     if (fork() == 0) {
         prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -396,9 +380,8 @@ static bool hear_mpirun(struct launch *l) {
     char bytes[4096];
     ssize_t n = read(l->said_file, bytes, sizeof bytes);
     size_t room = SAID_BYTES - 1 - l->said_size;
-    if (n <= 0) {
+    if (n <= 0)
         return n < 0 && errno == EINTR;
-    }
     size_t part = (size_t)n < room ? (size_t)n : room;
     memcpy(l->said + l->said_size, bytes, part);
     l->said_size += part;
@@ -426,24 +409,20 @@ static int watch(struct launch *l, bool input) {
                                {l->listener, POLLIN, 0},
                                {l->host, POLLIN, 0}};
         (void)poll(fds, sizeof fds / sizeof fds[0], TURN_MS);
-        if (fds[1].revents != 0) {
+        if (fds[1].revents != 0)
             welcome(l, input);
-        }
-        if (fds[2].revents != 0) {
+        if (fds[2].revents != 0)
             hear_host(l);
-        }
-        if (fds[0].revents != 0) {
+        if (fds[0].revents != 0)
             speaks = hear_mpirun(l);
-        }
         look_after(l);
     }
     while (waitpid(l->mpirun, &status, WNOHANG) == 0) {
         look_after(l);
         (void)poll(NULL, 0, 10);
     }
-    if (l->host >= 0) {
+    if (l->host >= 0)
         hear_host(l);
-    }
     return status;
 }
 
@@ -452,9 +431,8 @@ static int watch(struct launch *l, bool input) {
 /* The first words that mpirun has said, between its rules. */
 static void first_words(const char *said, char *words, size_t size) {
     size_t at = 0;
-    while (*said == '-' || *said == '\n') {
+    while (*said == '-' || *said == '\n')
         said++;
-    }
     while (*said != '\0' && strncmp(said, "\n\n", 2) != 0 &&
            strncmp(said, "\n--", 3) != 0 && at + 1 < size) {
         words[at++] = *said == '\n' ? ' ' : *said;
@@ -490,9 +468,8 @@ static int explain(const struct launch *l, unsigned nodes, int status,
                    struct host_error *error) {
     char words[400], how[80] = "its process has ended";
     int rank = rank_lost(l->said, how, sizeof how);
-    if (l->reported && l->report.lost != 0) {
+    if (l->reported && l->report.lost != 0)
         rank = rank == l->report.lost ? rank : l->report.lost;
-    }
     if (rank > 0) {
         return host_fail(error, HOST_CUBE,
                          "node %d (rank %d): %s, and the job with it; look for "
@@ -540,23 +517,19 @@ int host_launch_mpi(char **argv, const struct host_run_options *options,
     struct sigaction action = {.sa_handler = catch}, before[2];
     unsigned nodes = host_run_nodes(options);
     bool input = options->input != NULL && strcmp(options->input, "-") == 0;
-    if (listen_for_host(l, error) != 0) {
+    if (listen_for_host(l, error) != 0)
         return error->code;
-    }
     (void)sigaction(SIGINT, &action, &before[0]);
     (void)sigaction(SIGTERM, &action, &before[1]);
-    if (start_mpirun(l, argv, nodes, error) != 0) {
+    if (start_mpirun(l, argv, nodes, error) != 0)
         return error->code;
-    }
     int status = watch(l, input);
     bool whole = l->reported && l->report.lost == 0 && !l->report.ended;
-    if (!whole && l->host_pid != 0) {
+    if (!whole && l->host_pid != 0)
         host_run_clean(options, l->host_pid);
-    }
     if (caught != 0 && !(whole && l->report.status == 0)) {
-        if (options->outputs > 0 || options->stats != NULL) {
+        if (options->outputs > 0 || options->stats != NULL)
             host_output_expect();
-        }
         (void)sigaction(SIGINT, &before[0], NULL);
         (void)sigaction(SIGTERM, &before[1], NULL);
         (void)raise(caught);

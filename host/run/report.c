@@ -89,9 +89,8 @@ static uint64_t host_node_stack_bytes(const struct host_node_report *report) {
 static void map_line(FILE *file, uint64_t bytes, const char *what,
                      uint64_t count, const char *unit) {
     fprintf(file, "%12llu  %s", (unsigned long long)bytes, what);
-    if (count > 0) {
+    if (count > 0)
         fprintf(file, " (%llu %s)", (unsigned long long)count, unit);
-    }
     fputc('\n', file);
 }
 
@@ -101,9 +100,8 @@ static void host_report_map(FILE *file, const struct host_run_result *result) {
     const struct node_role *role = node_role_named(result->node[0].map.role);
     uint64_t stack = host_node_stack_bytes(&result->node[0]);
     unsigned links = 1;
-    while (1u << (links - 1) < result->nodes) {
+    while (1u << (links - 1) < result->nodes)
         links++;
-    }
     fprintf(file, "\nMemory map of node 0, bytes of %llu\n",
             (unsigned long long)result->memory);
     map_line(file, stack, "stack", 0, "");
@@ -147,18 +145,15 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         fprintf(file, "coordinates of -0.0, which count as 0.0: %llu\n",
                 (unsigned long long)r->negative_zeros);
     }
-    if (options->explain) {
+    if (options->explain)
         fprintf(file, "auto: %s\n", r->why);
-    }
     fprintf(file, "%s on ", r->strategy->name);
-    if (r->lost > 0) {
+    if (r->lost > 0)
         fprintf(file, "%u of ", r->nodes - r->lost);
-    }
     fprintf(file, "%u %s%s", r->nodes, options->direct ? "thread" : "node",
             r->nodes == 1 ? "" : "s");
-    if (r->lost > 0 || r->restarts > 0) {
+    if (r->lost > 0 || r->restarts > 0)
         fprintf(file, ", %u lost, %u started again", r->lost, r->restarts);
-    }
     fprintf(file, ": %.3f s to triangulate (%.3f Mtet/s), %.3f s in all%s\n",
             r->time_triangulation_s,
             1e-6 * ratio((double)r->tetrahedra, r->time_triangulation_s),
@@ -174,9 +169,8 @@ void host_report_run(FILE *file, const struct host_run_options *options,
         host_report_notes(file);
         node_lines(file, r);
     }
-    if (options->map) {
+    if (options->map)
         host_report_map(file, r);
-    }
 }
 
 /* --- stats ---------------------------------------------------------------- */
@@ -189,14 +183,12 @@ double host_candidates_mean(const struct host_run_result *result) {
 
 double host_candidates_p99(const struct host_run_result *result) {
     uint64_t calls = 0, seen = 0;
-    for (unsigned k = 0; k < 24; k++) {
+    for (unsigned k = 0; k < 24; k++)
         calls += result->candidates_histogram[k];
-    }
     for (unsigned k = 0; k < 24; k++) {
         seen += result->candidates_histogram[k];
-        if (calls > 0 && seen >= calls - calls / 100) {
+        if (calls > 0 && seen >= calls - calls / 100)
             return exp2(0.5 * (k + 1));
-        }
     }
     return 0.0;
 }
@@ -233,9 +225,8 @@ static json_t *map_object(const struct host_run_result *r, unsigned i) {
     put(o, "links", m->cube);
     uint64_t used = m->fixed + m->node + m->cube;
     for (unsigned k = 0; role != NULL && k < NODE_TABLES_MAX; k++) {
-        if (role->tables[k].name != NULL) {
+        if (role->tables[k].name != NULL)
             put(o, role->tables[k].name, m->tables[k].bytes);
-        }
         used += m->tables[k].bytes;
     }
     put(o, "left_over", r->memory > used ? r->memory - used : 0);
@@ -356,9 +347,8 @@ static json_t *run_object(const struct host_run_result *r) {
     put(o, "node_restarts", r->restarts);
     put(o, "generations", r->generations);
     put(o, "missing_wires", r->missing_wires);
-    for (unsigned i = 0; i < r->nodes; i++) {
+    for (unsigned i = 0; i < r->nodes; i++)
         json_array_append_new(nodes, node_object(r, i));
-    }
     json_object_set_new(o, "per_node", nodes);
     return o;
 }
@@ -374,9 +364,8 @@ int host_stats_write(const char *path, const struct host_run_result *result,
     json_t *object = run_object(result);
     struct host_output out;
     if (host_output_open(&out, path, error) == 0) {
-        if (json_dump_callback(object, put_bytes, &out, flags) != 0) {
+        if (json_dump_callback(object, put_bytes, &out, flags) != 0)
             host_fail_memory(error, "the statistics");
-        }
         host_output_text(&out, "\n");
         host_output_close(&out, 1, error);
     }

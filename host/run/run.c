@@ -89,9 +89,8 @@ static void host_run_sum_nodes(struct host_run_result *result) {
         const struct incode_statistics *s = &f->statistics;
         double wall = 1e-6 * (double)f->wall_us;
         r->retransmitted += f->retransmitted;
-        if (wall > 0 && (r->t_min_s == 0.0 || wall < r->t_min_s)) {
+        if (wall > 0 && (r->t_min_s == 0.0 || wall < r->t_min_s))
             r->t_min_s = wall;
-        }
         r->t_max_s = wall > r->t_max_s ? wall : r->t_max_s;
         r->make_tetra_calls += s->make_tetra_calls;
         r->built += s->tetrahedra_built;
@@ -103,9 +102,8 @@ static void host_run_sum_nodes(struct host_run_result *result) {
         r->stars_lent += s->stars_lent;
         r->stars_borrowed += s->stars_borrowed;
         r->tetrahedra_late += s->tetrahedra_late;
-        for (unsigned k = 0; k < 24; k++) {
+        for (unsigned k = 0; k < 24; k++)
             r->candidates_histogram[k] += s->candidates_histogram[k];
-        }
     }
 }
 
@@ -116,9 +114,8 @@ static uint64_t at_least(uint64_t count, uint64_t least) {
 /* It need not be secret from nodes: page_check.h. */
 static uint64_t draw_key(void) {
     uint64_t key;
-    if (getrandom(&key, sizeof key, 0) != (ssize_t)sizeof key) {
+    if (getrandom(&key, sizeof key, 0) != (ssize_t)sizeof key)
         key = host_now_us();
-    }
     return key;
 }
 
@@ -263,11 +260,10 @@ int host_triangulate_on(const struct host_run_options *options,
                         struct host_error *error) {
     struct host_order order;
     int status = order_points(options, points, &order, result, error);
-    if (status == 0) {
+    if (status == 0)
         status = on_nodes(options, machine, &order, tets, result, error);
-    } else {
+    else
         machine->stop(machine->context);
-    }
     host_order_free(&order);
     return status;
 }
@@ -289,9 +285,8 @@ static int begin_on_board(const struct host_run_options *options,
     nodes.one_wire = options->throttle.bytes_a_second != 0;
     nodes.program = options->node_program;
     nodes.trouble = options->trouble;
-    if (options->board->start(options->board, &nodes, &started, error) != 0) {
+    if (options->board->start(options->board, &nodes, &started, error) != 0)
         return error->code;
-    }
     *machine = started.machine;
     result->limited = started.limited;
     result->memory_held = started.memory_held;
@@ -310,9 +305,8 @@ static int start_nodes(const struct host_run_options *options,
     uint64_t start = host_now_us();
     host_progress_phase("starting nodes", NULL);
     if ((options->begin != NULL ? options->begin : begin_on_board)(
-            options, result, &machine, error) != 0) {
+            options, result, &machine, error) != 0)
         return error->code;
-    }
     result->time_start_up_s = seconds_since(start);
     return on_nodes(options, &machine, order, tets, result, error);
 }
@@ -326,13 +320,11 @@ int host_triangulate(const struct host_run_options *options,
     host_settle(options, points->count, result);
     if (check_strategy(options, result, error) != 0 ||
         host_memory_check(options, result->strategy, result->nodes, 1, no_cells,
-                          error) != 0) {
+                          error) != 0)
         return error->code;
-    }
     int status = order_points(options, points, &order, result, error);
-    if (status == 0) {
+    if (status == 0)
         status = start_nodes(options, &order, tets, result, error);
-    }
     host_order_free(&order);
     return status;
 }
@@ -340,9 +332,8 @@ int host_triangulate(const struct host_run_options *options,
 /* Whether standard output takes tetrahedra or statistics. */
 static bool stdout_is_data(const struct host_run_options *options) {
     bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
-    for (unsigned i = 0; i < options->outputs; i++) {
+    for (unsigned i = 0; i < options->outputs; i++)
         data = data || strcmp(options->output[i], "-") == 0;
-    }
     return data;
 }
 
@@ -359,17 +350,14 @@ static int report(const struct host_run_options *options,
 void host_run_clean(const struct host_run_options *options, pid_t writer) {
     char name[HOST_PATH_MAX];
     const char *file;
-    for (unsigned i = 0; i < options->outputs; i++) {
+    for (unsigned i = 0; i < options->outputs; i++)
         for (unsigned k = 0;
              (file = host_write_file(options->output[i], k, name,
                                      sizeof name)) != NULL;
-             k++) {
+             k++)
             host_output_clean(file, writer);
-        }
-    }
-    if (options->stats != NULL) {
+    if (options->stats != NULL)
         host_output_clean(options->stats, writer);
-    }
 }
 
 /* The file of the points, if its name tells its format: such a .node beside an
@@ -383,36 +371,30 @@ static int check_claims(const struct host_run_options *options,
                         struct host_error *error) {
     struct host_claims claims = {0};
     host_claims_read(&claims, options->input, error);
-    if (options->cube != NULL) {
+    if (options->cube != NULL)
         host_claims_read(&claims, options->cube, error);
-    }
     for (unsigned i = 0; i < options->outputs; i++) {
         host_claims_write(&claims, "-o ", options->output[i],
                           points_file(options), error);
     }
-    if (options->stats != NULL) {
+    if (options->stats != NULL)
         host_claims_write(&claims, "--stats ", options->stats, NULL, error);
-    }
     host_claims_free(&claims);
     return error->code;
 }
 
 static int check_outputs(const struct host_run_options *options,
                          struct host_error *error) {
-    if (check_claims(options, error) != 0) {
+    if (check_claims(options, error) != 0)
         return error->code;
-    }
     if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
-        host_write_probe(options->stats, NULL, error) != 0) {
+        host_write_probe(options->stats, NULL, error) != 0)
         return error->code;
-    }
-    for (unsigned i = 0; i < options->outputs; i++) {
+    for (unsigned i = 0; i < options->outputs; i++)
         if (host_write_check(options->output[i], error) != 0 ||
             host_write_probe(options->output[i], points_file(options), error) !=
-                0) {
+                0)
             return error->code;
-        }
-    }
     return 0;
 }
 
@@ -436,12 +418,10 @@ static int write_outputs(const struct host_run_options *options,
                          struct host_run_result *result,
                          struct host_error *error) {
     uint64_t start = host_now_us();
-    for (unsigned i = 0; i < options->outputs; i++) {
+    for (unsigned i = 0; i < options->outputs; i++)
         if (host_write(options->output[i], points_file(options), points, tets,
-                       error) != 0) {
+                       error) != 0)
             return error->code;
-        }
-    }
     result->time_write_s += seconds_since(start);
     return 0;
 }
@@ -494,20 +474,17 @@ static int run_on(const struct host_run_options *options,
     struct host_call call = {
         .threads = options->threads == 0 ? host_processors() : options->threads,
         .memory_max = UINT64_MAX};
-    if (options->direct) {
+    if (options->direct)
         host_call_enter(&call); /* all that follows takes so many threads */
-    }
     alone->time_io_s = result->time_read_s;
-    if (options->table && run_alone(options, points, alone, error) != 0) {
+    if (options->table && run_alone(options, points, alone, error) != 0)
         return error->code; /* of a cube: no call has begun */
-    }
     result->time_io_s = result->time_read_s;
     result->host_cpu_s = -used_seconds(CLOCK_PROCESS_CPUTIME_ID);
     int status = (options->direct ? host_triangulate_direct : host_triangulate)(
         options, points, &tets, result, error);
-    if (status == 0) {
+    if (status == 0)
         status = finish(options, points, &tets, result, error);
-    }
     host_tetrahedra_free(&tets);
     host_call_enter(NULL);
     return status;
@@ -526,9 +503,8 @@ static int look_at_points(const struct host_run_options *options,
                          "for each point",
                          options->input);
     }
-    if (options->quiet) {
+    if (options->quiet)
         return 0;
-    }
     host_points_note(options->input, points);
     if (options->outputs == 0 && options->stats == NULL && !options->table &&
         !options->map) {
@@ -547,33 +523,27 @@ int host_run(const struct host_run_options *options,
     uint64_t start = host_now_us();
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
-    if (check_outputs(options, error) != 0) {
+    if (check_outputs(options, error) != 0)
         return error->code;
-    }
-    if (options->anywhere) {
+    if (options->anywhere)
         host_progress_begin_anywhere();
-    } else {
+    else
         host_progress_begin(options->progress && !options->quiet);
-    }
     int status =
         host_points_read_as(options->input, options->format, &points, error);
     result->time_read_s = seconds_since(start);
-    if (status == 0) {
+    if (status == 0)
         status = look_at_points(options, &points, error);
-    }
-    if (status == 0) {
+    if (status == 0)
         status = run_on(options, &points, result, &alone, error);
-    }
     host_progress_end();
     host_points_free(&points);
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
-    if (status == 0 && options->stats != NULL) {
+    if (status == 0 && options->stats != NULL)
         status = host_stats_write(options->stats, result, error);
-    }
-    if (status == 0 && !options->quiet) {
+    if (status == 0 && !options->quiet)
         report(options, result, options->table ? &alone : NULL, error);
-    }
     return host_output_commit(error);
 }
 
@@ -621,9 +591,8 @@ static int triangulate(const struct host_run_options *options,
         order, options->input, points->xyz, points->count, HOST_ADAPTIVE,
         host_direct_regions(host_threads(), points->count), false, error);
     r->time_order_s = 1e-6 * (double)(host_now_us() - start);
-    if (status != 0) {
+    if (status != 0)
         return status;
-    }
     r->rows = order->rows;
     r->points = order->points;
     r->duplicates = order->duplicates;
@@ -633,9 +602,8 @@ static int triangulate(const struct host_run_options *options,
     host_progress_phase("triangulating", NULL);
     memset(&sums, 0, sizeof sums);
     sums.committed = show_progress;
-    if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE) {
+    if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
         return error->code;
-    }
     take_sums(&sums, r);
     return 0;
 }
@@ -647,9 +615,8 @@ static int check(const struct host_run_options *options,
                  const struct host_tetrahedra *tets, struct host_run_result *r,
                  struct host_error *error) {
     bool exact = options->verifying == HOST_VERIFY_ALWAYS;
-    if (!exact && options->stats == NULL) {
+    if (!exact && options->stats == NULL)
         return 0;
-    }
     uint64_t start = host_now_us();
     host_progress_phase("checking", NULL);
     int status = host_verify(points, tets,

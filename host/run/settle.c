@@ -11,9 +11,8 @@
 
 static unsigned cube_dimension(unsigned nodes) {
     unsigned dimension = 0;
-    while (1u << dimension < nodes) {
+    while (1u << dimension < nodes)
         dimension++;
-    }
     return dimension;
 }
 
@@ -35,9 +34,8 @@ static uint64_t memory_needed(const struct host_run_options *options,
                               unsigned dimension,
                               const struct node_setup_message *setup) {
     uint64_t memory = HOST_MEMORY_MIN;
-    while (!does_with(options, strategy, dimension, setup, memory)) {
+    while (!does_with(options, strategy, dimension, setup, memory))
         memory += 16384;
-    }
     return memory;
 }
 
@@ -50,14 +48,12 @@ static const char *memory_advice(const struct host_run_options *options,
     narrow.window = 0;
     bool fewer = nodes > 1 &&
                  memory_needed(options, strategy, 0, setup) <= options->memory;
-    if (options->cube != NULL) {
+    if (options->cube != NULL)
         return "";
-    }
     if (options->window > 0 &&
         memory_needed(&narrow, strategy, cube_dimension(nodes), setup) <=
-            options->memory) {
+            options->memory)
         return fewer ? ", fewer --nodes, or no --window" : ", or no --window";
-    }
     return fewer ? ", or fewer --nodes" : "";
 }
 
@@ -107,16 +103,14 @@ int host_memory_check(const struct host_run_options *options,
 static unsigned suitable_nodes(void) {
     long processors = sysconf(_SC_NPROCESSORS_ONLN);
     unsigned nodes = 1;
-    while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors) {
+    while (nodes < HOST_PROCESSES_MAX && (long)nodes * 2 <= processors)
         nodes *= 2;
-    }
     return nodes;
 }
 
 unsigned host_run_nodes(const struct host_run_options *options) {
-    if (options->nodes != 0) {
+    if (options->nodes != 0)
         return options->nodes;
-    }
     unsigned nodes =
         options->strategy == NULL ? 0 : options->strategy->nodes_default;
     nodes = nodes != 0 ? nodes : suitable_nodes();
@@ -209,9 +203,8 @@ static bool is_thin(const struct host_order *order, uint32_t brick) {
             hi = x > hi ? x : hi;
             again += i > 0 && x == axis[d][i - 1];
         }
-        if (4 * again > order->fill[brick]) {
+        if (4 * again > order->fill[brick])
             return true;
-        }
         least = hi - lo < least ? hi - lo : least;
         most = hi - lo > most ? hi - lo : most;
     }
@@ -249,25 +242,21 @@ bool host_settle_ordered(const struct host_run_options *options,
     const struct host_strategy *before = result->strategy;
     bool uneven = is_uneven(order);
     if (options->build == INCODE_BUILD_AUTO && may_insert(options) && uneven &&
-        !is_room(order, options->memory)) {
+        !is_room(order, options->memory))
         result->build = INCODE_BUILD_FACES;
-    }
-    if (result->why[0] == '\0') { /* it was not for `auto` to say */
+    if (result->why[0] == '\0') /* it was not for `auto` to say */
         return false;
-    }
     const struct run run = {options, result->nodes, order->bricks,
                             order->cells};
     struct host_task task = task_of(&run, order->points);
     task.uneven = uneven;
     task.by_points = task.by_points && result->build != INCODE_BUILD_FACES;
     choose(&task, result);
-    if (result->strategy->regions(result->nodes) == 1) {
+    if (result->strategy->regions(result->nodes) == 1)
         host_order_join(order);
-    }
     if (options->nodes == 0 && options->begin == NULL &&
-        result->strategy->nodes_default != 0) {
+        result->strategy->nodes_default != 0)
         result->nodes = result->strategy->nodes_default;
-    }
     return result->strategy != before;
 }
 
@@ -295,9 +284,8 @@ static int begin(const struct host_run_options *options,
     if (host_remote_free(&the_file, IN_USE_US, error) != 0 ||
         host_remote_program(&the_file, options->node_program, program,
                             sizeof program, error) != 0 ||
-        host_remote_start(&remote, &the_file, program, error) != 0) {
+        host_remote_start(&remote, &the_file, program, error) != 0)
         return error->code;
-    }
     *machine = host_remote_machine(&remote);
     stop_remote = machine->stop;
     machine->stop = stop;
@@ -307,9 +295,8 @@ static int begin(const struct host_run_options *options,
 int host_run_on_cube(struct host_run_options *options,
                      struct host_error *error) {
     unsigned asked = options->nodes;
-    if (host_cube_file_read(&the_file, options->cube, error) != 0) {
+    if (host_cube_file_read(&the_file, options->cube, error) != 0)
         return error->code;
-    }
     if (asked != 0 && asked != the_file.nodes) {
         return host_fail(error, HOST_USAGE,
                          "--nodes %u: the cube of %s has %u; leave it out",
@@ -332,9 +319,8 @@ int host_run_on_cube(struct host_run_options *options,
     options->memory = the_file.memory;
     options->board = the_file.board;
     options->link = host_cube_link(&the_file);
-    for (unsigned i = 0; i < the_file.nodes; i++) {
+    for (unsigned i = 0; i < the_file.nodes; i++)
         options->processors += !the_file.local[i];
-    }
     const struct host_cube_wire *wire = host_cube_host_wire(&the_file, 0);
     options->wire_bytes_s = wire == NULL   ? 0
                             : wire->serial ? wire->baud / 10

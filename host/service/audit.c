@@ -33,17 +33,14 @@ static void note_place(void *context, const uint64_t *tets, int tet_count,
     (void)what;
     /* Points without a tetrahedron prove nothing against a node: facets do. */
     unsigned most = HOST_AUDIT_PLACES / (tet_count == 0 ? 2u : 1u);
-    if (a->places >= most) {
+    if (a->places >= most)
         return;
-    }
     struct host_audit_place *place = &a->place[a->places++];
     memset(place, 0, sizeof *place);
-    for (int i = 0; i < tet_count && i < 2; i++) {
+    for (int i = 0; i < tet_count && i < 2; i++)
         place->tet[place->tets++] = tets[i];
-    }
-    for (int i = 0; i < count && i < 5; i++) {
+    for (int i = 0; i < count && i < 5; i++)
         place->vertex[place->vertices++] = vertices[i];
-    }
 }
 
 static bool is_point(const struct host_order *order, uint32_t vertex) {
@@ -53,18 +50,16 @@ static bool is_point(const struct host_order *order, uint32_t vertex) {
 }
 
 static void redo(struct inquiry *q, uint32_t vertex) {
-    if (is_point(q->s->order, vertex)) {
+    if (is_point(q->s->order, vertex))
         q->audit->redo[vertex / INCODE_BRICK_POINTS] = 1;
-    }
 }
 
 /* The node is at fault; the reason is as of printf. */
 __attribute__((format(printf, 3, 4))) static void
 accuse_of(struct inquiry *q, uint32_t node, const char *format, ...) {
     struct host_audit *a = q->audit;
-    if (a->guilty[node] != 0) {
+    if (a->guilty[node] != 0)
         return;
-    }
     a->guilty[node] = 1;
     if (q->named++ == 0) {
         va_list arguments;
@@ -92,9 +87,8 @@ static uint32_t owner(const struct inquiry *q, const uint32_t v[4]) {
 static void doubt_brick(struct inquiry *q, uint32_t brick, const char *what,
                         const uint32_t v[4]) {
     uint16_t by = q->s->ledger.by[brick];
-    if ((by & HOST_LEDGER_ALONE) != 0) {
+    if ((by & HOST_LEDGER_ALONE) != 0)
         accuse(q, host_ledger_by(&q->s->ledger, brick), what, v);
-    }
     q->audit->redo[brick] = 1;
 }
 
@@ -107,17 +101,13 @@ static int compare_tets(const void *p, const void *q) {
 static unsigned collect(const struct host_audit *a,
                         uint64_t tets[2 * HOST_AUDIT_PLACES]) {
     unsigned count = 0, kept = 0;
-    for (unsigned i = 0; i < a->places; i++) {
-        for (unsigned k = 0; k < a->place[i].tets; k++) {
+    for (unsigned i = 0; i < a->places; i++)
+        for (unsigned k = 0; k < a->place[i].tets; k++)
             tets[count++] = a->place[i].tet[k];
-        }
-    }
     qsort(tets, count, sizeof tets[0], compare_tets);
-    for (unsigned i = 0; i < count; i++) {
-        if (kept == 0 || tets[kept - 1] != tets[i]) {
+    for (unsigned i = 0; i < count; i++)
+        if (kept == 0 || tets[kept - 1] != tets[i])
             tets[kept++] = tets[i];
-        }
-    }
     return kept;
 }
 
@@ -156,11 +146,9 @@ static uint32_t hash_of(const uint32_t v[4]) {
 
 static void add_missing(struct missing *m, const uint32_t v[4]) {
     uint32_t at = hash_of(v);
-    for (unsigned i = m->head[at]; i < MISSING_MAX; i = m->next[i]) {
-        if (same_vertices(m->v[i], v)) {
+    for (unsigned i = m->head[at]; i < MISSING_MAX; i = m->next[i])
+        if (same_vertices(m->v[i], v))
             return;
-        }
-    }
     if (m->count < MISSING_MAX) {
         memcpy(m->v[m->count], v, sizeof m->v[0]);
         m->there[m->count] = false;
@@ -178,9 +166,8 @@ static void look_beyond(const struct inquiry *q, struct missing *m,
                               t[outward[i][2]], 0};
         beyond[3] = host_judge_apex(&q->judge, beyond);
         if (beyond[3] != INCODE_NONE &&
-            host_judge_tetrahedron(&q->judge, beyond)) {
+            host_judge_tetrahedron(&q->judge, beyond))
             add_missing(m, beyond);
-        }
     }
 }
 
@@ -188,26 +175,21 @@ static void look_beyond(const struct inquiry *q, struct missing *m,
  * committed its brick. */
 static void judge_missing(struct inquiry *q, struct missing *m) {
     const struct host_tetrahedra *all = q->s->tets;
-    for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
+    for (uint64_t k = 0; m->count > 0 && k < all->count; k++)
         for (unsigned i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
-             i = m->next[i]) {
+             i = m->next[i])
             m->there[i] |= same_vertices(m->v[i], all->v[k]);
-        }
-    }
-    for (unsigned i = 0; i < m->count; i++) {
-        if (!m->there[i]) {
+    for (unsigned i = 0; i < m->count; i++)
+        if (!m->there[i])
             doubt_brick(q, owner(q, m->v[i]), "it left out", m->v[i]);
-        }
-    }
 }
 
 /* --- what is there -------------------------------------------------------- */
 
 static bool is_judged(const struct inquiry *q, const uint32_t t[4]) {
     bool points = true;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         points = points && is_point(q->s->order, t[i]);
-    }
     return points && host_judge_tetrahedron(&q->judge, t);
 }
 
@@ -237,11 +219,9 @@ static void judge_tet(struct inquiry *q, struct missing *m,
         judge_wrong(q, tets[i]);
         return;
     }
-    for (unsigned k = 0; k < i; k++) {
-        if (same_vertices(q->s->tets->v[tets[k]], t)) {
+    for (unsigned k = 0; k < i; k++)
+        if (same_vertices(q->s->tets->v[tets[k]], t))
             doubt_brick(q, owner(q, t), "it sent twice", t);
-        }
-    }
     look_beyond(q, m, t);
 }
 
@@ -253,9 +233,8 @@ static void judge_points(struct inquiry *q) {
     bool one = true;
     for (unsigned p = 0; p < q->audit->places; p++) {
         const struct host_audit_place *place = &q->audit->place[p];
-        if (place->tets > 0 || place->vertices != 1) {
+        if (place->tets > 0 || place->vertices != 1)
             continue;
-        }
         vertex = place->vertex[0];
         uint32_t brick = vertex / INCODE_BRICK_POINTS;
         one = one && (ledger->by[brick] & HOST_LEDGER_ALONE) != 0 &&
@@ -273,15 +252,12 @@ static void judge_places(struct inquiry *q, struct missing *m) {
     unsigned count = collect(q->audit, tets);
     for (unsigned i = 0; i < count; i++) {
         judge_tet(q, m, tets, i);
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             redo(q, q->s->tets->v[tets[i]][k]);
-        }
     }
-    for (unsigned p = 0; p < q->audit->places; p++) {
-        for (unsigned i = 0; i < q->audit->place[p].vertices; i++) {
+    for (unsigned p = 0; p < q->audit->places; p++)
+        for (unsigned i = 0; i < q->audit->place[p].vertices; i++)
             redo(q, q->audit->place[p].vertex[i]);
-        }
-    }
     judge_missing(q, m);
     judge_points(q);
 }
@@ -292,17 +268,14 @@ static void judge_places(struct inquiry *q, struct missing *m) {
 static void redo_guilty(struct inquiry *q) {
     const struct host_service *s = q->s;
     const struct host_ledger *ledger = &s->ledger;
-    for (uint32_t b = 0; b < ledger->bricks; b++) {
+    for (uint32_t b = 0; b < ledger->bricks; b++)
         q->audit->redo[b] |= q->audit->guilty[host_ledger_by(ledger, b)];
-    }
     uint64_t i = 0;
     for (size_t r = 0; r < ledger->runs; r++) {
         bool guilty = q->audit->guilty[ledger->found[r].node] != 0;
-        for (; i < ledger->found[r].end; i++) {
-            if (guilty) {
+        for (; i < ledger->found[r].end; i++)
+            if (guilty)
                 q->audit->redo[owner(q, s->tets->v[i])] = 1;
-            }
-        }
     }
 }
 
@@ -313,17 +286,13 @@ static void redo_unclear(struct inquiry *q) {
     const struct host_ledger *ledger = &q->s->ledger;
     struct host_audit *a = q->audit;
     uint32_t marked = 0;
-    if (a->unclear++ > 0) {
-        for (uint32_t b = 0; b < ledger->bricks; b++) {
+    if (a->unclear++ > 0)
+        for (uint32_t b = 0; b < ledger->bricks; b++)
             a->redo[b] |= (ledger->by[b] & HOST_LEDGER_ALONE) == 0;
-        }
-    }
-    for (uint32_t b = 0; b < ledger->bricks; b++) {
+    for (uint32_t b = 0; b < ledger->bricks; b++)
         marked += a->redo[b];
-    }
-    if (marked == 0 || a->unclear > 2) {
+    if (marked == 0 || a->unclear > 2)
         memset(a->redo, 1, ledger->bricks);
-    }
 }
 
 static void analyse(struct host_service *s, struct host_audit *a) {
@@ -336,16 +305,14 @@ static void analyse(struct host_service *s, struct host_audit *a) {
         host_fail_memory(&a->error, "the search for the faulty node");
     } else if (host_judge_make(&q.judge, &sites, &a->error) == 0) {
         missing->count = 0;
-        for (unsigned i = 0; i < TABLE; i++) {
+        for (unsigned i = 0; i < TABLE; i++)
             missing->head[i] = MISSING_MAX;
-        }
         judge_places(&q, missing);
         host_judge_free(&q.judge);
-        if (q.named > 0) {
+        if (q.named > 0)
             redo_guilty(&q);
-        } else {
+        else
             redo_unclear(&q);
-        }
     }
     free(missing);
 }
@@ -386,11 +353,10 @@ static void begin(struct host_service *s) {
     a->state = HOST_AUDIT_RUNS;
     a->begun_us = s->machine->now_us(s->machine->context);
     host_progress_phase("checking", "Mtet");
-    if (s->machine->virtual_time || (!a->exact && s->tets->count < SMALL)) {
+    if (s->machine->virtual_time || (!a->exact && s->tets->count < SMALL))
         check(s);
-    } else {
+    else
         host_fork_start(&a->fork, check, s);
-    }
 }
 
 void host_audit_alone(struct host_service *service) {
@@ -443,10 +409,8 @@ static int begin_again(struct host_service *s, struct host_error *error) {
     struct host_audit *a = &s->audit;
     char what[HOST_AUDIT_WHY_BYTES + 40];
     a->failed++;
-    if (!host_audit_is_other(s, UINT_MAX) ||
-        a->failed > s->machine->nodes + 4u) {
+    if (!host_audit_is_other(s, UINT_MAX) || a->failed > s->machine->nodes + 4u)
         return give_up(s, error);
-    }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (a->guilty[i] != 0) {
             snprintf(what, sizeof what, "its result is wrong%s%s",
@@ -463,15 +427,12 @@ static int begin_again(struct host_service *s, struct host_error *error) {
         host_notice_line(s, line);
     }
     a->report.text[0] = '\0'; /* the bricks are done again */
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         s->ledger.job[i].epoch = 0; /* results under way do not count */
-    }
     host_progress_phase("triangulating", "Mtet");
-    for (uint32_t b = 0; b < s->ledger.bricks; b++) {
-        if (a->redo[b] != 0) {
+    for (uint32_t b = 0; b < s->ledger.bricks; b++)
+        if (a->redo[b] != 0)
             host_ledger_reopen(&s->ledger, b);
-        }
-    }
     host_audit_alone(s);
     a->lost_work = true;
     a->state = HOST_AUDIT_DUE;
@@ -491,13 +452,11 @@ int host_audit_step(struct host_service *service, bool *passed,
     struct host_audit *a = &s->audit;
     int status = 0;
     *passed = a->state == HOST_AUDIT_PASSED;
-    if (a->state == HOST_AUDIT_DUE) {
+    if (a->state == HOST_AUDIT_DUE)
         begin(s);
-    }
     if (a->state != HOST_AUDIT_RUNS ||
-        !__atomic_load_n(&a->ended, __ATOMIC_ACQUIRE)) {
+        !__atomic_load_n(&a->ended, __ATOMIC_ACQUIRE))
         return 0;
-    }
     host_fork_join(&a->fork);
     a->spent_us += s->machine->now_us(s->machine->context) - a->begun_us;
     if (a->error.code == 0 && is_exact_due(s) && !a->exact) {
@@ -524,9 +483,8 @@ void host_audit_free(struct host_audit *audit) {
 
 void host_faults_begin(struct host_service *service) {
     service->fault.told = false;
-    for (unsigned i = 0; i < service->machine->nodes; i++) {
+    for (unsigned i = 0; i < service->machine->nodes; i++)
         service->node[i].vouches = HOST_VOUCHES;
-    }
 }
 
 /* What to do about a fault that a node reports, by a word of its text; NULL: a
@@ -537,11 +495,9 @@ static const char *advice(const char *text) {
         {"memory", "give the nodes more memory"},
         {"protocol version", "run the same version of the program everywhere"},
         {"role", "run the same version of the program everywhere"}};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (strstr(text, known[i][0]) != NULL) {
+    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
+        if (strstr(text, known[i][0]) != NULL)
             return known[i][1];
-        }
-    }
     return NULL;
 }
 
@@ -573,15 +529,13 @@ int host_faults_take(struct host_service *service,
     struct host_service *s = service;
     size_t size = message->size < NODE_FAULT_TEXT_MAX ? message->size
                                                       : NODE_FAULT_TEXT_MAX;
-    if (s->fault.told) {
+    if (s->fault.told)
         return 0; /* the first is enough */
-    }
     memcpy(s->fault.text, message->data, size);
     s->fault.text[size] = '\0';
     s->fault.node = message->source;
-    if (!s->started || (advice(s->fault.text) != NULL && !may_go_on(s))) {
+    if (!s->started || (advice(s->fault.text) != NULL && !may_go_on(s)))
         return fail(s, error);
-    }
     s->fault.told = true;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         if (!s->work.lost[i]) {
@@ -603,11 +557,9 @@ void host_faults_pinged(struct host_service *service, unsigned node,
 
 /* Nodes that have left are not asked. */
 static bool all_vouch(const struct host_service *s) {
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (s->node[i].vouches != HOST_VOUCHES && !s->node[i].left) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
+        if (s->node[i].vouches != HOST_VOUCHES && !s->node[i].left)
             return false;
-        }
-    }
     return true;
 }
 
@@ -625,9 +577,8 @@ static int believe(struct host_service *s, struct host_error *error) {
         s->loss = true;
         return 0;
     }
-    if (!host_audit_is_other(s, node)) {
+    if (!host_audit_is_other(s, node))
         return fail(s, error);
-    }
     snprintf(why, sizeof why, "reports: %s", s->fault.text);
     host_audit_exclude(s, node, why);
     return 0;
@@ -636,9 +587,8 @@ static int believe(struct host_service *s, struct host_error *error) {
 int host_faults_answered(struct host_service *service, unsigned node,
                          uint32_t count, struct host_error *error) {
     struct host_node *n = &service->node[node];
-    if (n->vouches == HOST_ASKED && (int32_t)(count - n->asked) >= 0) {
+    if (n->vouches == HOST_ASKED && (int32_t)(count - n->asked) >= 0)
         n->vouches = HOST_VOUCHES;
-    }
     return service->fault.told && all_vouch(service) ? believe(service, error)
                                                      : 0;
 }

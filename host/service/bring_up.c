@@ -24,14 +24,12 @@ enum host_in_use_state host_in_use_look(struct host_in_use *in_use,
         in_use->since_us = 0;
         return HOST_FREE;
     }
-    if (in_use->since_us == 0) {
+    if (in_use->since_us == 0)
         in_use->since_us = now_us;
-    }
     if (in_use->told != peer->in_use) {
         in_use->told_us = now_us;
-        if (machine->rest != NULL) {
+        if (machine->rest != NULL)
             machine->rest(machine->context, IN_USE_REST_US);
-        }
     }
     in_use->told = peer->in_use;
     uint64_t passed = now_us - in_use->since_us;
@@ -69,17 +67,15 @@ struct cube *host_cube_make(const struct host_machine *machine, unsigned window,
     config.self = CUBE_HOST;
     config.dimension = (uint8_t)machine->dimension;
     config.window = (uint16_t)(window == 0 ? WINDOW_DEFAULT : window);
-    if (config.window > LINK_WINDOW_MAX) {
+    if (config.window > LINK_WINDOW_MAX)
         config.window = LINK_WINDOW_MAX;
-    }
     config.epoch = machine->epoch;
     config.pipes[0] = machine->pipe;
     config.pipes[1] = machine->spare;
     config.spare_node = machine->spare_node;
     config.host_ports = machine->host_ports;
-    for (unsigned i = 1; i < config.host_ports; i++) {
+    for (unsigned i = 1; i < config.host_ports; i++)
         config.pipes[i] = machine->wires[i];
-    }
     cube_for_serial(&config, machine->serial_baud);
     size_t bytes = cube_arena_bytes(&config);
     *memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
@@ -180,11 +176,9 @@ static unsigned count_missing(const struct host_service *s, unsigned *first) {
 /* A neighbour that has met somebody with another key where the node should be;
  * -1: none has. */
 static int refused_by(const struct host_service *s, unsigned node) {
-    for (unsigned d = 0; d < s->machine->dimension; d++) {
-        if ((s->node[node ^ 1u << d].refused >> d & 1) != 0) {
+    for (unsigned d = 0; d < s->machine->dimension; d++)
+        if ((s->node[node ^ 1u << d].refused >> d & 1) != 0)
             return (int)(node ^ 1u << d);
-        }
-    }
     return -1;
 }
 
@@ -263,9 +257,8 @@ static void tell(struct host_service *s, uint64_t now_us) {
     /* A generation begins without anybody, and all come again one by one. */
     if (now_us - s->opened_us < TELL_US || now_us - s->news_us < NEWS_US ||
         s->machine->restarts != NULL ||
-        (s->waiting[0] != '\0' && now_us - s->waiting_us < TELL_AGAIN_US)) {
+        (s->waiting[0] != '\0' && now_us - s->waiting_us < TELL_AGAIN_US))
         return;
-    }
     describe(s, line, sizeof line);
     if (strncmp(line, s->waiting, sizeof s->waiting - 1) != 0) {
         snprintf(s->waiting, sizeof s->waiting, "%.*s",
@@ -323,9 +316,8 @@ static uint64_t starved_us(struct host_service *s) {
 
 static void count_time(struct host_service *s, uint64_t elapsed_us) {
     s->step_us += elapsed_us;
-    if (s->step_us < STEP_US) {
+    if (s->step_us < STEP_US)
         return;
-    }
     uint64_t starved = starved_us(s);
     s->waited_us += starved < s->step_us ? s->step_us - starved : 0;
     s->step_us = 0;
@@ -335,9 +327,8 @@ int host_bring_up_check(struct host_service *service, uint64_t now_us,
                         uint64_t elapsed_us, struct host_error *error) {
     struct host_service *s = service;
     unsigned first = 0;
-    if (s->started || s->up == s->work.living) {
+    if (s->started || s->up == s->work.living)
         return 0;
-    }
     unsigned there = s->machine->nodes - count(s, true, &first);
     if (there > s->there) {
         s->there = there;
@@ -349,9 +340,8 @@ int host_bring_up_check(struct host_service *service, uint64_t now_us,
 }
 
 void host_bring_up_done(struct host_service *service) {
-    if (service->waiting[0] != '\0') {
+    if (service->waiting[0] != '\0')
         host_notice_line(service, "host: all nodes are there; the run begins");
-    }
 }
 
 /* --- generations ---------------------------------------------------------- */
@@ -368,9 +358,8 @@ static bool speaks(const struct host_service *s, const struct cube_wiring *w,
                    uint16_t gateway) {
     unsigned dimension = s->machine->dimension;
     bool on = dimension == 0;
-    for (unsigned d = 0; d < dimension; d++) {
+    for (unsigned d = 0; d < dimension; d++)
         on = on || !wiring_is_dead(w, w->dead_count, gateway, d, dimension);
-    }
     return on &&
            !wiring_is_dead(w, w->dead_count, gateway, dimension, dimension);
 }
@@ -425,9 +414,8 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
     struct host_service *s = service;
     host_detector_begin(s, now_us);
     host_onlooking_again(&s->onlooking);
-    if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0) {
+    if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0)
         return error->code;
-    }
     s->late = false;
     if (s->started) {
         s->audit.lost_work = true;
@@ -467,17 +455,15 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
         s->over = s->reporting;
         return 0;
     }
-    if (check_progress(s, error) != 0) {
+    if (check_progress(s, error) != 0)
         return error->code;
-    }
     if (s->searching || !host_missing_links_spare(s)) {
         /* That a wire is absent shows later, and who is cut off is waited
          * for. */
         next.dead_count = next.settled;
     }
-    if (!s->searching) {
+    if (!s->searching)
         next.absent_s = s->started ? s->machine->absent_s : next.absent_s;
-    }
     if (s->wire_lost) {
         struct cube_dead dead = {next.gateway, (uint8_t)dimension};
         (void)wiring_add_dead(&next, dead, dimension);
@@ -486,9 +472,8 @@ int host_generation_renew(struct host_service *service, uint64_t now_us,
     }
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct cube_dead dead = {(uint16_t)i, CUBE_WHOLE_NODE};
-        if (s->node[i].given_up) {
+        if (s->node[i].given_up)
             (void)wiring_add_dead(&next, dead, dimension);
-        }
     }
     next.gateway = host_generation_gateway(s, &next);
     cube_renew(s->cube, &next);

@@ -45,16 +45,13 @@ static unsigned distance(const struct host_service *s, unsigned node) {
  * the gateway, so that the way to it leads over nodes that have. */
 static void ping_next(struct host_service *s) {
     unsigned best = UINT32_MAX;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         if (!s->work.lost[i] && !s->report[i].up &&
-            (best == UINT32_MAX || distance(s, i) < distance(s, best))) {
+            (best == UINT32_MAX || distance(s, i) < distance(s, best)))
             best = i;
-        }
-    }
     s->probing = best != UINT32_MAX;
-    if (s->probing) {
+    if (s->probing)
         s->node[best].ping_due = true;
-    }
 }
 
 /* The last part of the patience, in which a silent node is pinged alone. */
@@ -89,27 +86,23 @@ void host_detector_begin(struct host_service *service, uint64_t now_us) {
         node->still_us = 0;
         node->cut_off = false;
         node->silent = 0;
-        if (node->silent_us > s->patience_us - probe_us(s)) {
+        if (node->silent_us > s->patience_us - probe_us(s))
             node->silent_us = s->patience_us - probe_us(s);
-        }
         node->awaited = INCODE_NONE;
         node->owing = CUBE_HOST;
         node->left = false;
         s->report[i].up = s->report[i].ready = false;
-        if (lost) {
+        if (lost)
             close_start(s, i);
-        }
     }
-    if (s->probing) {
+    if (s->probing)
         ping_next(s);
-    }
     host_faults_begin(s);
 }
 
 void host_detector_end(struct host_service *service) {
-    for (unsigned i = 0; i < service->machine->nodes; i++) {
+    for (unsigned i = 0; i < service->machine->nodes; i++)
         close_start(service, i);
-    }
 }
 
 /* --- pings and pongs ------------------------------------------------------ */
@@ -117,9 +110,8 @@ void host_detector_end(struct host_service *service) {
 bool host_detector_ping(struct host_service *service, uint16_t to) {
     struct host_node *node = &service->node[to];
     struct node_ping_message ping = {node->sent};
-    if (cube_write(service->cube, to, NODE_PING, &ping, sizeof ping) != 0) {
+    if (cube_write(service->cube, to, NODE_PING, &ping, sizeof ping) != 0)
         return false;
-    }
     host_faults_pinged(service, to, node->sent);
     node->sent++;
     node->ping_due = false;
@@ -144,9 +136,8 @@ int host_detector_pong(struct host_service *service,
     }
     memcpy(&pong, message->data, sizeof pong);
     bool anew = node->start != 0 && node->start != pong.start;
-    if (anew) {
+    if (anew)
         s->blamed = message->source;
-    }
     bool first = !report->up;
     if (first) {
         /* It has had nothing but pings yet.  The first of them may have gone
@@ -156,19 +147,16 @@ int host_detector_pong(struct host_service *service,
         s->news_us = s->check_us;
         node->missed = pong.pinged - pong.received;
         node->ping_again_us = PING_AGAIN_US;
-        if (anew) {
+        if (anew)
             close_start(s, message->source);
-        }
         node->start = pong.start;
     }
     if (pong.start != node->start ||
         pong.pinged - pong.received != node->missed ||
-        pong.sent != node->received) {
+        pong.sent != node->received)
         s->loss = true;
-    }
-    if (pong.work != node->work) {
+    if (pong.work != node->work)
         host_idle_progress(s, message->source);
-    }
     node->work = pong.work;
     node->awaited = pong.awaited;
     node->owing = pong.owing;
@@ -179,9 +167,8 @@ int host_detector_pong(struct host_service *service,
     node->pinged = false;
     /* What would have been asked again, is answered. */
     node->ping_due = node->vouches == HOST_DOUBTED;
-    if (first && s->probing) {
+    if (first && s->probing)
         ping_next(s);
-    }
     return s->loss
                ? 0
                : host_faults_answered(s, message->source, pong.pinged, error);
@@ -189,23 +176,20 @@ int host_detector_pong(struct host_service *service,
 
 static unsigned pings_due(const struct host_service *s) {
     unsigned due = 0;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         due += s->node[i].ping_due;
-    }
     return due;
 }
 
 /* Has each node pinged once a period, one after the other; less often where
  * the wire is too slow for that and for the work. */
 static void ping_in_turn(struct host_service *s, uint64_t now_us) {
-    if (s->probing) {
+    if (s->probing)
         return;
-    }
     uint64_t every = PINGS_EVERY_US / s->machine->nodes;
     every = every < PING_EVERY_US ? PING_EVERY_US : every;
-    if (now_us - s->ping_us < every) {
+    if (now_us - s->ping_us < every)
         return;
-    }
     unsigned due = pings_due(s);
     for (unsigned i = 0; i < s->machine->nodes && due < PINGS_DUE_MAX &&
                          now_us - s->ping_us >= every;
@@ -219,9 +203,8 @@ static void ping_in_turn(struct host_service *s, uint64_t now_us) {
         s->ping_turn = (s->ping_turn + 1) % s->machine->nodes;
         s->ping_us += every;
     }
-    if (now_us - s->ping_us >= every) {
+    if (now_us - s->ping_us >= every)
         s->ping_us = now_us;
-    }
 }
 
 /* --- what is wrong -------------------------------------------------------- */
@@ -255,9 +238,8 @@ static void give_up(struct host_service *s, unsigned i) {
     node->given_up = true;
     s->blamed = i;
     s->loss = true;
-    if (i == cube_wiring(s->cube)->gateway && s->machine->spare_node == 0) {
+    if (i == cube_wiring(s->cube)->gateway && s->machine->spare_node == 0)
         return; /* the error says so */
-    }
     host_notice(s, i,
                 "given up after %llu s without an answer; its work is given "
                 "to others, look after that node and its wires",
@@ -290,15 +272,12 @@ static void listen(struct host_service *s, uint64_t now_us,
                                       ? 2 * node->ping_again_us
                                       : PING_AGAIN_US;
         }
-        if (!s->started || s->work.lost[i] ||
-            !(node->pinged || node->ping_due)) {
+        if (!s->started || s->work.lost[i] || !(node->pinged || node->ping_due))
             continue;
-        }
         node->silent_us += elapsed_us;
         uint64_t most = silence_us_max(s, i);
-        if (node->silent_us <= most - (alone ? 0 : probe_us(s))) {
+        if (node->silent_us <= most - (alone ? 0 : probe_us(s)))
             continue;
-        }
         if (alone) {
             give_up(s, i);
         } else {
@@ -323,9 +302,8 @@ static int check_wire(struct host_service *s, uint64_t now_us,
     /* A wire that was never up is waited for: its node may start late.  What is
      * wrong with one, the wiring will have in a moment. */
     if (state != LINK_DOWN ||
-        cube_link_statistics(s->cube, wire)->sessions == 0) {
+        cube_link_statistics(s->cube, wire)->sessions == 0)
         s->wire_down_us = now_us;
-    }
     /* Without another wire it is the node that is waited for. */
     if (now_us - s->wire_down_us > WIRE_DOWN_US_MAX &&
         s->machine->spare_node != 0) {
@@ -340,9 +318,8 @@ int host_detector_doubt(const struct host_service *service, unsigned node,
                         struct host_error *error) {
     const struct host_machine *m = service->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
-    if (doubt == NULL) {
+    if (doubt == NULL)
         return 0;
-    }
     bool next = strchr(doubt, ';') != NULL;
     return host_fail(error, HOST_CUBE, "node %u link %u: %s%s", node,
                      host_detector_link(service, node), doubt,
@@ -355,23 +332,20 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
                         struct host_error *error) {
     struct host_service *s = service;
     const struct cube_wiring *wiring = cube_wiring(s->cube);
-    if (now_us - s->check_us < CHECK_EVERY_US) {
+    if (now_us - s->check_us < CHECK_EVERY_US)
         return 0;
-    }
     uint64_t elapsed = now_us - s->check_us;
     s->check_us = now_us;
-    if (s->machine->check(s->machine->context, error) != 0) {
+    if (s->machine->check(s->machine->context, error) != 0)
         return error->code;
-    }
     if (s->work.living == 0) {
         return host_fail(error, HOST_CUBE,
                          "node %u link %u: no node is left to work; look after "
                          "the nodes, and run again",
                          s->blamed, host_detector_link(s, s->blamed));
     }
-    if (wiring->wrong_count > 0) {
+    if (wiring->wrong_count > 0)
         return fail_wrong(s, error);
-    }
     if (s->machine->restarts != NULL &&
         s->machine->restarts(s->machine->context) != s->restarts) {
         s->restarts = s->machine->restarts(s->machine->context);
@@ -387,9 +361,8 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     host_doubts_check(s, elapsed);
     host_idle_check(s, elapsed);
     host_missing_links_look(s, elapsed);
-    if (check_wire(s, now_us, error) != 0) {
+    if (check_wire(s, now_us, error) != 0)
         return error->code;
-    }
     return host_bring_up_check(s, now_us, elapsed, error);
 }
 
@@ -421,19 +394,16 @@ static uint64_t doubt_us(const struct host_service *s) {
 /* Notes the silences that have ended since the last check. */
 static void note_silences(struct host_service *s, uint64_t elapsed_us) {
     bool doubted = false;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         doubted = doubted || (s->node[i].doubted && !s->work.lost[i]);
-    }
     s->undoubted_us = doubted ? 0 : s->undoubted_us + elapsed_us;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         struct host_node *n = &s->node[i];
         uint64_t fades_us = elapsed_us / FADES;
         bool ended = n->silent_us < n->silence_us && n->silent == 0;
         n->slow_us -= fades_us < n->slow_us ? fades_us : n->slow_us;
-        if (ended && s->undoubted_us >= QUIET_US &&
-            n->silence_us > n->slow_us) {
+        if (ended && s->undoubted_us >= QUIET_US && n->silence_us > n->slow_us)
             n->slow_us = n->silence_us;
-        }
         n->silence_us = n->silent_us;
     }
 }
@@ -525,11 +495,9 @@ static void look_at_links(struct host_service *s, unsigned i,
     limit = limit < usual_us(s, i) ? usual_us(s, i) : limit;
     wires &= (1u << s->machine->dimension) - 1;
     node->wires_us = wires != 0 ? node->wires_us + elapsed_us : 0;
-    for (unsigned d = 0; wires >> d != 0 && node->wires_us > limit; d++) {
-        if ((wires >> d & 1) != 0) {
+    for (unsigned d = 0; wires >> d != 0 && node->wires_us > limit; d++)
+        if ((wires >> d & 1) != 0)
             doubt_wire(s, i, d);
-        }
-    }
 }
 
 void host_doubts_check(struct host_service *service, uint64_t elapsed_us) {
@@ -541,15 +509,13 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us) {
         uint64_t limit = doubt_us(s);
         limit = limit < usual_us(s, i) ? usual_us(s, i) : limit;
         limit = s->patience_us / 2 < limit ? s->patience_us / 2 : limit;
-        if (s->work.lost[i] || s->node[i].doubted) {
+        if (s->work.lost[i] || s->node[i].doubted)
             continue;
-        }
         if (s->node[i].silent_us > limit && witnesses(s, i, &others) > 0 &&
-            others == 0) {
+            others == 0)
             doubt(s, i);
-        } else {
+        else
             look_at_links(s, i, elapsed_us);
-        }
     }
 }
 
@@ -614,9 +580,8 @@ static unsigned awaits(const struct host_service *s, unsigned i) {
 static unsigned culprit(const struct host_service *s, unsigned i) {
     unsigned next = awaits(s, i);
     for (unsigned k = 0; k < s->machine->nodes && next != CUBE_HOST; k++) {
-        if (s->node[next].still_us <= s->patience_us / 2) {
+        if (s->node[next].still_us <= s->patience_us / 2)
             return CUBE_HOST;
-        }
         i = next;
         next = awaits(s, i);
     }
@@ -635,9 +600,8 @@ bool host_idle_leave(struct host_service *service, unsigned node,
     n->still_us = 0;
     s->blamed = node;
     n->left = true;
-    if (n->started_anew) {
+    if (n->started_anew)
         return false;
-    }
     if (s->machine->kill != NULL &&
         s->machine->kill(s->machine->context, node)) {
         n->started_anew = true; /* the machine will say so */
@@ -671,14 +635,12 @@ static void host_idle_check(struct host_service *service, uint64_t elapsed_us) {
         node->still_us = is_owed(s, i) ? 0 : node->still_us + elapsed_us;
         /* One that is silent does not answer: failure_detector.h. */
         if (!owes(s, i) || node->still_us <= s->patience_us ||
-            node->silent_us > SILENT_US) {
+            node->silent_us > SILENT_US)
             continue;
-        }
         char why[80];
         unsigned who = culprit(s, i);
-        if (who == CUBE_HOST) {
+        if (who == CUBE_HOST)
             continue;
-        }
         snprintf(why, sizeof why, "answers, but has done nothing for %llu s",
                  (unsigned long long)s->patience_us / 1000000);
         leave_for_good(s, who, why);

@@ -32,9 +32,8 @@ static int wrong_size(const struct cube_message *message, const char *what,
  * says is a part that must not be taken for the whole. */
 static bool missing(struct host_service *s, const struct host_node *node,
                     uint32_t sent) {
-    if (sent == node->received) {
+    if (sent == node->received)
         return false;
-    }
     s->loss = true;
     return true;
 }
@@ -87,21 +86,18 @@ static int take_results(struct host_service *s,
                         const struct cube_message *message,
                         struct host_error *error) {
     struct node_result_header header;
-    if (message->size < sizeof header) {
+    if (message->size < sizeof header)
         return wrong_size(message, "results", sizeof header, error);
-    }
     memcpy(&header, message->data, sizeof header);
     struct host_node *node = &s->node[message->source];
     node->results++;
 #ifdef INCODE_PLANT_LOST_BATCH /* a fault that the simulation has to find */
-    if (node->results % 8 == 0) {
+    if (node->results % 8 == 0)
         return 0;
-    }
 #endif
     if (missing(s, node, header.sent) ||
-        !host_ledger_current(&s->ledger, message->source, header.epoch)) {
+        !host_ledger_current(&s->ledger, message->source, header.epoch))
         return 0;
-    }
     return host_results_take(s, message, error);
 }
 
@@ -110,9 +106,8 @@ static int take_spill(struct host_service *s,
                       struct host_error *error) {
     struct node_spill_header header;
     struct incode_face faces[NODE_FACES_A_MESSAGE];
-    if (message->size < sizeof header) {
+    if (message->size < sizeof header)
         return wrong_size(message, "spilled faces", sizeof header, error);
-    }
     memcpy(&header, message->data, sizeof header);
     size_t size = sizeof header + header.count * sizeof faces[0];
     if (message->size != size) {
@@ -125,9 +120,8 @@ static int take_spill(struct host_service *s,
                        "more than %d spilled faces in a message: %u",
                        NODE_FACES_A_MESSAGE, header.count);
     }
-    if (!host_ledger_current(&s->ledger, message->source, header.epoch)) {
+    if (!host_ledger_current(&s->ledger, message->source, header.epoch))
         return 0;
-    }
     memcpy(faces, message->data + sizeof header,
            header.count * sizeof faces[0]);
     return host_results_spill(s, message->source, faces, header.count, error);
@@ -152,9 +146,8 @@ static int take_unspill_request(struct host_service *s,
         return unsound(message, error, "more than %d spilled lists requested",
                        HOST_UNSPILLS_MAX);
     }
-    if (missing(s, node, header.sent)) {
+    if (missing(s, node, header.sent))
         return 0; /* what was lost may have been part of the list */
-    }
     uint32_t at =
         (node->unspills_first + node->unspills_count++) % HOST_UNSPILLS_MAX;
     node->unspills[at].header = header;
@@ -171,13 +164,11 @@ static int take_finished(struct host_service *s,
     struct host_node_report *report = &s->report[message->source];
     struct host_node *node = &s->node[message->source];
     struct node_finished_message finished;
-    if (message->size != sizeof finished) {
+    if (message->size != sizeof finished)
         return wrong_size(message, "statistics", sizeof finished, error);
-    }
     memcpy(&finished, message->data, sizeof finished);
-    if (missing(s, node, finished.sent)) {
+    if (missing(s, node, finished.sent))
         return 0;
-    }
     if (finished.epoch != 0 &&
         !host_ledger_current(&s->ledger, message->source, finished.epoch)) {
         return unsound(message, error,
@@ -209,16 +200,14 @@ static int take_ready(struct host_service *s,
                       struct host_error *error) {
     struct host_node_report *report = &s->report[message->source];
     uint32_t protocol = NODE_PROTOCOL;
-    if (message->size >= sizeof protocol) {
+    if (message->size >= sizeof protocol)
         memcpy(&protocol, message->data, sizeof protocol);
-    }
     if (protocol != NODE_PROTOCOL) {
         return unsound(message, error, "protocol version %u, expected %d",
                        protocol, NODE_PROTOCOL);
     }
-    if (message->size != sizeof report->map) {
+    if (message->size != sizeof report->map)
         return wrong_size(message, "memory map", sizeof report->map, error);
-    }
     memcpy(&report->map, message->data, sizeof report->map);
     s->ready += !report->ready;
     report->ready = true;
@@ -234,12 +223,10 @@ static int doubt_page(struct host_service *s, unsigned reporter,
                       unsigned sender, uint32_t page,
                       struct host_error *error) {
     char which[32] = "a page cut short", why[120];
-    if (s->work.lost[reporter] || s->node[reporter].left) {
+    if (s->work.lost[reporter] || s->node[reporter].left)
         return 0;
-    }
-    if (page != INCODE_NONE) {
+    if (page != INCODE_NONE)
         snprintf(which, sizeof which, "a wrong page %u", page);
-    }
     if (sender == CUBE_HOST || s->strategy == &host_redo) {
         snprintf(why, sizeof why,
                  "reports %s of the host's, altered on the way or by that node",
@@ -265,9 +252,8 @@ static int take_wrong_page(struct host_service *s,
     }
     memcpy(&wrong, message->data, sizeof wrong);
     if (wrong.sender == message->source ||
-        (wrong.sender != CUBE_HOST && wrong.sender >= s->machine->nodes)) {
+        (wrong.sender != CUBE_HOST && wrong.sender >= s->machine->nodes))
         return unsound(message, error, "a wrong page of node %u", wrong.sender);
-    }
     return doubt_page(s, message->source, wrong.sender, wrong.page, error);
 }
 
@@ -277,22 +263,18 @@ static int take_other(struct host_service *s,
                       struct host_error *error) {
     const struct host_strategy *strategy = s->strategy;
     struct node_result_header header;
-    if (strategy->take == NULL) {
+    if (strategy->take == NULL)
         return unsound(message, error, "unknown type of message");
-    }
-    if (message->size < sizeof header) {
+    if (message->size < sizeof header)
         return wrong_size(message, "message of a role", sizeof header, error);
-    }
     memcpy(&header, message->data, sizeof header);
     if (missing(s, &s->node[message->source], header.sent) ||
         (header.epoch != 0 &&
-         !host_ledger_current(&s->ledger, message->source, header.epoch))) {
+         !host_ledger_current(&s->ledger, message->source, header.epoch)))
         return 0;
-    }
     int status = strategy->take(&s->work, message, error);
-    if (status != 0 && error->code == 0) {
+    if (status != 0 && error->code == 0)
         return unsound(message, error, "unknown type of message");
-    }
     return error->code;
 }
 
@@ -337,16 +319,13 @@ static bool is_of_itself(uint8_t type) {
 
 int host_handle(struct host_service *service,
                 const struct cube_message *message, struct host_error *error) {
-    if (message->source >= service->machine->nodes) {
+    if (message->source >= service->machine->nodes)
         return unsound(message, error, "not in this cube");
-    }
     struct host_node *node = &service->node[message->source];
-    if (service->work.lost[message->source] || node->left) {
+    if (service->work.lost[message->source] || node->left)
         return 0; /* it has no part in this generation, or no more */
-    }
-    if (!is_of_itself(message->type)) {
+    if (!is_of_itself(message->type))
         host_idle_progress(service, message->source);
-    }
     bool expected = is_of_itself(message->type) ||
                     message->type == NODE_FAULT ||
                     (service->started && !node->setup_due);
@@ -375,9 +354,8 @@ uint64_t host_paging_memory(uint64_t memory, uint64_t frames, uint64_t pages) {
     double needed = needed_for(memory, frames, pages);
     uint64_t enough = 1;
     while (enough <= memory ||
-           ((double)enough < needed && enough < HOST_MEMORY_MAX)) {
+           ((double)enough < needed && enough < HOST_MEMORY_MAX))
         enough *= 2;
-    }
     return enough < HOST_MEMORY_MAX ? enough : HOST_MEMORY_MAX;
 }
 
@@ -428,9 +406,8 @@ static void look(struct host_service *s, uint64_t pages) {
         (uint64_t)s->order->tree.pages * s->machine->nodes * s->generations;
     if (s->memory == 0 || s->paging_told || pages <= needed ||
         pages - needed < HOST_PAGING_AGAIN_MIN ||
-        (pages - needed) * HOST_PAGING_TETRAHEDRA < s->tets->count) {
+        (pages - needed) * HOST_PAGING_TETRAHEDRA < s->tets->count)
         return;
-    }
     s->paging_told = true;
     tell(s);
 }
@@ -442,8 +419,7 @@ void host_paging_sent(struct host_service *service) {
 
 void host_paging_end(struct host_service *service) {
     uint64_t pages = 0;
-    for (unsigned i = 0; i < service->machine->nodes; i++) {
+    for (unsigned i = 0; i < service->machine->nodes; i++)
         pages += service->report[i].statistics.statistics.page_requests;
-    }
     look(service, pages);
 }

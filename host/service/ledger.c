@@ -34,11 +34,10 @@ static uint32_t region_end(const struct host_order *order, uint32_t brick) {
     uint32_t low = 0, high = order->regions;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
-        if (order->region[middle].first <= brick) {
+        if (order->region[middle].first <= brick)
             low = middle;
-        } else {
+        else
             high = middle;
-        }
     }
     return order->region[low].last;
 }
@@ -47,16 +46,14 @@ bool host_ledger_next(struct host_ledger *ledger,
                       const struct host_order *order, uint32_t *first,
                       uint32_t *last) {
     uint32_t at = ledger->cursor;
-    while (at < ledger->bricks && host_ledger_committed(ledger, at)) {
+    while (at < ledger->bricks && host_ledger_committed(ledger, at))
         at++;
-    }
     *first = at;
     if (at < ledger->bricks) {
         uint32_t end = region_end(order, at);
         while (at < end && at - *first < ledger->piece_max &&
-               !host_ledger_committed(ledger, at)) {
+               !host_ledger_committed(ledger, at))
             at++;
-        }
     }
     *last = at;
     ledger->cursor = at;
@@ -87,9 +84,8 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick) {
     struct host_job *job = &ledger->job[node];
     if (job->epoch == 0 || brick < job->first || brick >= job->last ||
-        host_ledger_committed(ledger, brick)) {
+        host_ledger_committed(ledger, brick))
         return -1;
-    }
     ledger->open[brick] = 0;
     ledger->by[brick] =
         (uint16_t)(node | (ledger->alone ? HOST_LEDGER_ALONE : 0));
@@ -100,9 +96,8 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
 
 int host_ledger_finish(struct host_ledger *ledger, uint32_t node) {
     struct host_job *job = &ledger->job[node];
-    if (job->epoch == 0 || job->committed != job->last - job->first) {
+    if (job->epoch == 0 || job->committed != job->last - job->first)
         return -1;
-    }
     job->epoch = 0;
     return 0;
 }
@@ -111,9 +106,8 @@ uint32_t host_ledger_owner(const struct host_ledger *ledger,
                            const struct host_order *order,
                            const uint32_t v[4]) {
     double at[4][3];
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         host_vertex(order, v[i], at[i]);
-    }
     const double *const p[4] = {at[0], at[1], at[2], at[3]};
     return v[incode_owner(ledger->owner_rule, v, p)] / INCODE_BRICK_POINTS;
 }
@@ -122,9 +116,8 @@ int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
                       struct host_error *error) {
     size_t runs = ledger->runs;
     uint64_t before = runs == 0 ? 0 : ledger->found[runs - 1].end;
-    if (count == 0) {
+    if (count == 0)
         return 0;
-    }
     if (runs > 0 && ledger->found[runs - 1].node == node) {
         ledger->found[runs - 1].end = before + count;
         return 0;
@@ -132,9 +125,8 @@ int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
     if (runs == ledger->runs_max) {
         size_t more = runs == 0 ? 64 : 2 * runs;
         void *moved = realloc(ledger->found, more * sizeof *ledger->found);
-        if (moved == NULL) {
+        if (moved == NULL)
             return host_fail_memory(error, "the list of finders");
-        }
         ledger->found = moved;
         ledger->runs_max = more;
     }
@@ -146,11 +138,10 @@ uint32_t host_ledger_finder(const struct host_ledger *ledger, uint64_t i) {
     size_t low = 0, high = ledger->runs;
     while (low < high) {
         size_t middle = low + (high - low) / 2;
-        if (ledger->found[middle].end <= i) {
+        if (ledger->found[middle].end <= i)
             low = middle + 1;
-        } else {
+        else
             high = middle;
-        }
     }
     assert(low < ledger->runs);
     return ledger->found[low].node;
@@ -179,12 +170,10 @@ static uint64_t keep_committed(struct host_ledger *ledger,
                 kept++;
             }
         }
-        if (kept == before) {
+        if (kept == before)
             continue;
-        }
-        if (runs > 0 && ledger->found[runs - 1].node == run.node) {
+        if (runs > 0 && ledger->found[runs - 1].node == run.node)
             runs--;
-        }
         ledger->found[runs++] = (struct host_found){kept, run.node};
     }
     assert(i == tets->count);
@@ -197,12 +186,10 @@ uint64_t host_ledger_abandon(struct host_ledger *ledger, uint32_t pieces,
                              struct host_tetrahedra *tets) {
     uint64_t count = tets->count;
     uint32_t left = ledger->bricks - ledger->committed;
-    if (left > 0) {
+    if (left > 0)
         host_tetrahedra_cut(tets, keep_committed(ledger, order, tets));
-    }
-    for (uint32_t i = 0; i < ledger->nodes; i++) {
+    for (uint32_t i = 0; i < ledger->nodes; i++)
         ledger->job[i].epoch = 0;
-    }
     ledger->cursor = 0;
     ledger->piece_max = left / pieces + 1;
     return count - tets->count;

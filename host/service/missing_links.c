@@ -45,9 +45,8 @@ static bool holds_together(const struct host_service *s,
     const bool *reached = follow(s, w);
     bool all =
         !wiring_is_dead(w, w->dead_count, w->gateway, dimension, dimension);
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         all = all && (reached[i] || s->work.lost[i]);
-    }
     return all;
 }
 
@@ -57,9 +56,8 @@ bool host_missing_links_spare(struct host_service *service) {
     found.gateway = host_generation_gateway(s, &found);
     bool spare = holds_together(s, &found);
     const bool *reached = follow(s, &found);
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         s->node[i].cut_off = !spare && !s->work.lost[i] && !reached[i];
-    }
     return spare;
 }
 
@@ -71,18 +69,16 @@ static void name_wire(struct host_service *s, unsigned node, unsigned link) {
         s->machine->missing(s->machine->context, node, link);
         return;
     }
-    if (link < s->machine->dimension) {
+    if (link < s->machine->dimension)
         snprintf(other, sizeof other, "node %u", node ^ 1u << link);
-    }
     host_note("node %u link %u: the wire to %s does not come up; the run goes "
               "on without it, look after that wire",
               node, link, other);
 }
 
 static void tell(struct host_service *s, const struct cube_wiring *w) {
-    for (unsigned i = w->settled; i < w->dead_count; i++) {
+    for (unsigned i = w->settled; i < w->dead_count; i++)
         name_wire(s, w->dead[i].node, w->dead[i].dimension);
-    }
 }
 
 static void search(struct host_service *s, uint64_t now_us) {
@@ -124,14 +120,12 @@ bool host_missing_links_check(struct host_service *service, uint64_t now_us,
                               uint64_t patience_us) {
     struct host_service *s = service;
     struct cube_wiring found = *cube_wiring(s->cube);
-    if (s->started || s->machine->absent_s == 0) {
+    if (s->started || s->machine->absent_s == 0)
         return false;
-    }
     if (!s->searching) {
         if (s->up < s->work.living &&
-            now_us - s->news_us >= wait_us(patience_us)) {
+            now_us - s->news_us >= wait_us(patience_us))
             search(s, now_us);
-        }
         return s->searching;
     }
     found.gateway = host_generation_gateway(s, &found);
@@ -159,9 +153,8 @@ void host_missing_links_heard(struct host_service *service, unsigned node,
     struct host_service *s = service;
     s->node[node].links_heard_us = s->uncabled_us;
     s->node[node].links |= links;
-    for (unsigned d = 0; d < s->machine->dimension; d++) {
+    for (unsigned d = 0; d < s->machine->dimension; d++)
         s->node[node ^ 1u << d].links |= links & bit_of(d);
-    }
 }
 
 static bool has_host_port(const struct host_machine *m, unsigned node) {
@@ -213,11 +206,9 @@ static unsigned count_missing(const struct host_service *s, unsigned *certain) {
 static void name_all(struct host_service *s) {
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         uint32_t missing = missing_of(s, i);
-        for (unsigned d = 0; missing >> d != 0; d++) {
-            if ((missing & bit_of(d)) != 0) {
+        for (unsigned d = 0; missing >> d != 0; d++)
+            if ((missing & bit_of(d)) != 0)
                 name_wire(s, i, d);
-            }
-        }
     }
 }
 
@@ -233,9 +224,8 @@ static void go_round_all(struct host_service *s) {
                           wiring_add_dead(&next, dead, s->machine->dimension));
         }
     }
-    if (!all || !holds_together(s, &next)) {
+    if (!all || !holds_together(s, &next))
         return;
-    }
     next.gateway = host_generation_gateway(s, &next);
     s->generations++;
     cube_renew(s->cube, &next);
@@ -243,9 +233,8 @@ static void go_round_all(struct host_service *s) {
 
 static bool all_attentive(const struct host_service *s) {
     bool all = true;
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         all = all && (s->work.lost[i] || s->node[i].silent_us <= ATTENTIVE_US);
-    }
     return all;
 }
 
@@ -261,20 +250,17 @@ void host_missing_links_look(struct host_service *service,
                              uint64_t elapsed_us) {
     struct host_service *s = service;
     unsigned certain;
-    if (s->cabled || !s->started) {
+    if (s->cabled || !s->started)
         return;
-    }
     unsigned missing = count_missing(s, &certain);
-    if (missing > 0 && all_attentive(s)) {
+    if (missing > 0 && all_attentive(s))
         s->uncabled_us += elapsed_us;
-    }
     if (missing == certain) {
         name_all(s);
         s->cabled = true;
         if (missing > 0 && s->strategy->meshes && !s->finished &&
-            s->ledger.committed < s->ledger.bricks) {
+            s->ledger.committed < s->ledger.bricks)
             go_round_all(s);
-        }
     } else if (s->finished) {
         call_all(s);
     }

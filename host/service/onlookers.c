@@ -14,9 +14,8 @@ void host_onlooking_look(struct host_onlooking *onlooking,
                          const struct host_onlookers_progress *progress) {
     const struct host_onlookers *them = machine->onlookers;
     struct host_onlooking *o = onlooking;
-    if (them == NULL || (!o->asked && now_us - o->look_us < LOOK_US)) {
+    if (them == NULL || (!o->asked && now_us - o->look_us < LOOK_US))
         return;
-    }
     if (!o->asked) {
         o->look_us = now_us;
         o->asked = them->ask(them->context, now_us, &o->question);
@@ -52,13 +51,11 @@ bool host_onlooking_take(struct host_onlooking *onlooking,
                          const struct cube_message *message) {
     const struct host_onlookers *them = machine->onlookers;
     struct node_answer_head head;
-    if (message->size < sizeof head) {
+    if (message->size < sizeof head)
         return false;
-    }
     memcpy(&head, message->data, sizeof head);
-    if (head.tag != HOST_ONLOOKERS_TAG) {
+    if (head.tag != HOST_ONLOOKERS_TAG)
         return false;
-    }
     if (onlooking->asked && head.what == (uint32_t)onlooking->question.what &&
         host_node_set_has(&onlooking->waited, message->source)) {
         them->answer(them->context, message->source,

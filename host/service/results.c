@@ -37,16 +37,13 @@ static bool is_different(const uint32_t v[4]) {
 static bool is_sound(const struct host_service *s, const struct host_job *job,
                      const uint32_t v[4]) {
     bool different = is_different(v), open = different;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         open &= is_open(s, job, v[i]);
-    }
-    if (open) {
+    if (open)
         return true;
-    }
     if (!different || !is_point(s->order, v[0]) || !is_point(s->order, v[1]) ||
-        !is_point(s->order, v[2]) || !is_point(s->order, v[3])) {
+        !is_point(s->order, v[2]) || !is_point(s->order, v[3]))
         return false;
-    }
     uint32_t brick = host_ledger_owner(&s->ledger, s->order, v);
     return brick >= job->first && brick < job->last &&
            !host_ledger_committed(&s->ledger, brick);
@@ -90,9 +87,8 @@ int host_results_refuse(struct host_service *service, unsigned node,
             node, why,
             s->node[node].started_anew ? ", and had its new start before" : "");
     }
-    if (can_start && host_idle_leave(s, node, why)) {
+    if (can_start && host_idle_leave(s, node, why))
         return 0;
-    }
     char again[WHY_BYTES + 20];
     snprintf(again, sizeof again, "%s%s", why,
              s->node[node].started_anew ? ", again" : "");
@@ -139,9 +135,8 @@ static uint32_t (*rows_of_job(const struct host_service *s,
     *count = 0;
     for (uint64_t i = 0; rows != NULL && i < s->tets->count; i++) {
         uint32_t brick = host_ledger_owner(&s->ledger, s->order, s->tets->v[i]);
-        if (brick >= job->first && brick < job->last && *count < job->rows) {
+        if (brick >= job->first && brick < job->last && *count < job->rows)
             memcpy(rows[(*count)++], s->tets->v[i], sizeof *rows);
-        }
     }
     return rows;
 }
@@ -151,20 +146,15 @@ static uint32_t (*rows_of_job(const struct host_service *s,
 static const char *why_too_many(struct host_service *s,
                                 const struct host_judge *judge,
                                 uint32_t (*rows)[4], uint64_t count) {
-    for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
-        if (!host_judge_tetrahedron(judge, rows[draw(s, count)])) {
+    for (unsigned i = 0; i < SAMPLE && count > 0; i++)
+        if (!host_judge_tetrahedron(judge, rows[draw(s, count)]))
             return "more results than its points allow, and wrong ones";
-        }
-    }
-    for (uint64_t i = 0; i < count; i++) {
+    for (uint64_t i = 0; i < count; i++)
         ascend(rows[i], 4);
-    }
     qsort(rows, (size_t)count, sizeof *rows, compare_rows);
-    for (uint64_t i = 1; i < count; i++) {
-        if (memcmp(rows[i], rows[i - 1], sizeof *rows) == 0) {
+    for (uint64_t i = 1; i < count; i++)
+        if (memcmp(rows[i], rows[i - 1], sizeof *rows) == 0)
             return "more results than its points allow, and some twice";
-        }
-    }
     return NULL;
 }
 
@@ -177,15 +167,13 @@ static int look_through_rows(struct host_service *s, unsigned node,
     const struct host_sites sites = host_sites_of_order(s->order);
     struct host_judge judge;
     uint64_t count = 0;
-    if (host_judge_make(&judge, &sites, error) != 0) {
+    if (host_judge_make(&judge, &sites, error) != 0)
         return error->code;
-    }
     uint32_t(*rows)[4] = rows_of_job(s, job, &count);
     const char *why =
         rows == NULL ? NULL : why_too_many(s, &judge, rows, count);
-    if (rows == NULL) {
+    if (rows == NULL)
         host_fail_memory(error, "a look at a node's results");
-    }
     free(rows);
     host_judge_free(&judge);
     job->rows_max = 2 * job->rows;
@@ -210,9 +198,8 @@ static bool is_facet(const struct host_judge *judge, const uint32_t f[3]) {
     for (int side = 0; side < 2; side++) {
         uint32_t t[4] = {f[0], f[side == 0 ? 1 : 2], f[side == 0 ? 2 : 1], 0};
         t[3] = host_judge_apex(judge, t);
-        if (t[3] != INCODE_NONE && host_judge_tetrahedron(judge, t)) {
+        if (t[3] != INCODE_NONE && host_judge_tetrahedron(judge, t))
             return true;
-        }
     }
     return false;
 }
@@ -227,11 +214,9 @@ static int compare_faces(const void *p, const void *q) {
 static const char *why_spilled(struct host_service *s,
                                const struct host_judge *judge,
                                struct incode_face *faces, uint64_t count) {
-    for (unsigned i = 0; i < SAMPLE && count > 0; i++) {
-        if (!is_facet(judge, faces[draw(s, count)].v)) {
+    for (unsigned i = 0; i < SAMPLE && count > 0; i++)
+        if (!is_facet(judge, faces[draw(s, count)].v))
             return "more spilled faces than its points allow, and wrong ones";
-        }
-    }
     for (uint64_t i = 0; i < count; i++) {
         uint32_t *f = faces[i].v;
         while (f[0] > f[1] || f[0] > f[2]) {
@@ -242,11 +227,9 @@ static const char *why_spilled(struct host_service *s,
         }
     }
     qsort(faces, (size_t)count, sizeof *faces, compare_faces);
-    for (uint64_t i = 1; i < count; i++) {
-        if (memcmp(&faces[i], &faces[i - 1], sizeof *faces) == 0) {
+    for (uint64_t i = 1; i < count; i++)
+        if (memcmp(&faces[i], &faces[i - 1], sizeof *faces) == 0)
             return "more spilled faces than its points allow, and some twice";
-        }
-    }
     return NULL;
 }
 
@@ -258,17 +241,15 @@ static int look_through_faces(struct host_service *s, unsigned node,
     struct host_judge judge;
     uint64_t count = 0;
     struct incode_face *faces = NULL;
-    if (host_judge_make(&judge, &sites, error) != 0) {
+    if (host_judge_make(&judge, &sites, error) != 0)
         return error->code;
-    }
     if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
         const char *why = why_spilled(s, &judge, faces, count);
         /* Faces that are on their way back are not judged. */
         n->spilled_max =
             n->spilled + (count > SPILLED_MIN ? count : SPILLED_MIN);
-        if (why != NULL) {
+        if (why != NULL)
             (void)host_results_refuse(s, node, why, error);
-        }
     }
     free(faces);
     host_judge_free(&judge);
@@ -293,9 +274,8 @@ int host_results_spill(struct host_service *service, unsigned node,
     uint64_t least =
         SPILLED_MIN + (uint64_t)SPILLED_A_BRICK * (job->last - job->first);
     uint64_t before = service->spill.faces;
-    if (host_spill_put(&service->spill, node, faces, count, error) != 0) {
+    if (host_spill_put(&service->spill, node, faces, count, error) != 0)
         return error->code;
-    }
     n->spilled += service->spill.faces - before;
     n->spilled_max = n->spilled_max < least ? least : n->spilled_max;
     return n->spilled <= n->spilled_max
@@ -325,9 +305,8 @@ int host_results_take(struct host_service *service,
                      s->machine->nodes);
     do {
         uint32_t(*rows)[4] = host_tetrahedra_room(s->tets, room, error);
-        if (rows == NULL) {
+        if (rows == NULL)
             return error->code;
-        }
         event = node_result_read(&reader, rows, room, &count);
         if (event == NODE_RESULT_GARBAGE) {
             return host_results_refuse(s, message->source, "invalid results",
@@ -342,9 +321,8 @@ int host_results_take(struct host_service *service,
         /* A node that works alone has found all its tetrahedra itself. */
         uint32_t finder =
             s->ledger.alone ? message->source : (uint32_t)reader.finder;
-        if (host_ledger_found(&s->ledger, finder, count, error) != 0) {
+        if (host_ledger_found(&s->ledger, finder, count, error) != 0)
             return error->code;
-        }
         host_tetrahedra_keep(s->tets, count);
         job->rows += count;
         s->node[message->source].unreported += count;
@@ -377,30 +355,25 @@ bool host_sending_write(void *service, unsigned node, uint8_t type,
 bool host_sending_write_to_all(void *service, uint8_t type, const void *data,
                                size_t size) {
     struct host_service *s = service;
-    if (cube_write(s->cube, CUBE_ALL, type, data, size) != 0) {
+    if (cube_write(s->cube, CUBE_ALL, type, data, size) != 0)
         return false;
-    }
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
         s->node[i].sent++;
-    }
-    if (type == NODE_PAGE_TO_ALL) {
+    if (type == NODE_PAGE_TO_ALL)
         s->page_bytes_to_all += size - sizeof(struct node_page_head);
-    }
     return true;
 }
 
 static bool send_page(struct host_service *s, uint16_t to) {
     struct node_page_message body;
     struct host_node *node = &s->node[to];
-    if (cube_room(s->cube, to) == 0) {
+    if (cube_room(s->cube, to) == 0)
         return false;
-    }
     body.head.page = node->pages[node->pages_first];
     size_t size = host_page(s->order, body.head.page, body.data);
     if (!send_counted(s, to, NODE_PAGE, &body,
-                      node_page_seal(&body, s->setup.page_key, size))) {
+                      node_page_seal(&body, s->setup.page_key, size)))
         return false;
-    }
     node->pages_first = (node->pages_first + 1) % HOST_PAGES_QUEUED_MAX;
     node->pages_count--;
     s->report[to].pages++;
@@ -417,14 +390,12 @@ static bool send_unspill(struct host_service *s, uint16_t to,
     } body;
     struct host_node *node = &s->node[to];
     struct host_spill_list *list = &node->unspills[node->unspills_first].list;
-    if (cube_room(s->cube, to) == 0) {
+    if (cube_room(s->cube, to) == 0)
         return false;
-    }
     body.header = node->unspills[node->unspills_first].header;
     if (host_spill_take(&s->spill, list, body.faces, NODE_FACES_A_MESSAGE,
-                        &body.header.count, error) != 0) {
+                        &body.header.count, error) != 0)
         return false;
-    }
     assert(node->spilled >= body.header.count);
     node->spilled -= body.header.count;
     body.header.last = list->faces == 0;
@@ -456,15 +427,12 @@ void host_sending_deal(struct host_service *service) {
     s->work.frames = UINT32_MAX;
     for (unsigned i = 0; i < s->machine->nodes; i++) {
         uint32_t frames = s->report[i].map.map.pages;
-        if (!s->work.lost[i] && frames < s->work.frames) {
+        if (!s->work.lost[i] && frames < s->work.frames)
             s->work.frames = frames;
-        }
     }
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job)) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
+        if (!s->work.lost[i] && s->strategy->first(&s->work, i, &job))
             give_job(s, i, &job);
-        }
-    }
 }
 
 void host_sending_begin(struct host_service *service) {
@@ -508,9 +476,8 @@ static bool serve_data(struct host_service *s, uint16_t to,
 static bool serve_work(struct host_service *s, uint16_t to,
                        struct host_error *error) {
     struct host_node *node = &s->node[to];
-    if (!s->started || !s->report[to].up) {
+    if (!s->started || !s->report[to].up)
         return false; /* what goes before the first answer may get lost */
-    }
     if (node->setup_due) {
         struct node_setup_message setup = s->setup;
         s->strategy->set_up(&s->work, to, &setup);
@@ -520,9 +487,8 @@ static bool serve_work(struct host_service *s, uint16_t to,
         return !node->setup_due;
     }
     struct incode_job job;
-    if (s->dealt && !node->working && s->strategy->next(&s->work, to, &job)) {
+    if (s->dealt && !node->working && s->strategy->next(&s->work, to, &job))
         give_job(s, to, &job);
-    }
     if (node->job_due) {
         node->job_due =
             !send_counted(s, to, NODE_JOB, &node->job, sizeof node->job);
@@ -537,9 +503,8 @@ static bool serve_work(struct host_service *s, uint16_t to,
     /* Half of the credit back at a time. */
     uint32_t credit = node->results + s->setup.credits;
     if (credit - node->credit >= s->setup.credits / 2) {
-        if (!send_counted(s, to, NODE_CREDIT, &credit, sizeof credit)) {
+        if (!send_counted(s, to, NODE_CREDIT, &credit, sizeof credit))
             return false;
-        }
         node->credit = credit;
         return true;
     }
@@ -551,9 +516,8 @@ static bool serve_onlookers(struct host_service *s, uint16_t to) {
     struct node_question_message question;
     if (!host_onlooking_due(&s->onlooking, to, &question) ||
         !s->report[to].up ||
-        !send_counted(s, to, NODE_QUESTION, &question, sizeof question)) {
+        !send_counted(s, to, NODE_QUESTION, &question, sizeof question))
         return false;
-    }
     host_onlooking_sent(&s->onlooking, to);
     return true;
 }
@@ -563,16 +527,14 @@ static bool serve_onlookers(struct host_service *s, uint16_t to) {
 static bool serve_node(struct host_service *s, uint16_t to,
                        struct host_error *error) {
     struct host_node *node = &s->node[to];
-    if (s->work.lost[to]) {
+    if (s->work.lost[to])
         return false;
-    }
     if (node->ping_due && !node->ping_last) {
         node->ping_last = host_detector_ping(s, to);
         return node->ping_last;
     }
-    if (serve_onlookers(s, to)) {
+    if (serve_onlookers(s, to))
         return true;
-    }
     if (serve_work(s, to, error)) {
         node->ping_last = false;
         return true;
@@ -597,9 +559,8 @@ unsigned host_sending_serve(struct host_service *service,
         if (serve_node(s, (uint16_t)s->turn, error)) {
             sent++;
             idle = 0;
-            if (goes_on(s, &s->node[s->turn])) {
+            if (goes_on(s, &s->node[s->turn]))
                 continue;
-            }
         } else {
             idle++;
         }
@@ -609,10 +570,8 @@ unsigned host_sending_serve(struct host_service *service,
 }
 
 bool host_sending_pages_wait(const struct host_service *service) {
-    for (unsigned i = 0; i < service->machine->nodes; i++) {
-        if (service->node[i].pages_count > 0) {
+    for (unsigned i = 0; i < service->machine->nodes; i++)
+        if (service->node[i].pages_count > 0)
             return true;
-        }
-    }
     return false;
 }

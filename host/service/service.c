@@ -45,11 +45,9 @@ static void look_out(struct host_service *s, uint64_t now_us) {
                                                s->ledger.bricks, 0};
     progress.tetrahedra = s->tets == NULL ? 0 : s->tets->count;
     host_onlooking_look(&s->onlooking, s->machine, now_us, &progress);
-    for (unsigned i = 0; s->onlooking.asked && i < s->machine->nodes; i++) {
-        if (s->work.lost[i]) {
+    for (unsigned i = 0; s->onlooking.asked && i < s->machine->nodes; i++)
+        if (s->work.lost[i])
             host_onlooking_leave_out(&s->onlooking, i);
-        }
-    }
 }
 
 /* One round of the loop: read, serve, and sleep where nothing moved. */
@@ -59,28 +57,22 @@ int host_service_round(struct host_service *service, struct host_error *error) {
     unsigned moved = (unsigned)cube_poll(s->cube, now);
     /* Nodes that have served another start of the host know a later one. */
     if (cube_wiring(s->cube)->generation != s->generation &&
-        host_generation_begin(s, now, error) != 0) {
+        host_generation_begin(s, now, error) != 0)
         return error->code;
-    }
-    if (read_all(s, &moved, error) != 0) {
+    if (read_all(s, &moved, error) != 0)
         return error->code;
-    }
     bool pages = s->started && host_sending_pages_wait(s);
     uint64_t begun = pages ? now_of(s) : 0;
-    if (s->machine->onlookers != NULL) {
+    if (s->machine->onlookers != NULL)
         look_out(s, now);
-    }
     moved += host_sending_serve(s, error);
     s->pages_us += pages ? now_of(s) - begun : 0;
-    if (error->code != 0 || host_detector_check(s, now, error) != 0) {
+    if (error->code != 0 || host_detector_check(s, now, error) != 0)
         return error->code;
-    }
-    if (s->loss) {
+    if (s->loss)
         return host_generation_renew(s, now, error);
-    }
-    if (moved == 0) {
+    if (moved == 0)
         wait_for_wire(s, now);
-    }
     return 0;
 }
 
@@ -93,13 +85,11 @@ int host_service_open(struct host_service *service, struct host_error *error) {
     s->work.nodes = s->machine->nodes;
     s->work.sharing = s->sharing;
     s->work.lost = calloc(s->machine->nodes, sizeof *s->work.lost);
-    if (s->node == NULL || s->report == NULL || s->work.lost == NULL) {
+    if (s->node == NULL || s->report == NULL || s->work.lost == NULL)
         return host_fail_memory(error, "the nodes' queues");
-    }
     s->cube = host_cube_make(s->machine, s->window, &s->cube_memory, error);
-    if (s->cube == NULL) {
+    if (s->cube == NULL)
         return error->code;
-    }
     s->generations = 1;
     s->check_us = s->wire_down_us = now_of(s);
     s->opened_us = s->check_us;
@@ -113,12 +103,10 @@ static bool host_service_is_up(const struct host_service *service) {
 
 int host_service_start(struct host_service *service, struct host_error *error) {
     int status = host_service_open(service, error);
-    while (status == 0 && !host_service_is_up(service)) {
+    while (status == 0 && !host_service_is_up(service))
         status = host_service_round(service, error);
-    }
-    if (status == 0) {
+    if (status == 0)
         host_bring_up_done(service);
-    }
     return status;
 }
 
@@ -165,11 +153,9 @@ static void ask_for_reports(struct host_service *s) {
 }
 
 static bool all_reported(const struct host_service *s) {
-    for (unsigned i = 0; i < s->machine->nodes; i++) {
-        if (!s->work.lost[i] && !s->node[i].reported) {
+    for (unsigned i = 0; i < s->machine->nodes; i++)
+        if (!s->work.lost[i] && !s->node[i].reported)
             return false;
-        }
-    }
     return true;
 }
 
@@ -177,14 +163,12 @@ static bool all_reported(const struct host_service *s) {
  * right. */
 static int conclude(struct host_service *s, struct host_error *error) {
     bool passed;
-    if (host_audit_step(s, &passed, error) != 0) {
+    if (host_audit_step(s, &passed, error) != 0)
         return error->code;
-    }
-    if (passed && s->late) {
+    if (passed && s->late)
         s->over = true;
-    } else if (passed) {
+    else if (passed)
         ask_for_reports(s);
-    }
     return 0;
 }
 
@@ -193,22 +177,18 @@ int host_service_run(struct host_service *service, struct host_error *error) {
     if (host_ledger_init(&s->ledger, s->order->bricks, s->machine->nodes,
                          error) != 0 ||
         host_spill_init(&s->spill, 0, error) != 0 ||
-        prepare_work(s, error) != 0) {
+        prepare_work(s, error) != 0)
         return error->code;
-    }
     prepare(s);
     host_sending_begin(s);
     while (!s->over && !(s->reporting && all_reported(s))) {
-        if (host_service_round(s, error) != 0) {
+        if (host_service_round(s, error) != 0)
             return error->code;
-        }
-        if (!s->dealt && s->ready == s->work.living) {
+        if (!s->dealt && s->ready == s->work.living)
             host_sending_deal(s);
-        }
         if (!s->reporting && s->ledger.committed == s->ledger.bricks &&
-            (s->working == 0 || s->late) && conclude(s, error) != 0) {
+            (s->working == 0 || s->late) && conclude(s, error) != 0)
             return error->code;
-        }
         host_progress_show(s->ledger.committed, s->ledger.bricks,
                            s->tets->count);
     }
@@ -226,9 +206,8 @@ int host_service_run(struct host_service *service, struct host_error *error) {
 
 int host_service_wires(struct host_service *service, struct host_error *error) {
     int status = 0;
-    while (status == 0 && host_missing_links_awaited(service)) {
+    while (status == 0 && host_missing_links_awaited(service))
         status = host_service_round(service, error);
-    }
     return status;
 }
 
@@ -244,27 +223,23 @@ void host_service_end(struct host_service *service) {
     struct host_service *s = service;
     uint64_t start = now_of(s);
     bool told = s->cube == NULL || !s->finished, closing = false;
-    if (!s->finished) {
+    if (!s->finished)
         s->machine->stop(s->machine->context); /* nothing to wait for */
-    }
     while (!told || (s->cube != NULL && !parted(s))) {
         uint64_t now = now_of(s);
         unsigned moved = (unsigned)cube_poll(s->cube, now);
         struct cube_message message;
-        while (cube_read(s->cube, &message)) {
+        while (cube_read(s->cube, &message))
             cube_release(s->cube);
-        }
         told = told || cube_write(s->cube, CUBE_ALL, NODE_STOP, NULL, 0) == 0;
         if (told && !closing && cube_idle(s->cube)) {
             cube_close(s->cube, start + FAREWELL_US_MAX);
             closing = true;
         }
-        if (now - start > FAREWELL_US_MAX) {
+        if (now - start > FAREWELL_US_MAX)
             break;
-        }
-        if (moved == 0) {
+        if (moved == 0)
             wait_for_wire(s, now);
-        }
     }
     s->machine->stop(s->machine->context);
     host_audit_free(&s->audit);

@@ -43,12 +43,10 @@ static uint32_t another(struct host_liar *l, const struct table *t,
     for (unsigned i = 0; i < TRIES; i++) {
         uint32_t other = t->v[draw(l, 0, t->rows * t->width - 1)];
         bool differs = other != INCODE_NONE;
-        for (uint32_t k = 0; k < width; k++) {
+        for (uint32_t k = 0; k < width; k++)
             differs = differs && other != v[k];
-        }
-        if (differs) {
+        if (differs)
             return other;
-        }
     }
     return INCODE_NONE;
 }
@@ -87,9 +85,8 @@ static uint32_t drop(struct host_liar *l, const struct table *t, uint32_t i,
 static uint32_t exchange(struct host_liar *l, const struct table *t,
                          uint32_t (*said)[4]) {
     uint32_t *v = said[0], k = draw(l, t->face, 3);
-    if (v[k] == INCODE_NONE || !replace(l, t, v, k)) {
+    if (v[k] == INCODE_NONE || !replace(l, t, v, k))
         return 1;
-    }
     if (t->face < 3 && v[3] != INCODE_NONE && draw(l, 0, 1) == 1) {
         uint32_t second = v[2];
         v[2] = v[3];
@@ -115,12 +112,10 @@ static uint32_t invent(struct host_liar *l, const struct table *t,
                        uint32_t (*said)[4]) {
     bool hull = said[0][3] == INCODE_NONE, lies = hull || t->face < 3;
     memcpy(said[1], said[0], sizeof said[1]);
-    for (uint32_t k = hull ? 3 : 1; k < 4; k++) {
+    for (uint32_t k = hull ? 3 : 1; k < 4; k++)
         lies = lies && replace(l, t, said[1], k);
-    }
-    if (lies && t->fixed) {
+    if (lies && t->fixed)
         memcpy(said[0], said[1], sizeof said[0]);
-    }
     l->pending += lies;
     return lies && !t->fixed ? 2 : 1;
 }
@@ -136,9 +131,8 @@ static uint32_t lend(struct host_liar *l, const struct table *t,
 static uint32_t say(struct host_liar *l, const struct table *t, uint32_t i,
                     uint32_t (*said)[4]) {
     memcpy(said[0], t->v + i * t->width, t->width * sizeof said[0][0]);
-    if (!is_due(l)) {
+    if (!is_due(l))
         return 1;
-    }
     switch (l->way) {
     case HOST_LIE_DROP:
         return drop(l, t, i, said);
@@ -163,18 +157,16 @@ static bool read_results(struct host_liar *l, const uint8_t *data,
     struct node_result_reader reader;
     enum node_result_event event = NODE_RESULT_ROWS;
     l->rows = l->commits = 0;
-    if (size < head) {
+    if (size < head)
         return false;
-    }
     node_result_open(&reader, data + head, size - head, UINT32_MAX,
                      HOST_LIAR_SELF, HOST_LIAR_SELF);
     while (event == NODE_RESULT_ROWS || event == NODE_RESULT_COMMIT) {
         size_t count;
         event = node_result_read(&reader, l->row + l->rows,
                                  HOST_LIAR_ROWS - l->rows, &count);
-        for (; count > 0; count--) {
+        for (; count > 0; count--)
             l->finder[l->rows++] = (uint16_t)reader.finder;
-        }
         if (event == NODE_RESULT_COMMIT) {
             l->commit[l->commits].after = l->rows;
             l->commit[l->commits++].brick = reader.brick;
@@ -198,9 +190,8 @@ static void end_star(struct stars *s) {
 }
 
 static void put_row(struct stars *s, const uint32_t v[4], uint16_t finder) {
-    if (v[0] != s->vertex || s->count == STAR || finder != s->writer.finder) {
+    if (v[0] != s->vertex || s->count == STAR || finder != s->writer.finder)
         end_star(s);
-    }
     s->full = s->full || !node_result_finder(&s->writer, finder);
     s->vertex = v[0];
     memcpy(s->apex[s->count++], v + 1, sizeof s->apex[0]);
@@ -231,19 +222,16 @@ static size_t alter_results(struct host_liar *l, const uint8_t *data,
                             size_t size) {
     struct stars stars;
     uint32_t said[2][4], commits = 0;
-    if (!read_results(l, data, size) || l->rows == 0) {
+    if (!read_results(l, data, size) || l->rows == 0)
         return 0;
-    }
     const struct table table = {l->row[0], l->rows, 4, 1, false};
     begin_results(l, &stars, data);
     for (uint32_t i = 0; i <= l->rows; i++) {
-        while (commits < l->commits && l->commit[commits].after == i) {
+        while (commits < l->commits && l->commit[commits].after == i)
             put_commit(&stars, l->commit[commits++].brick);
-        }
         uint32_t count = i < l->rows ? say(l, &table, i, said) : 0;
-        for (uint32_t k = 0; k < count; k++) {
+        for (uint32_t k = 0; k < count; k++)
             put_row(&stars, said[k], l->finder[i]);
-        }
     }
     memcpy(l->kept, l->row[draw(l, 0, l->rows - 1)], sizeof l->kept);
     l->keeps = true;
@@ -260,9 +248,8 @@ static uint32_t say_all(struct host_liar *l, const struct table *t, size_t at,
     size_t bytes = t->width * sizeof said[0][0];
     for (uint32_t i = 0; i < t->rows; i++) {
         uint32_t count = say(l, t, i, said);
-        for (uint32_t k = 0; k < count && rows < rows_max; k++) {
+        for (uint32_t k = 0; k < count && rows < rows_max; k++)
             memcpy(l->out + at + rows++ * bytes, said[k], bytes);
-        }
     }
     return rows;
 }
@@ -306,9 +293,8 @@ static void alter_tuples(struct host_liar *l, const uint8_t *data,
     struct tuple tuple;
     if (size <= TUPLES_HEADER_BYTES ||
         !tuple_read(&tuple, data + TUPLES_HEADER_BYTES,
-                    size - TUPLES_HEADER_BYTES)) {
+                    size - TUPLES_HEADER_BYTES))
         return;
-    }
     const struct tuple_field *f = &tuple.field[tuple.count - 1];
     if (f->type == TUPLE_TYPE_BYTES && !f->formal &&
         f->size >= offsetof(struct incode_list, v)) {
@@ -332,9 +318,8 @@ static size_t alter_found(struct host_liar *l, const uint8_t *data,
     struct node_found_message found;
     const size_t head = offsetof(struct node_found_message, found.v);
     memcpy(&found, data, head);
-    if (found.found.count == 0) {
+    if (found.found.count == 0)
         return size;
-    }
     struct table t = table_of(l, data, head, found.found.count, 4);
     t.face = 3;
     t.fixed = l->way == HOST_LIE_LOAN;
@@ -364,9 +349,8 @@ static bool is_repeated(const double *x, uint32_t i) {
 static uint32_t points_of(const struct incode_brick *brick) {
     uint32_t last = INCODE_BRICK_POINTS - 1;
     while (last > 0 && is_repeated(brick->x, last) &&
-           is_repeated(brick->y, last) && is_repeated(brick->z, last)) {
+           is_repeated(brick->y, last) && is_repeated(brick->z, last))
         last--;
-    }
     return last + 1;
 }
 
@@ -375,9 +359,8 @@ static uint32_t points_of(const struct incode_brick *brick) {
 static void alter_page(struct host_liar *l, size_t size) {
     struct incode_brick brick;
     const size_t head = offsetof(struct node_page_message, data);
-    if (size != head + sizeof brick || !is_due(l)) {
+    if (size != head + sizeof brick || !is_due(l))
         return;
-    }
     memcpy(&brick, l->out + head, sizeof brick);
     uint32_t last = points_of(&brick) - 1, slot = draw(l, 0, last);
     double *const axes[3] = {brick.x, brick.y, brick.z};
@@ -404,30 +387,26 @@ size_t host_liar_alter(struct host_liar *liar, uint16_t dest, uint8_t type,
     struct host_liar *l = liar;
     size_t altered = size;
     l->pending = 0;
-    if (type == NODE_RESULT && lies_of_findings(l)) {
+    if (type == NODE_RESULT && lies_of_findings(l))
         altered = alter_results(l, data, size);
-    }
     if (type != NODE_RESULT || altered == 0 || l->pending == 0) {
         l->pending = 0;
         altered = size;
-        if (size > 0) {
+        if (size > 0)
             memcpy(l->out, data, size);
-        }
     }
-    if (type == NODE_LIST || type == NODE_ANSWERS) {
+    if (type == NODE_LIST || type == NODE_ANSWERS)
         alter_answers(l, data, size, 0);
-    } else if (type == NODE_TUPLES) {
+    else if (type == NODE_TUPLES)
         alter_tuples(l, data, size);
-    } else if (type == NODE_LOAN) {
+    else if (type == NODE_LOAN)
         alter_loan(l, data);
-    } else if (type == NODE_LOAN_FOUND) {
+    else if (type == NODE_LOAN_FOUND)
         altered = alter_found(l, data, size);
-    } else if (type == NODE_SHARE) {
+    else if (type == NODE_SHARE)
         alter_shared(l, data, size);
-    } else if (type == NODE_PAGE && dest != CUBE_HOST &&
-               l->way == HOST_LIE_PAGE) {
+    else if (type == NODE_PAGE && dest != CUBE_HOST && l->way == HOST_LIE_PAGE)
         alter_page(l, size);
-    }
     return altered;
 }
 
@@ -470,9 +449,8 @@ static bool begins_flood(struct host_liar *l, const uint8_t *data,
     if (read_results(l, data, size) && l->rows > 0) {
         memcpy(l->kept, l->row[0], sizeof l->kept);
         l->keeps = true;
-        for (uint32_t i = 0; i < l->rows && !l->floods; i++) {
+        for (uint32_t i = 0; i < l->rows && !l->floods; i++)
             l->floods = is_due(l);
-        }
     }
     return l->floods && l->keeps;
 }
@@ -491,9 +469,8 @@ int host_liar_write(struct host_liar *liar, struct node_counted *counted,
     uint8_t lie = l->way == HOST_LIE_FLOOD ? NODE_RESULT : NODE_SPILL;
     for (unsigned i = 0; i < AT_ONCE; i++) {
         size_t bytes = flood(l, counted, data);
-        if (cube_write(counted->cube, CUBE_HOST, lie, l->out, bytes) != 0) {
+        if (cube_write(counted->cube, CUBE_HOST, lie, l->out, bytes) != 0)
             break;
-        }
         counted->sent++;
         l->told += l->pending;
     }

@@ -74,25 +74,22 @@ static int open_world(struct host_sim_run *r, struct host_error *error) {
     r->liar.way = p->liar.way;
     r->liar.one_in = p->liar.one_in;
     r->liar.random = sim_seed(p->seed, 5);
-    if (host_world_open(&r->world, &o, error) != 0) {
+    if (host_world_open(&r->world, &o, error) != 0)
         return error->code;
-    }
     struct host_sim_cube *cube = &r->world.cube;
     for (unsigned i = 0; i < p->missing; i++) {
         unsigned wire =
             (unsigned)host_sim_draw(&r->random, 0, cube->host_wire - 1);
-        if (!cube->wire[wire].missing) {
+        if (!cube->wire[wire].missing)
             host_sim_cube_leave_out(cube, wire);
-        }
     }
     return 0;
 }
 
 static int make_work(struct host_sim_run *r, struct host_error *error) {
     const struct host_sim_plan *p = r->plan;
-    if (host_gen(p->kind, p->points, p->seed, &r->points, error) != 0) {
+    if (host_gen(p->kind, p->points, p->seed, &r->points, error) != 0)
         return error->code;
-    }
     return host_order_make(&r->order, "points", r->points.xyz, r->points.count,
                            host_strategy_partition(p->strategy, p->partition),
                            p->strategy->regions(p->nodes),
@@ -263,18 +260,16 @@ static void tell(struct host_sim_run *r) {
             out->node_frames[i] += port->end->out->frames;
         }
     }
-    for (unsigned i = 0; i < 2 * w->cube.wires; i++) {
+    for (unsigned i = 0; i < 2 * w->cube.wires; i++)
         out->frames += host_sim_cube_direction(&w->cube, i / 2, i % 2)->frames;
-    }
 }
 
 int host_sim_run(const struct host_sim_plan *plan,
                  struct host_sim_outcome *outcome, struct host_error *error) {
     struct host_sim_run *r = calloc(1, sizeof *r);
     memset(outcome, 0, sizeof *outcome);
-    if (r == NULL) {
+    if (r == NULL)
         return host_fail_memory(error, "the simulation");
-    }
     r->plan = plan;
     r->outcome = outcome;
     r->random = sim_seed(plan->seed, 2);
@@ -330,9 +325,8 @@ static void parse_seeds(struct parse_sim *p, const char *value) {
     char first[32] = "";
     const char *dots = strstr(value, "..");
     size_t length = dots == NULL ? sizeof first : (size_t)(dots - value);
-    if (length < sizeof first) {
+    if (length < sizeof first)
         memcpy(first, value, length);
-    }
     if (dots == NULL ||
         host_parse_number(first, 0, UINT64_MAX, &first_seed) != 0 ||
         host_parse_number(dots + 2, first_seed, UINT64_MAX, &last_seed) != 0) {
@@ -354,10 +348,8 @@ static error_t parse_sim_option(int key, char *value,
                   "%s: sim takes options alone; see incode sim --help", value);
         return 0;
     case KEY_SEED:
-        if (host_option_number("seed", value, 0, UINT64_MAX, &n, p->error) ==
-            0) {
+        if (host_option_number("seed", value, 0, UINT64_MAX, &n, p->error) == 0)
             add_range(p, n, n);
-        }
         return 0;
     case KEY_SEEDS:
         parse_seeds(p, value);
@@ -415,9 +407,8 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
     struct parse_sim parse = {options, error};
     memset(options, 0, sizeof *options);
     int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
-    if (status == 0 && options->ranges == 0) {
+    if (status == 0 && options->ranges == 0)
         add_range(&parse, 1, 1);
-    }
     return status;
 }
 
@@ -437,9 +428,8 @@ static char replay[160];
 
 static void note_replay(const struct host_sim_plan *plan) {
     char nodes[32] = "";
-    if (plan->nodes_given != 0) {
+    if (plan->nodes_given != 0)
         snprintf(nodes, sizeof nodes, " --nodes %u", plan->nodes_given);
-    }
     snprintf(replay, sizeof replay,
              "  replay: git checkout %s && make && build/incode sim --seed "
              "%llu%s\n",
@@ -457,9 +447,8 @@ static void on_crash(int number) {
 static void watch_crashes(void) {
     static const int numbers[] = {SIGSEGV, SIGBUS,  SIGILL,   SIGFPE,
                                   SIGTRAP, SIGABRT, SIGVTALRM};
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         (void)signal(numbers[i], on_crash);
-    }
 }
 
 /* Processor time for one more seed. */
@@ -487,9 +476,8 @@ static void print_struck(const uint64_t *struck) {
             any = true;
         }
     }
-    if (!any) {
+    if (!any)
         printf(" no fault");
-    }
 }
 
 static void run_seed(uint64_t seed, unsigned nodes, struct totals *totals,
@@ -533,9 +521,8 @@ static void print_totals(const struct totals *t, double seconds) {
            (unsigned long long)t->seeds, t->seeds == 1 ? "" : "s",
            (unsigned long long)t->failed, (unsigned long long)t->restarts,
            t->restarts == 1 ? "" : "s", 1e-6 * (double)t->time_us, seconds);
-    if (seconds >= RATE_S_MIN) {
+    if (seconds >= RATE_S_MIN)
         printf(", %.0f seeds an hour", 3600 * (double)t->seeds / seconds);
-    }
     printf("\n");
     printf("%-12s %12s %8s  while work was open\n", "fault", "strikes",
            "seeds");

@@ -15,9 +15,8 @@ static void start(struct host_world *w, unsigned i) {
     } else {
         n->node = node_start(&n->board, &why);
     }
-    if (n->node == NULL && n->stand_in == NULL) {
+    if (n->node == NULL && n->stand_in == NULL)
         host_world_give_up(w, i, why);
-    }
 }
 
 void host_sim_learn(struct host_world *world, unsigned node) {
@@ -26,13 +25,11 @@ void host_sim_learn(struct host_world *world, unsigned node) {
     struct host_world_node *n = &w->node[i];
     struct node_identity heard = n->board.identity;
     node_identity_ask(&n->learner, n->board.now_us(n));
-    if (!node_identity_hear(&n->learner, &heard)) {
+    if (!node_identity_hear(&n->learner, &heard))
         return;
-    }
     if (heard.self != i || heard.dimension != n->board.identity.dimension ||
-        heard.host_port != n->board.identity.host_port) {
+        heard.host_port != n->board.identity.host_port)
         host_world_give_up(w, i, "takes itself for another");
-    }
     w->learned += node_identity_epoch_behind(&n->learner, &n->board.identity);
     start(w, i);
 }
@@ -74,11 +71,10 @@ static uint64_t machine_now_us(void *context) {
 
 static void machine_idle(void *context, uint64_t wait_us) {
     struct host_second_host *h = context;
-    if (h->there) {
+    if (h->there)
         h->sleep_us = h->world->now_us + wait_us;
-    } else {
+    else
         h->ahead_us += wait_us + 1;
-    }
 }
 
 static int machine_check(void *context, struct host_error *error) {
@@ -147,9 +143,8 @@ void host_second_host_round(void *host) {
     struct host_second_host *h = host;
     struct host_world *w = h->world;
     struct host_error error = {0};
-    if (!h->there) {
+    if (!h->there)
         return;
-    }
     if (w->now_us < h->busy_us) {
         w->second_us = h->busy_us;
         return;

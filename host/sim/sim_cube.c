@@ -19,24 +19,20 @@ static unsigned host_node(const struct host_sim_cube *c, unsigned k) {
 }
 
 unsigned host_sim_cube_links(const struct host_sim_cube *cube, unsigned place) {
-    if (place >= cube->nodes) {
+    if (place >= cube->nodes)
         return place == cube->nodes ? host_wires_of(cube) : 1;
-    }
     bool hosted = false;
-    for (unsigned k = 0; k < host_wires_of(cube); k++) {
+    for (unsigned k = 0; k < host_wires_of(cube); k++)
         hosted = hosted || host_node(cube, k) == place;
-    }
     return cube->options.dimension + hosted;
 }
 
 unsigned host_sim_cube_wire(const struct host_sim_cube *cube, unsigned place,
                             unsigned link) {
-    if (place > cube->nodes) {
+    if (place > cube->nodes)
         return cube->wires - 1;
-    }
-    if (place == cube->nodes) {
+    if (place == cube->nodes)
         return cube->host_wire + link;
-    }
     if (link == cube->options.dimension) {
         bool spare = place != 0 && cube->options.spare_node != 0;
         return cube->host_wire + (spare ? 1 : place);
@@ -79,9 +75,8 @@ static void remember_bytes(struct host_sim_cube *c, const uint8_t *bytes,
         remember(c, word);
     }
     uint64_t rest = size;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         rest = rest << 8 | bytes[i];
-    }
     remember(c, rest);
 }
 
@@ -89,9 +84,8 @@ static int port_send(void *context, const uint8_t *bytes, size_t size) {
     struct host_sim_port *port = context;
     struct host_sim_cube *c = port->cube;
     const struct host_sim_cube_options *o = &c->options;
-    if (port->replaced) {
+    if (port->replaced)
         return LINK_PIPE_CLOSED;
-    }
     int taken = port->pipe.send(port->pipe.context, bytes, size);
     if (taken > 0) {
         remember(c, *c->now_us << 16 ^ port->wire << 1 ^ port->side);
@@ -112,9 +106,8 @@ static int port_receive(void *context, uint8_t *bytes, size_t size) {
     }
     int got = port->pipe.receive(port->pipe.context, bytes, size);
     const struct host_sim_cube_options *o = &port->cube->options;
-    if (got > 0 && port->end->in->blocked && o->wake != NULL) {
+    if (got > 0 && port->end->in->blocked && o->wake != NULL)
         o->wake(o->context, port->peer, *port->cube->now_us);
-    }
     return got;
 }
 
@@ -148,18 +141,16 @@ void host_sim_cube_faults(struct host_sim_cube *cube,
 uint64_t host_sim_cube_struck(const struct host_sim_cube *cube,
                               enum sim_fault fault) {
     uint64_t sum = 0;
-    for (unsigned i = 0; i < 2 * cube->wires; i++) {
+    for (unsigned i = 0; i < 2 * cube->wires; i++)
         sum += host_sim_cube_direction(cube, i / 2, i % 2)->struck[fault];
-    }
     return sum;
 }
 
 void host_sim_cube_cut(struct host_sim_cube *cube, unsigned wire, bool cut) {
     struct host_sim_wire *one = &cube->wire[wire];
     one->cuts += cut ? 1u : UINT32_MAX;
-    if (cut ? one->cuts == 1 : one->cuts == 0) {
+    if (cut ? one->cuts == 1 : one->cuts == 0)
         sim_wire_cut(&one->wire, cut);
-    }
 }
 
 void host_sim_cube_deaf(struct host_sim_cube *cube, unsigned wire,
@@ -190,17 +181,15 @@ static int make_wires(struct host_sim_cube *c) {
     c->port = calloc((size_t)c->places * c->links_max, sizeof *c->port);
     c->bytes =
         malloc(each * c->host_wire + of_host * (c->wires - c->host_wire));
-    if (c->wire == NULL || c->port == NULL || c->bytes == NULL) {
+    if (c->wire == NULL || c->port == NULL || c->bytes == NULL)
         return -1;
-    }
     uint8_t *bytes = c->bytes;
     for (unsigned i = 0; i < c->wires; i++) {
         bool host = i >= c->host_wire;
         sim_wire_init(&c->wire[i].wire, bytes, host ? &o->host_wire : &o->wire,
                       c->now_us, sim_seed(o->seed, 1000 + i));
-        if (o->shared) {
+        if (o->shared)
             sim_wire_share(&c->wire[i].wire, &c->medium_ns);
-        }
         bytes += host ? of_host : each;
     }
     return 0;
@@ -212,31 +201,26 @@ int host_sim_cube_open(struct host_sim_cube *cube,
     struct host_sim_cube *c = cube;
     memset(c, 0, sizeof *c);
     c->options = *options;
-    if (options->host_wire.bytes == 0) {
+    if (options->host_wire.bytes == 0)
         c->options.host_wire = options->wire;
-    }
     c->now_us = now_us;
     c->nodes = 1u << options->dimension;
     c->places = c->nodes + (options->second_host ? 2 : 1);
     c->host_wire = c->nodes * options->dimension / 2;
     c->wires = c->host_wire + host_wires_of(c) + options->second_host;
     c->links_max = options->dimension + 1;
-    if (c->links_max < host_wires_of(c)) {
+    if (c->links_max < host_wires_of(c))
         c->links_max = host_wires_of(c);
-    }
     if (make_wires(c) != 0) {
         host_sim_cube_close(c);
         return host_fail_memory(error, "the simulated wires");
     }
-    for (unsigned i = 0; i < c->places; i++) {
-        for (unsigned d = 0; d < host_sim_cube_links(c, i); d++) {
+    for (unsigned i = 0; i < c->places; i++)
+        for (unsigned d = 0; d < host_sim_cube_links(c, i); d++)
             open_port(c, i, d, host_sim_cube_wire(c, i, d), peer_of(c, i, d));
-        }
-    }
     host_sim_cube_faults(c, &options->faults);
-    if (options->second_host) {
+    if (options->second_host)
         host_sim_cube_cut(c, c->wires - 1, true);
-    }
     return 0;
 }
 
@@ -265,16 +249,14 @@ static void machine_idle(void *context, uint64_t wait_us) {
     struct host_world *w = context;
     host_world_run(w, w->now_us + wait_us, true);
     unsigned host = w->nodes;
-    for (unsigned d = 0; d < host_sim_cube_links(&w->cube, host); d++) {
+    for (unsigned d = 0; d < host_sim_cube_links(&w->cube, host); d++)
         host_sim_cube_port(&w->cube, host, d)->end->out->blocked = false;
-    }
 }
 
 static int machine_check(void *context, struct host_error *error) {
     const struct host_world *w = context;
-    if (w->fault == NULL) {
+    if (w->fault == NULL)
         return 0;
-    }
     return host_fail(error, HOST_CUBE,
                      "node %u: %s, after %llu ms and %llu steps; replay it",
                      w->fault_node, w->fault,

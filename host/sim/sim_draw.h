@@ -15,9 +15,8 @@ static inline uint64_t host_sim_draw(uint64_t *state, uint64_t lo,
 static inline uint64_t host_sim_draw_log(uint64_t *state, uint64_t lo,
                                          uint64_t hi) {
     unsigned doublings = 0;
-    while (lo << doublings < hi) {
+    while (lo << doublings < hi)
         doublings++;
-    }
     uint64_t top = lo << host_sim_draw(state, 0, doublings);
     return host_sim_draw(state, lo, top < hi ? top : hi);
 }

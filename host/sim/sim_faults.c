@@ -28,16 +28,14 @@ static uint64_t draw(struct host_sim_run *r, uint64_t lo, uint64_t hi) {
  * then. */
 static void draw_death(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 78);
-    if (p->nodes < 4 || p->nodes > 64 || host_sim_draw(&state, 1, 5) > 2) {
+    if (p->nodes < 4 || p->nodes > 64 || host_sim_draw(&state, 1, 5) > 2)
         return;
-    }
     bool node = host_sim_draw(&state, 1, 2) == 1;
     p->wanted[HOST_SIM_DEAD_WIRE] = !node || host_sim_draw(&state, 1, 4) == 1;
     p->wanted[HOST_SIM_DEAD_NODE] = node;
     p->patience_us = host_sim_draw(&state, 9000000, 15000000);
-    for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++) {
+    for (int k = HOST_SIM_ONE_WAY; k <= HOST_SIM_CRASH; k++)
         p->wanted[k] = false;
-    }
     p->dead_us = (uint32_t)host_sim_draw(&state, 4000000, 8000000);
 }
 
@@ -49,9 +47,8 @@ static void draw_missing(struct host_sim_plan *p) {
     unsigned dead =
         p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_DEAD_NODE];
     if (p->nodes > 64 || dimension < 2 + dead ||
-        host_sim_draw(&state, 1, 4) > 1) {
+        host_sim_draw(&state, 1, 4) > 1)
         return;
-    }
     p->wanted[HOST_SIM_MISSING_WIRE] = true;
     p->missing = (unsigned)host_sim_draw(&state, 1, dimension - 1 - dead);
     p->absent_s = dead == 0 ? ABSENT_S : (uint8_t)(p->dead_us / 1000000);
@@ -62,9 +59,8 @@ static void draw_missing(struct host_sim_plan *p) {
  * then keeps it from that for long. */
 static void draw_second_host(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 80);
-    if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1) {
+    if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1)
         return;
-    }
     p->wanted[HOST_SIM_SECOND_HOST] = true;
     p->second_us = host_sim_draw_log(&state, 100, 200000);
     p->second_lasts_us = host_sim_draw_log(&state, 10000, 10000000);
@@ -79,9 +75,8 @@ static void draw_second_host(struct host_sim_plan *p) {
 /* From a state of its own, as what follows. */
 static void draw_slow_nodes(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 88);
-    if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1) {
+    if (p->nodes > 64 || host_sim_draw(&state, 1, 4) > 1)
         return;
-    }
     p->wanted[HOST_SIM_SLOW_NODE] = true;
     p->look_us = (uint32_t)host_sim_draw_log(&state, 20, 1000);
 }
@@ -101,9 +96,8 @@ static void draw_bare(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 89);
     if (p->nodes > 16 || p->wanted[HOST_SIM_SECOND_HOST] ||
         p->wanted[HOST_SIM_DEAD_WIRE] || p->wanted[HOST_SIM_MISSING_WIRE] ||
-        p->wanted[HOST_SIM_TINY] || host_sim_draw(&state, 1, 3) > 1) {
+        p->wanted[HOST_SIM_TINY] || host_sim_draw(&state, 1, 3) > 1)
         return;
-    }
     p->wanted[HOST_SIM_BARE] = true;
     p->wanted[HOST_SIM_CUT] = p->wanted[HOST_SIM_PARTITION] = false;
     uint32_t baud = rates[host_sim_draw(&state, 0, 4)];
@@ -111,9 +105,8 @@ static void draw_bare(struct host_sim_plan *p) {
     draw_serial_wire(&p->wire, baud, &state);
     draw_serial_wire(&p->host_wire, baud, &state);
     p->gather_us = (uint32_t)(UINT64_C(10000000) * FIFO_BYTES / baud);
-    if (p->points > BARE_POINTS_MAX) {
+    if (p->points > BARE_POINTS_MAX)
         p->points = 30 + p->points % BARE_POINTS_MAX;
-    }
 }
 
 /* What is left of the cube can do the work without it, once more: that slow
@@ -125,21 +118,17 @@ static void draw_liar(struct host_sim_plan *p) {
                       p->wanted[HOST_SIM_DEAD_WIRE] + p->wanted[HOST_SIM_IDLER];
     bool slow = p->wanted[HOST_SIM_TINY] && p->wanted[HOST_SIM_SLOW_NODE];
     if (p->nodes <= others || p->nodes > 64 || slow ||
-        host_sim_draw(&state, 1, 6) > 1) {
+        host_sim_draw(&state, 1, 6) > 1)
         return;
-    }
     unsigned node = (unsigned)host_sim_draw(&state, 0, p->nodes - 1);
     enum host_lie way = (enum host_lie)host_sim_draw(&state, 0, HOST_LIES - 1);
     bool alone = p->strategy->nodes_default == 1;
-    if (!p->strategy->meshes && way == HOST_LIE_LOAN) {
+    if (!p->strategy->meshes && way == HOST_LIE_LOAN)
         way = HOST_LIE_DROP;
-    }
-    if (!p->strategy->meshes && way == HOST_LIE_PAGE && !alone) {
+    if (!p->strategy->meshes && way == HOST_LIE_PAGE && !alone)
         way = HOST_LIE_EXCHANGE;
-    }
-    if (alone) {
+    if (alone)
         node = way == HOST_LIE_PAGE ? node | 1 : 0;
-    }
     p->wanted[HOST_SIM_LIAR] = true;
     p->liar.node = node;
     p->liar.way = way;
@@ -172,18 +161,15 @@ static void part(struct host_sim_run *r, const struct host_sim_event *e,
                  bool apart) {
     struct host_sim_cube *cube = &r->world.cube;
     unsigned dimension = cube->options.dimension;
-    for (unsigned i = 0; e->link == dimension && i < dimension; i++) {
+    for (unsigned i = 0; e->link == dimension && i < dimension; i++)
         host_sim_cube_cut(cube, host_sim_cube_wire(cube, e->node, i), apart);
-    }
-    for (unsigned i = 0; e->link < dimension && i < cube->nodes / 2; i++) {
+    for (unsigned i = 0; e->link < dimension && i < cube->nodes / 2; i++)
         host_sim_cube_cut(cube, e->link * (cube->nodes / 2) + i, apart);
-    }
 }
 
 static bool partition(struct host_sim_run *r, const struct host_sim_event *e) {
-    if (r->world.cube.options.dimension == 0) {
+    if (r->world.cube.options.dimension == 0)
         return false;
-    }
     part(r, e, true);
     return true;
 }
@@ -204,9 +190,8 @@ static bool crash(struct host_sim_run *r, const struct host_sim_event *e) {
     const struct host_second_host *second = &r->second;
     if (e->node == 0 && second->there &&
         (second->refused == 0 ||
-         r->world.now_us - second->refused_us >= REFUSED_US)) {
+         r->world.now_us - second->refused_us >= REFUSED_US))
         return false;
-    }
     bool unplugged = draw(r, 0, 1) == 0 && !r->plan->wanted[HOST_SIM_BARE];
     host_world_crash(&r->world, e->node, e->lasts_us, unplugged);
     return true;
@@ -246,9 +231,8 @@ static uint64_t count_slow_host(const struct host_sim_run *r,
 static uint64_t count_tiny(const struct host_sim_run *r,
                            enum host_sim_fault kind) {
     uint64_t sum = r->service.spill.faces_total;
-    for (unsigned i = 0; i < r->plan->nodes; i++) {
+    for (unsigned i = 0; i < r->plan->nodes; i++)
         sum += r->service.report[i].statistics.statistics.page_evictions;
-    }
     return r->plan->wanted[kind] ? sum : 0;
 }
 
@@ -256,9 +240,8 @@ static uint64_t count_missing(const struct host_sim_run *r,
                               enum host_sim_fault kind) {
     uint64_t sum = 0;
     (void)kind;
-    for (unsigned i = 0; i < r->world.cube.wires; i++) {
+    for (unsigned i = 0; i < r->world.cube.wires; i++)
         sum += r->world.cube.wire[i].missing;
-    }
     return sum;
 }
 
@@ -332,11 +315,10 @@ static void take_back(struct host_sim_run *r, bool all) {
     unsigned left = 0;
     for (unsigned i = 0; i < r->lasting_count; i++) {
         struct host_sim_event one = r->lasting[i];
-        if (all || one.until_us <= r->world.now_us) {
+        if (all || one.until_us <= r->world.now_us)
             host_sim_kinds[one.kind].take_back(r, &one);
-        } else {
+        else
             r->lasting[left++] = one;
-        }
     }
     r->lasting_count = left;
 }
@@ -345,11 +327,9 @@ static void take_back(struct host_sim_run *r, bool all) {
 static enum host_sim_fault draw_kind(struct host_sim_run *r) {
     enum host_sim_fault kinds[HOST_SIM_FAULTS];
     unsigned count = 0;
-    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
-        if (host_sim_kinds[k].happen != NULL) {
+    for (int k = 0; k < HOST_SIM_FAULTS; k++)
+        if (host_sim_kinds[k].happen != NULL)
             kinds[count++] = (enum host_sim_fault)k;
-        }
-    }
     return kinds[draw(r, 0, count - 1)];
 }
 
@@ -367,21 +347,18 @@ static bool happen(struct host_sim_run *r) {
     bool lasts = kind->take_back != NULL;
     if (!r->plan->wanted[e.kind] ||
         (lasts && r->lasting_count == HOST_SIM_LASTING_MAX) ||
-        !kind->happen(r, &e)) {
+        !kind->happen(r, &e))
         return false;
-    }
-    if (lasts) {
+    if (lasts)
         r->lasting[r->lasting_count++] = e;
-    }
     r->happened[e.kind] += r->open;
     return true;
 }
 
 static bool any_event_wanted(const struct host_sim_plan *plan) {
     bool any = false;
-    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+    for (int k = 0; k < HOST_SIM_FAULTS; k++)
         any = any || (plan->wanted[k] && host_sim_kinds[k].happen != NULL);
-    }
     return any;
 }
 
@@ -397,14 +374,11 @@ static void break_for_good(struct host_sim_run *r) {
 
 static void event(struct host_sim_run *r) {
     bool more = any_event_wanted(r->plan) && r->events > 0;
-    if (!r->broken) {
+    if (!r->broken)
         break_for_good(r);
-    }
-    for (unsigned tries = 0; more && tries < TRIES_MAX; tries++) {
-        if (happen(r)) {
+    for (unsigned tries = 0; more && tries < TRIES_MAX; tries++)
+        if (happen(r))
             break;
-        }
-    }
     r->events -= more;
     r->event_us =
         !more ? UINT64_MAX
@@ -440,9 +414,8 @@ static void calm(struct host_sim_run *r) {
     take_back(r, true);
     weather(r, false);
     w->strike_us = arrivals_us(r);
-    if (w->options.host_us > HOST_US_CALM) {
+    if (w->options.host_us > HOST_US_CALM)
         w->options.host_us = HOST_US_CALM;
-    }
 }
 
 void host_sim_faults_strike(void *run) {
@@ -453,30 +426,26 @@ void host_sim_faults_strike(void *run) {
         host_world_crash(w, r->plan->restart_node, REBOOT_US, false);
     }
     take_back(r, false);
-    if (w->now_us >= r->second_us) {
+    if (w->now_us >= r->second_us)
         second_host(r);
-    }
     host_sim_stand_ins_strike(r);
     if (w->now_us >= r->calm_us) {
         calm(r);
         return;
     }
-    if (w->now_us >= r->event_us) {
+    if (w->now_us >= r->event_us)
         event(r);
-    }
     w->strike_us = sooner(sooner(r->calm_us, r->event_us), arrivals_us(r));
-    for (unsigned i = 0; i < r->lasting_count; i++) {
+    for (unsigned i = 0; i < r->lasting_count; i++)
         w->strike_us = sooner(w->strike_us, r->lasting[i].until_us);
-    }
 }
 
 /* The frame that the plan names meets its fate. */
 static enum sim_fate decide(void *context, struct sim_direction *direction) {
     struct host_sim_run *r = context;
     (void)direction;
-    if (++r->frames != r->plan->frame) {
+    if (++r->frames != r->plan->frame)
         return SIM_PASSES;
-    }
     r->crash_due = r->plan->restart;
     r->world.strike_us = r->plan->restart ? 0 : r->world.strike_us;
     return r->plan->fate;
@@ -486,19 +455,16 @@ static enum sim_fate decide(void *context, struct sim_direction *direction) {
 static void watch_frames(struct host_sim_run *r) {
     struct host_sim_cube *cube = &r->world.cube;
     unsigned node = r->plan->restart_node;
-    if (r->plan->frame == 0) {
+    if (r->plan->frame == 0)
         return;
-    }
     for (unsigned i = 0; i < 2 * cube->wires; i++) {
         struct sim_direction *direction =
             host_sim_cube_direction(cube, i / 2, i % 2);
         direction->decide = r->plan->restart ? NULL : decide;
         direction->context = r;
     }
-    for (unsigned d = 0; r->plan->restart && d < r->world.node[node].links;
-         d++) {
+    for (unsigned d = 0; r->plan->restart && d < r->world.node[node].links; d++)
         host_sim_cube_port(cube, node, d)->end->out->decide = decide;
-    }
 }
 
 void host_sim_faults_prepare(struct host_sim_run *run) {
@@ -523,9 +489,8 @@ void host_sim_faults_begin(struct host_sim_run *run) {
     r->second_us = r->plan->wanted[HOST_SIM_SECOND_HOST]
                        ? now_us + r->plan->second_us
                        : UINT64_MAX;
-    for (int k = 0; k < SIM_CHANCES; k++) {
+    for (int k = 0; k < SIM_CHANCES; k++)
         r->before[k] = host_sim_cube_struck(&r->world.cube, (enum sim_fault)k);
-    }
     host_sim_stand_ins_begin(r);
     weather(r, true);
     r->world.strike_us = sooner(r->event_us, arrivals_us(r));

@@ -29,9 +29,8 @@ static bool one_in(uint64_t *state, unsigned n) {
 static unsigned draw_nodes(uint64_t *state) {
     uint64_t at = draw(state, 0, 999);
     unsigned i = 0;
-    while (at >= cubes[i].weight) {
+    while (at >= cubes[i].weight)
         at -= cubes[i++].weight;
-    }
     return 1u << cubes[i].dimension;
 }
 
@@ -76,22 +75,18 @@ static void draw_sharing(struct host_sim_plan *p) {
     uint64_t state = sim_seed(p->seed, 87);
     struct host_sharing s = {0};
     unsigned heeds = p->strategy->sharing;
-    if ((heeds & HOST_SHARING_CLUSTER) != 0 && one_in(&state, 2)) {
+    if ((heeds & HOST_SHARING_CLUSTER) != 0 && one_in(&state, 2))
         s.cluster = 1u << draw(&state, 1, 5);
-    }
-    if ((heeds & HOST_SHARING_BUILDERS) != 0 && one_in(&state, 3)) {
+    if ((heeds & HOST_SHARING_BUILDERS) != 0 && one_in(&state, 3))
         s.builders = (unsigned)draw(&state, 1, p->nodes);
-    }
     if ((heeds & HOST_SHARING_LISTS) != 0 && one_in(&state, 2)) {
         s.faces_per_job = (unsigned)host_sim_draw_log(&state, 1, 96);
         s.jobs_per_worker = (unsigned)draw(&state, 1, 4);
     }
-    if (is_refused(p->strategy, p->nodes, &s, INCODE_FACE_OWN)) {
+    if (is_refused(p->strategy, p->nodes, &s, INCODE_FACE_OWN))
         s.cluster = s.builders = 0;
-    }
-    if (is_refused(p->strategy, p->nodes, &s, p->face_rule)) {
+    if (is_refused(p->strategy, p->nodes, &s, p->face_rule))
         p->face_rule = INCODE_FACE_OWN;
-    }
     p->sharing = s;
 }
 
@@ -122,9 +117,8 @@ static void draw_work(struct host_sim_plan *p, uint64_t *state) {
                                               : 300;
     p->points = host_sim_draw_log(state, 30, most);
     if (p->nodes > 64 && strcmp(p->kind, "sphere") == 0 &&
-        p->points > SPHERE_MAX) {
+        p->points > SPHERE_MAX)
         p->points = SPHERE_MAX; /* every node asks for nearly all */
-    }
     if (p->wanted[HOST_SIM_TINY] && p->nodes <= 8) {
         /* What the least memory does not hold. */
         p->index = INCODE_KD;
@@ -161,9 +155,8 @@ static void draw_cube(struct host_sim_plan *p, uint64_t *state) {
     }
     p->gather_us = (uint32_t)host_sim_draw_log(state, 1, 500);
     uint64_t slow = p->wire.bytes_per_s == 0 ? UINT32_MAX : p->wire.bytes_per_s;
-    if (p->gather_us < FIFO_BYTES * UINT64_C(1000000) / slow) {
+    if (p->gather_us < FIFO_BYTES * UINT64_C(1000000) / slow)
         p->gather_us = (uint32_t)(FIFO_BYTES * UINT64_C(1000000) / slow);
-    }
     p->step_us = (uint32_t)host_sim_draw_log(state, 5, 1000);
     p->host_us = p->wanted[HOST_SIM_SLOW_HOST]
                      ? (uint32_t)host_sim_draw_log(state, 500, 5000)
@@ -207,11 +200,9 @@ void host_sim_plan_draw(struct host_sim_plan *plan, uint64_t seed,
     draw_work(plan, &state);
     draw_cube(plan, &state);
     draw_faults(plan, &state);
-    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
-        if (host_sim_kinds[k].draw != NULL) {
+    for (int k = 0; k < HOST_SIM_FAULTS; k++)
+        if (host_sim_kinds[k].draw != NULL)
             host_sim_kinds[k].draw(plan);
-        }
-    }
 }
 
 void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan) {

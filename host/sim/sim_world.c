@@ -41,13 +41,10 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us) {
     }
     for (;;) {
         uint32_t child = 2 * at + 1;
-        if (child + 1 < count &&
-            before(w, w->heap[child + 1], w->heap[child])) {
+        if (child + 1 < count && before(w, w->heap[child + 1], w->heap[child]))
             child++;
-        }
-        if (child >= count || !before(w, w->heap[child], node)) {
+        if (child >= count || !before(w, w->heap[child], node))
             break;
-        }
         place(w, at, w->heap[child]);
         at = child;
     }
@@ -57,17 +54,14 @@ static void wake_at(struct host_world *w, uint32_t node, uint64_t us) {
 /* Something comes for a place: a node looks once it is free. */
 static void rouse(void *context, unsigned node, uint64_t us) {
     struct host_world *w = context;
-    if (node > w->nodes && us < w->second_us) {
+    if (node > w->nodes && us < w->second_us)
         w->second_us = us;
-    }
-    if (node >= w->nodes || w->node[node].state != HOST_WORLD_UP) {
+    if (node >= w->nodes || w->node[node].state != HOST_WORLD_UP)
         return;
-    }
     struct host_world_node *n = &w->node[node];
     us = us < n->busy_until_us && !w->options.routers ? n->busy_until_us : us;
-    if (us < n->wake_us) {
+    if (us < n->wake_us)
         wake_at(w, node, us);
-    }
 }
 
 /* --- two hosts ------------------------------------------------------------ */
@@ -149,9 +143,8 @@ static void take_time(struct host_world *w) {
 static uint64_t node_now_us(void *context) {
     const struct host_world_node *node = context;
     struct host_world *w = node->world;
-    if (node->stepping && w->options.look_us > 0) {
+    if (node->stepping && w->options.look_us > 0)
         take_time(w);
-    }
     return w->now_us + node->offset_us + spent_ns(node) / 1000;
 }
 
@@ -205,9 +198,8 @@ static void plug_in(struct host_world *w, unsigned i, bool in) {
 void host_world_crash(struct host_world *world, unsigned node, uint64_t us,
                       bool unplugged) {
     struct host_world_node *n = &world->node[node];
-    if (n->state != HOST_WORLD_UP) {
+    if (n->state != HOST_WORLD_UP)
         return;
-    }
     n->state = HOST_WORLD_OFF;
     if (node == 0 && world->options.cube.second_host) {
         hang_up(world, 0, CONNECT_US);
@@ -273,9 +265,8 @@ static uint64_t next_duty(struct host_world *w, struct host_world_node *n) {
 
 /* Its links may send again what found no room. */
 static void look_for_room(struct host_world *w, unsigned i) {
-    for (unsigned d = 0; d < w->node[i].links; d++) {
+    for (unsigned d = 0; d < w->node[i].links; d++)
         host_sim_cube_port(&w->cube, i, d)->end->out->blocked = false;
-    }
 }
 
 /* The node's processor is busy, its links are not. */
@@ -296,9 +287,8 @@ static uint64_t charged_step(struct host_world_node *n,
     unsigned moved = node_receive(n->node);
     *event = node_send(n->node, moved);
     if (*event != NODE_STOPPED &&
-        node_receive(n->node) + node_work(n->node) > 0) {
+        node_receive(n->node) + node_work(n->node) > 0)
         *event = NODE_BUSY;
-    }
     uint64_t ns = spent_ns(n);
     n->stepping = false;
     n->used_ns += ns / 1000 * 1000;
@@ -362,9 +352,8 @@ static void step(struct host_world *w, unsigned i) {
     n->busy_until_us = w->now_us + cost;
     uint64_t due = event == NODE_IDLE ? next_duty(w, n) : 0;
     wake_at(w, i, due < n->busy_until_us ? n->busy_until_us : due);
-    if (w->options.routers && cost > PASS_US) {
+    if (w->options.routers && cost > PASS_US)
         rouse(w, i, next_duty(w, n));
-    }
 }
 
 /* --- time ---------------------------------------------------------------- */
@@ -414,9 +403,8 @@ static void happen(struct host_world *w, enum what what, unsigned host) {
         connect_host(w, host);
         break;
     }
-    if (++w->steps > w->options.steps_max) {
+    if (++w->steps > w->options.steps_max)
         host_world_give_up(w, w->nodes, "too many steps");
-    }
 }
 
 void host_world_run(struct host_world *world, uint64_t until, bool for_host) {
@@ -426,25 +414,21 @@ void host_world_run(struct host_world *world, uint64_t until, bool for_host) {
         unsigned host = 0;
         uint64_t next = next_event(w, &what, &host);
         uint64_t due = for_host ? host_world_host_due(w, 0) : UINT64_MAX;
-        if (due <= next && due < until) {
+        if (due <= next && due < until)
             until = due;
-        }
-        if (next >= until) {
+        if (next >= until)
             break;
-        }
         w->now_us = next > w->now_us ? next : w->now_us;
         happen(w, what, host);
     }
     w->now_us = until > w->now_us ? until : w->now_us;
-    if (w->now_us > w->options.time_us_max) {
+    if (w->now_us > w->options.time_us_max)
         host_world_give_up(w, w->nodes, "too long");
-    }
 }
 
 void host_world_halt(struct host_world *world) {
-    for (unsigned i = 0; i < world->nodes; i++) {
+    for (unsigned i = 0; i < world->nodes; i++)
         wake_at(world, i, UINT64_MAX);
-    }
 }
 
 /* --- from nothing, and back ---------------------------------------------- */
@@ -465,21 +449,18 @@ static int open_node(struct host_world *w, unsigned i) {
     n->board.busy_us = node_busy_us;
     n->board.idle = node_idle;
     n->board.reset = node_reset;
-    if (o->liar != NULL && o->liar_node == i) {
+    if (o->liar != NULL && o->liar_node == i)
         n->board.write = node_write;
-    }
     n->board.fixed_bytes = HOST_WORLD_STACK + HOST_WORLD_STATIC;
     n->board.arena_bytes = o->memory - n->board.fixed_bytes;
     n->board.arena =
         aligned_alloc(64, (n->board.arena_bytes + GUARD_BYTES + 63) / 64 * 64);
-    if (n->board.arena == NULL) {
+    if (n->board.arena == NULL)
         return -1;
-    }
     memset((uint8_t *)n->board.arena + n->board.arena_bytes, GUARD,
            GUARD_BYTES);
-    for (unsigned d = 0; d < n->links; d++) {
+    for (unsigned d = 0; d < n->links; d++)
         n->board.pipes[d] = host_sim_cube_pipe(&w->cube, i, d);
-    }
     /* Nodes start in any order. */
     n->state = HOST_WORLD_OFF;
     n->unplugged = false;
@@ -492,18 +473,15 @@ static int open_nodes(struct host_world *w) {
     w->node = calloc(w->nodes, sizeof *w->node);
     w->heap = calloc(w->nodes, sizeof *w->heap);
     w->named = calloc(w->cube.wires, sizeof *w->named);
-    if (w->node == NULL || w->heap == NULL || w->named == NULL) {
+    if (w->node == NULL || w->heap == NULL || w->named == NULL)
         return -1;
-    }
     for (unsigned i = 0; i < w->nodes; i++) {
         w->node[i].wake_us = UINT64_MAX;
         place(w, i, i);
     }
-    for (unsigned i = 0; i < w->nodes; i++) {
-        if (open_node(w, i) != 0) {
+    for (unsigned i = 0; i < w->nodes; i++)
+        if (open_node(w, i) != 0)
             return -1;
-        }
-    }
     return 0;
 }
 
@@ -521,10 +499,8 @@ int host_world_open(struct host_world *world,
     w->strike_us = w->second_us = UINT64_MAX;
     w->epoch = (uint32_t)(sim_draw(&w->random) >> 33) | 1;
     w->connection[0].wanted = w->connection[0].connected = true;
-    if (host_sim_cube_open(&w->cube, &w->options.cube, &w->now_us, error) !=
-        0) {
+    if (host_sim_cube_open(&w->cube, &w->options.cube, &w->now_us, error) != 0)
         return error->code;
-    }
     if (open_nodes(w) != 0) {
         host_world_close(w);
         return host_fail_memory(error, "the simulated nodes");
@@ -533,9 +509,8 @@ int host_world_open(struct host_world *world,
 }
 
 void host_world_close(struct host_world *world) {
-    for (unsigned i = 0; world->node != NULL && i < world->nodes; i++) {
+    for (unsigned i = 0; world->node != NULL && i < world->nodes; i++)
         free(world->node[i].board.arena);
-    }
     free(world->node);
     free(world->heap);
     free(world->named);
@@ -547,11 +522,9 @@ const char *host_world_damage(const struct host_world *world) {
     for (unsigned i = 0; i < world->nodes; i++) {
         const struct node_board *b = &world->node[i].board;
         const uint8_t *past = (const uint8_t *)b->arena + b->arena_bytes;
-        for (unsigned k = 0; k < GUARD_BYTES; k++) {
-            if (past[k] != GUARD) {
+        for (unsigned k = 0; k < GUARD_BYTES; k++)
+            if (past[k] != GUARD)
                 return "a node wrote past its memory";
-            }
-        }
     }
     return NULL;
 }

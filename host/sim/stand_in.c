@@ -122,14 +122,12 @@ static enum node_event idle(struct host_stand_in *one) {
         cube_release(cube);
         moved++;
     }
-    if (one->owes_pong) {
+    if (one->owes_pong)
         one->owes_pong = !send_pong(one);
-    } else if (one->owes_ready) {
+    else if (one->owes_ready)
         one->owes_ready = !send_ready(one);
-    }
-    if (one->stop_us != 0 && cube_idle(cube)) {
+    if (one->stop_us != 0 && cube_idle(cube))
         cube_close(cube, one->stop_us);
-    }
     return one->stop_us != 0 && one->now_us >= one->stop_us ? NODE_STOPPED
            : moved > 0                                      ? NODE_BUSY
                                                             : NODE_IDLE;
@@ -147,9 +145,8 @@ static bool start_teller(struct host_stand_in *one, uint8_t *memory,
         struct link_config c = cube_link_config(&config, d);
         size_t needed = node_aligned(link_bytes(&c));
         one->link[d] = needed <= bytes ? link_init(memory, bytes, &c) : NULL;
-        if (one->link[d] == NULL) {
+        if (one->link[d] == NULL)
             return false;
-        }
         memory += needed;
         bytes -= needed;
     }
@@ -164,9 +161,8 @@ static enum node_event tell(struct host_stand_in *one) {
         struct link_message message;
         bool ask;
         moved += (unsigned)link_poll(link, one->now_us);
-        while (link_read(link, &message)) {
+        while (link_read(link, &message))
             link_release(link);
-        }
         if (link_take_datagram(link, &message, &ask) && !one->heard[d] &&
             one->told_us[d] > 0) {
             one->heard[d] = true;
@@ -189,9 +185,8 @@ struct host_stand_in *
 host_stand_in_start(const struct node_board *board,
                     const struct host_stand_in_orders *orders) {
     size_t own = node_aligned(sizeof(struct host_stand_in));
-    if (board->arena_bytes < own) {
+    if (board->arena_bytes < own)
         return NULL;
-    }
     struct host_stand_in *one = board->arena;
     uint8_t *rest = (uint8_t *)board->arena + own;
     size_t bytes = board->arena_bytes - own;
@@ -244,13 +239,11 @@ void host_sim_draw_idler(struct host_sim_plan *plan) {
     bool node = p->wanted[HOST_SIM_DEAD_NODE];
     /* A dead node and a dead wire may cut off another two of four. */
     unsigned needed = node && p->wanted[HOST_SIM_DEAD_WIRE] ? 8 : 2 + node;
-    if (p->nodes < needed || p->nodes > 64 || host_sim_draw(&state, 1, 6) > 1) {
+    if (p->nodes < needed || p->nodes > 64 || host_sim_draw(&state, 1, 6) > 1)
         return;
-    }
     p->wanted[HOST_SIM_IDLER] = true;
-    if (p->patience_us == 0) {
+    if (p->patience_us == 0)
         p->patience_us = host_sim_draw(&state, 10000000, 30000000);
-    }
     p->idler.node = (unsigned)host_sim_draw(&state, first, p->nodes - 1);
     p->idler.us = host_sim_draw(&state, 1, 3) == 1
                       ? 0
@@ -271,9 +264,8 @@ static void draw_generation(struct host_sim_plan *p, uint64_t *state) {
     p->foreign = p->foreign_jumps ? jumps[host_sim_draw(state, 0, JUMPS - 1)]
                                   : ends[host_sim_draw(state, 0, ENDS - 1)] -
                                         (uint32_t)host_sim_draw(state, 0, 2);
-    if (host_sim_draw(state, 1, 8) == 1) {
+    if (host_sim_draw(state, 1, 8) == 1)
         p->foreign = (uint32_t)(sim_draw(state) >> 32);
-    }
 }
 
 /* The wiring of a host that was there before. */
@@ -281,9 +273,8 @@ void host_sim_draw_teller(struct host_sim_plan *plan) {
     struct host_sim_plan *p = plan;
     uint64_t state = sim_seed(p->seed, 83);
     unsigned first = p->wanted[HOST_SIM_SECOND_HOST];
-    if (p->nodes > 64 || first >= p->nodes || host_sim_draw(&state, 1, 6) > 1) {
+    if (p->nodes > 64 || first >= p->nodes || host_sim_draw(&state, 1, 6) > 1)
         return;
-    }
     p->wanted[HOST_SIM_FOREIGN] = true;
     p->teller.node = (unsigned)host_sim_draw(&state, first, p->nodes - 1);
     p->teller.us = host_sim_draw(&state, 1, 2) == 1
@@ -310,9 +301,8 @@ static void teller_comes(struct host_sim_run *r) {
     struct host_stand_in_orders orders = {.kind = HOST_TELLER};
     struct cube_wiring *w = &orders.wiring;
     w->generation = p->foreign;
-    if (p->foreign_jumps) {
+    if (p->foreign_jumps)
         w->generation += r->open ? cube_wiring(r->service.cube)->generation : 1;
-    }
     w->generation += w->generation == 0;
     w->host_epoch = (uint32_t)(sim_draw(&state) >> 32);
     for (uint64_t i = host_sim_draw(&state, 0, FOREIGN_DEAD_MAX);
@@ -331,9 +321,8 @@ static void teller_comes(struct host_sim_run *r) {
 static void teller_goes(struct host_sim_run *r) {
     unsigned node = r->plan->teller.node;
     const struct host_world_node *n = &r->world.node[node];
-    if (n->state == HOST_WORLD_UP && n->stand_in != NULL) {
+    if (n->state == HOST_WORLD_UP && n->stand_in != NULL)
         r->happened[HOST_SIM_FOREIGN] += host_stand_in_told(n->stand_in);
-    }
     host_world_replace(&r->world, node, REPLACE_US, NULL);
     r->teller_us = UINT64_MAX;
     r->telling = false;
@@ -342,22 +331,18 @@ static void teller_goes(struct host_sim_run *r) {
 void host_sim_stand_ins_prepare(struct host_sim_run *run) {
     const struct host_sim_plan *p = run->plan;
     run->idler_us = run->teller_us = UINT64_MAX;
-    if (p->wanted[HOST_SIM_IDLER] && p->idler.us == 0) {
+    if (p->wanted[HOST_SIM_IDLER] && p->idler.us == 0)
         idler_comes(run);
-    }
-    if (p->wanted[HOST_SIM_FOREIGN] && p->teller.us == 0) {
+    if (p->wanted[HOST_SIM_FOREIGN] && p->teller.us == 0)
         teller_comes(run);
-    }
 }
 
 void host_sim_stand_ins_begin(struct host_sim_run *run) {
     const struct host_sim_plan *p = run->plan;
-    if (p->wanted[HOST_SIM_IDLER] && p->idler.us > 0) {
+    if (p->wanted[HOST_SIM_IDLER] && p->idler.us > 0)
         run->idler_us = run->world.now_us + p->idler.us;
-    }
-    if (p->wanted[HOST_SIM_FOREIGN] && p->teller.us > 0) {
+    if (p->wanted[HOST_SIM_FOREIGN] && p->teller.us > 0)
         run->teller_us = run->world.now_us + p->teller.us;
-    }
 }
 
 void host_sim_stand_ins_finish(struct host_sim_run *run) {
@@ -370,14 +355,12 @@ uint64_t host_sim_stand_ins_us(const struct host_sim_run *run) {
 }
 
 void host_sim_stand_ins_strike(struct host_sim_run *run) {
-    if (run->world.now_us >= run->idler_us) {
+    if (run->world.now_us >= run->idler_us)
         idler_comes(run);
-    }
     if (run->world.now_us >= run->teller_us) {
-        if (run->telling) {
+        if (run->telling)
             teller_goes(run);
-        } else {
+        else
             teller_comes(run);
-        }
     }
 }

@@ -52,30 +52,26 @@ void check_fault(struct check *c, const char *subject, const char *what,
     struct check_fault f = {.subject = subject, .what = what};
     f.tets = (uint8_t)tet_count;
     f.vertices = (uint8_t)count;
-    for (int i = 0; i < tet_count; i++) {
+    for (int i = 0; i < tet_count; i++)
         f.tet[i] = tets[i];
-    }
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++)
         f.vertex[i] = vertices[i];
-    }
     (void)pthread_mutex_lock(&c->lock);
     c->report->faults++;
     /* Half of the slots are kept for faults at facets, which say more than
      * points without a tetrahedron. */
     uint64_t most = tet_count == 0 ? (c->faults_max + 1) / 2 : c->faults_max;
     if (c->faults_kept < most &&
-        (c->faults_kept < c->faults_room || make_fault_room(c))) {
+        (c->faults_kept < c->faults_room || make_fault_room(c)))
         c->fault[c->faults_kept++] = f;
-    }
     (void)pthread_mutex_unlock(&c->lock);
 }
 
 /* Notes an error, unless there is one. */
 static void check_fail(struct check *c, const struct host_error *error) {
     (void)pthread_mutex_lock(&c->lock);
-    if (error->code != 0 && c->error->code == 0) {
+    if (error->code != 0 && c->error->code == 0)
         *c->error = *error;
-    }
     (void)pthread_mutex_unlock(&c->lock);
 }
 
@@ -104,9 +100,8 @@ static void deliver(const struct check *c,
                   "a line has a subject, five numbers, and what is wrong");
     for (uint64_t i = 0; i < c->faults_kept; i++) {
         const struct check_fault *f = &c->fault[i];
-        if (i < NAMED_MAX) {
+        if (i < NAMED_MAX)
             add_line(c, f);
-        }
         if (listener != NULL && i < listener->faults_max) {
             listener->fault(listener->context, f->tet, f->tets, f->vertex,
                             f->vertices, f->what);
@@ -167,14 +162,12 @@ static int check_boundary(struct check *c) {
     struct host_hull_listener listener = {c, hull_fault};
     struct beyond b = {.c = c};
     uint64_t before = c->report->faults;
-    if (host_hull_check(&c->hull, &listener, c->error) != 0) {
+    if (host_hull_check(&c->hull, &listener, c->error) != 0)
         return c->error->code;
-    }
     c->report->hull_facets = c->hull.count;
     c->report->hull_vertices = c->hull.vertices;
-    if (c->report->faults == before && !c->any_unused) {
+    if (c->report->faults == before && !c->any_unused)
         return 0;
-    }
     if (host_judge_make(&b.judge, c->sites, c->error) == 0) {
         c->next = 0;
         host_fork_all(host_threads(), find_beyond, &b);
@@ -190,9 +183,8 @@ static int cut_parts(struct check *c) {
     uint64_t count = c->tets->count, words = count / 64 + 1;
     unsigned threads = host_threads();
     c->parts = threads < CHECK_THREADS_MAX ? threads : CHECK_THREADS_MAX;
-    while (c->parts < CHECK_PARTS_MAX && count / c->parts >= 1u << 30) {
+    while (c->parts < CHECK_PARTS_MAX && count / c->parts >= 1u << 30)
         c->parts++;
-    }
     if (count / c->parts >= 1u << 30) {
         return host_fail(c->error, HOST_BROKEN,
                          "verify: %llu tetrahedra cannot be checked, 2^34 at "
@@ -216,9 +208,8 @@ static int check_all(struct check *c) {
                          "verify: the system gives no random numbers; look "
                          "into getrandom(2)");
     }
-    if (cut_parts(c) != 0 || check_sums(c) != 0 || check_twins(c) != 0) {
+    if (cut_parts(c) != 0 || check_sums(c) != 0 || check_twins(c) != 0)
         return c->error->code;
-    }
     return check_boundary(c);
 }
 
@@ -235,9 +226,8 @@ int host_check(const struct host_sites *sites,
                       .hull = {.sites = sites, .tets = tets}};
     *report = (struct host_check_report){.points = sites->count,
                                          .tetrahedra = tets->count};
-    if (listener != NULL && listener->faults_max > NAMED_MAX) {
+    if (listener != NULL && listener->faults_max > NAMED_MAX)
         c.faults_max = listener->faults_max;
-    }
     (void)pthread_mutex_init(&c.lock, NULL);
     check_all(&c);
     deliver(&c, listener);
@@ -264,11 +254,10 @@ int host_verify(const struct host_points *points,
     struct host_sites sites = {
         .xyz = points->xyz, .lowest = lowest, .count = rows};
     if (lowest == NULL ||
-        (rows > 0 && host_distinct_rows(points->xyz, rows, lowest) == 0)) {
+        (rows > 0 && host_distinct_rows(points->xyz, rows, lowest) == 0))
         host_fail_memory(error, "the check");
-    } else {
+    else
         host_check(&sites, tets, depth, NULL, report, error);
-    }
     host_unmap(lowest, rows * sizeof *lowest);
     return error->code;
 }
@@ -304,9 +293,8 @@ static void list_entries(void *context, unsigned number) {
     for (int fill = 0; fill < 2; fill++) {
         for (uint64_t i = 0; i < n; i++) {
             uint32_t tet = tet_of(part, i), low[2];
-            if (check_is_bad(c, part->first + tet)) {
+            if (check_is_bad(c, part->first + tet))
                 continue;
-            }
             check_lowest_two(v[tet], low);
             if (fill == 0) {
                 next[low[0]]++;
@@ -349,15 +337,13 @@ static void filter_spheres(struct spheres *s) {
     for (uint32_t i = 0; i < BATCH; i++) {
         double d[4][3], m[3], w[4];
         for (int k = 0; k < 3; k++) {
-            for (int j = 0; j < 4; j++) {
+            for (int j = 0; j < 4; j++)
                 d[j][k] = s->p[j][k][i] - s->p[4][k][i];
-            }
             m[k] = larger(larger(magnitude(d[0][k]), magnitude(d[1][k])),
                           larger(magnitude(d[2][k]), magnitude(d[3][k])));
         }
-        for (int j = 0; j < 4; j++) {
+        for (int j = 0; j < 4; j++)
             w[j] = d[j][0] * d[j][0] + d[j][1] * d[j][1] + d[j][2] * d[j][2];
-        }
         double ab = d[0][0] * d[1][1] - d[1][0] * d[0][1];
         double ac = d[0][0] * d[2][1] - d[2][0] * d[0][1];
         double ad = d[0][0] * d[3][1] - d[3][0] * d[0][1];
@@ -393,12 +379,10 @@ static void check_spheres(struct check *c, struct spheres *s,
     filter_spheres(s);
     for (uint32_t i = 0; i < s->n; i++) {
         double p[5][3];
-        if (s->sure[i] != 0) {
+        if (s->sure[i] != 0)
             continue;
-        }
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < 5; k++)
             host_site(c->sites, s->vertex[i][k], p[k]);
-        }
         if (incode_in_sphere(tally, p[0], p[1], p[2], p[3], p[4]) > 0) {
             check_fault(c, "tetrahedron and point",
                         "are not Delaunay: the point lies in the sphere",
@@ -446,16 +430,14 @@ static void facet_fault(struct walk *w, uint64_t facet, uint64_t other,
 static void pair(struct walk *w, uint64_t facet, uint64_t twin) {
     struct spheres *s = &w->spheres;
     const uint32_t(*v)[4] = (const uint32_t(*)[4])w->c->tets->v;
-    if (w->c->depth != HOST_CHECK_DELAUNAY) {
+    if (w->c->depth != HOST_CHECK_DELAUNAY)
         return;
-    }
     s->tet[s->n][0] = facet >> 3;
     s->tet[s->n][1] = twin >> 3;
     memcpy(s->vertex[s->n], v[facet >> 3], sizeof *v);
     s->vertex[s->n][4] = v[twin >> 3][twin >> 1 & 3];
-    if (++s->n == BATCH) {
+    if (++s->n == BATCH)
         check_spheres(w->c, s, &w->tally);
-    }
 }
 
 static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
@@ -464,9 +446,8 @@ static void add_facet(struct walk *w, uint32_t x, uint32_t y, uint64_t tet,
     uint64_t facet = pack(tet, corner, x < y);
     size_t i = (size_t)((others * UINT64_C(0x9e3779b97f4a7c15)) >> 32);
     i &= w->mask;
-    while (w->slot[i].others != others && w->slot[i].others != 0) {
+    while (w->slot[i].others != others && w->slot[i].others != 0)
         i = (i + 1) & w->mask;
-    }
     struct slot *slot = &w->slot[i];
     if (slot->others == 0) {
         *slot = (struct slot){others, facet};
@@ -496,9 +477,8 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet) {
         least = t[k] < p ? k : least;
     }
     for (int k = 0; k < 4; k++) {
-        if (k == place || (least >= 0 && k != least)) {
+        if (k == place || (least >= 0 && k != least))
             continue;
-        }
         add_facet(w, t[after[k][place][0]], t[after[k][place][1]], tet,
                   (uint32_t)k);
     }
@@ -507,16 +487,14 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet) {
 /* Room for twice as many facets as there may be, all slots free. */
 static int clear_slots(struct walk *w, size_t tets) {
     size_t wanted = TABLE_MIN;
-    while (wanted < 6 * tets) {
+    while (wanted < 6 * tets)
         wanted *= 2;
-    }
     if (wanted > w->capacity) {
         free(w->slot);
         w->slot = malloc(wanted * sizeof *w->slot);
         w->capacity = w->slot == NULL ? 0 : wanted;
-        if (w->slot == NULL) {
+        if (w->slot == NULL)
             return host_fail_memory(&w->error, "the facets at a vertex");
-        }
     }
     memset(w->slot, 0, wanted * sizeof *w->slot);
     w->mask = wanted - 1;
@@ -540,20 +518,16 @@ static void keep_open(struct walk *w) {
 static void walk_vertex(struct walk *w, uint32_t p) {
     struct check *c = w->c;
     size_t tets = 0;
-    if (c->depth == HOST_CHECK_TILING && c->hot[p] == 0) {
+    if (c->depth == HOST_CHECK_TILING && c->hot[p] == 0)
         return; /* most */
-    }
-    for (unsigned i = 0; i < c->parts; i++) {
+    for (unsigned i = 0; i < c->parts; i++)
         tets += c->part[i].end[(size_t)p + 1] - c->part[i].end[p];
-    }
-    if (tets == 0 || clear_slots(w, tets) != 0) {
+    if (tets == 0 || clear_slots(w, tets) != 0)
         return;
-    }
     for (unsigned i = 0; i < c->parts; i++) {
         const struct check_part *part = &c->part[i];
-        for (uint32_t e = part->end[p]; e < part->end[(size_t)p + 1]; e++) {
+        for (uint32_t e = part->end[p]; e < part->end[(size_t)p + 1]; e++)
             add_tetrahedron(w, p, part->first + part->entry[e]);
-        }
     }
     keep_open(w);
 }
@@ -565,9 +539,8 @@ static void walk_vertices(void *context, unsigned number) {
     uint64_t count = c->sites->count, i;
     while ((i = check_take(c, CHECK_VERTICES, count)) < count) {
         uint64_t end = check_end(i, CHECK_VERTICES, count);
-        for (; i < end && w.error.code == 0; i++) {
+        for (; i < end && w.error.code == 0; i++)
             walk_vertex(&w, (uint32_t)i);
-        }
     }
     check_spheres(c, &w.spheres, &w.tally);
     free(w.slot);

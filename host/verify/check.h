@@ -53,9 +53,8 @@ static inline void host_site(const struct host_sites *sites, uint32_t v,
         host_vertex(sites->order, v, xyz);
         return;
     }
-    for (int d = 0; d < 3; d++) {
+    for (int d = 0; d < 3; d++)
         xyz[d] = sites->xyz[3 * (size_t)v + (size_t)d];
-    }
 }
 
 enum host_check_depth { HOST_CHECK_TILING, HOST_CHECK_DELAUNAY };

@@ -69,9 +69,8 @@ static void fault(struct hull_check *c, const uint64_t *tets, int tet_count,
 
 static void at(const struct hull_check *c, uint32_t vertex, double p[3]) {
     host_site(c->hull->sites, vertex, p);
-    for (int d = 0; d < 3 && c->scaled; d++) {
+    for (int d = 0; d < 3 && c->scaled; d++)
         p[d] = scalbn(p[d] - c->shift[d], c->power[d]);
-    }
 }
 
 static void outward(const struct hull_check *c, size_t facet, uint32_t v[3]) {
@@ -84,9 +83,8 @@ static int side(const struct hull_check *c, const uint32_t v[3],
                 const double *p) {
     struct incode_tally tally = {0};
     double a[3][3];
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         at(c, v[k], a[k]);
-    }
     return incode_orient3d(&tally, a[0], a[1], a[2], p);
 }
 
@@ -134,9 +132,8 @@ static bool is_dent(const struct hull_check *c, const struct edge *a,
     outward(c, a->facet / 4, f);
     outward(c, b->facet / 4, g);
     int s = side_of_vertex(c, f, g[(b->facet % 4 + 2) % 3]);
-    if (s != 0) {
+    if (s != 0)
         return s > 0;
-    }
     const struct host_hull_facet *facet = &c->hull->facet[a->facet / 4];
     return side_of_vertex(c, g, c->hull->tets->v[facet->tet][facet->corner]) >=
            0;
@@ -154,18 +151,16 @@ static void check_edge(struct hull_check *c, uint32_t low,
     }
     outward(c, edge[0].facet / 4, f);
     outward(c, edge[1].facet / 4, g);
-    if (f[edge[0].facet % 4] == g[edge[1].facet % 4]) {
+    if (f[edge[0].facet % 4] == g[edge[1].facet % 4])
         fault(c, tets, 2, v, 2, "has hull facets of opposite orientation");
-    } else if (is_dent(c, &edge[0], &edge[1])) {
+    else if (is_dent(c, &edge[0], &edge[1]))
         fault(c, tets, 2, v, 2, "is a dent of the hull");
-    }
 }
 
 static int compare_edges(const void *p, const void *q) {
     const struct edge *a = p, *b = q;
-    if (a->high != b->high) {
+    if (a->high != b->high)
         return a->high < b->high ? -1 : 1;
-    }
     return a->facet < b->facet ? -1 : a->facet > b->facet;
 }
 
@@ -178,9 +173,8 @@ static void sort_edges(struct edge *edge, size_t n) {
     for (size_t i = 1; i < n; i++) {
         struct edge e = edge[i];
         size_t j = i;
-        for (; j > 0 && compare_edges(&e, &edge[j - 1]) < 0; j--) {
+        for (; j > 0 && compare_edges(&e, &edge[j - 1]) < 0; j--)
             edge[j] = edge[j - 1];
-        }
         edge[j] = e;
     }
 }
@@ -235,9 +229,8 @@ static void list_edges(struct hull_check *c) {
 
 /* A closed surface of triangles with as many vertices as a sphere's. */
 static void check_euler(struct hull_check *c) {
-    if (c->hull->count + 4 != 2 * c->hull->vertices) {
+    if (c->hull->count + 4 != 2 * c->hull->vertices)
         fault(c, NULL, 0, NULL, 0, "its Euler characteristic is not 2");
-    }
 }
 
 static int check_edges(struct hull_check *c, struct host_error *error) {
@@ -279,9 +272,8 @@ static void blend(const struct hull_check *c, const uint32_t *v, int n,
     for (int i = 0; i < n; i++) {
         double q[3];
         at(c, v[i], q);
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             p[d] += weight[i] / sum * q[d];
-        }
     }
     for (int d = 0; d < 3; d++) {
         /* The weights' rounding may lead beyond the largest double. */
@@ -296,21 +288,18 @@ static bool find_inside(struct hull_check *c) {
     for (uint64_t i = 0; i < tries; i++) {
         const uint32_t *v = c->hull->tets->v[count / tries * i];
         bool inside = true;
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             inside = inside && v[k] < c->hull->sites->count;
-        }
-        if (!inside) {
+        if (!inside)
             continue;
-        }
         blend(c, v, 4, i, c->inside);
         for (uint32_t k = 0; k < 4 && inside; k++) {
             uint32_t f[3];
             host_facet_outward(v, k, f);
             inside = side(c, f, c->inside) < 0;
         }
-        if (inside) {
+        if (inside)
             return true;
-        }
     }
     return false;
 }
@@ -325,9 +314,8 @@ static void check_facing(struct hull_check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         uint32_t v[3];
         outward(c, facet, v);
-        if (side(c, v, c->inside) >= 0) {
+        if (side(c, v, c->inside) >= 0)
             facet_fault(c, facet, "is a hull facet that faces inward");
-        }
     }
 }
 
@@ -339,9 +327,8 @@ static int crosses(const struct hull_check *c, size_t facet) {
     double p[3][3];
     int lowest = 1;
     outward(c, facet, v);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         at(c, v[k], p[k]);
-    }
     for (int k = 0; k < 3 && lowest >= 0; k++) {
         /* positive: the ray passes on the left of the edge */
         int s =
@@ -354,11 +341,10 @@ static int crosses(const struct hull_check *c, size_t facet) {
 static void count_crossed(struct hull_check *c, size_t first, size_t last) {
     for (size_t facet = first; facet < last; facet++) {
         int crossed = crosses(c, facet);
-        if (crossed < 0) {
+        if (crossed < 0)
             __atomic_store_n(&c->grazed, true, __ATOMIC_RELAXED);
-        } else if (crossed > 0) {
+        else if (crossed > 0)
             (void)__atomic_fetch_add(&c->crossed, 1, __ATOMIC_RELAXED);
-        }
     }
 }
 
@@ -382,9 +368,8 @@ static void check_thin_facet(struct hull_check *c, size_t facet) {
 }
 
 static void check_thin(struct hull_check *c, size_t first, size_t last) {
-    for (size_t facet = first; facet < last; facet++) {
+    for (size_t facet = first; facet < last; facet++)
         check_thin_facet(c, facet);
-    }
 }
 
 static void check_rays(struct hull_check *c) {
@@ -397,9 +382,8 @@ static void check_rays(struct hull_check *c) {
         c->grazed = false;
         for_all(c, c->hull->count, count_crossed);
         if (!c->grazed) {
-            if (c->crossed > 1) {
+            if (c->crossed > 1)
                 facet_fault(c, facet, "is a hull facet covered by another");
-            }
             return;
         }
     }
@@ -429,9 +413,8 @@ static void find_shift(struct hull_check *c) {
             }
         }
     }
-    for (int d = 0; d < 3; d++) {
+    for (int d = 0; d < 3; d++)
         c->shift[d] = exact[d] && isfinite(lowest[d]) ? lowest[d] : 0.0;
-    }
 }
 
 /* The points at the origin and as large as they may be, axis by axis: exact,
@@ -443,9 +426,8 @@ static void magnify(struct hull_check *c) {
     find_shift(c);
     for (uint64_t i = 0; i < sites->count; i++) {
         host_site(sites, (uint32_t)i, p);
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             most[d] = fmax(most[d], fabs(p[d] - c->shift[d]));
-        }
     }
     for (int d = 0; d < 3; d++) {
         int exponent = 0;
@@ -467,9 +449,8 @@ static void check_winding(struct hull_check *c) {
         return;
     }
     for_all(c, c->hull->count, check_facing);
-    if (!c->broken) {
+    if (!c->broken)
         check_rays(c);
-    }
 }
 
 int host_hull_check(struct host_hull *hull,
@@ -477,10 +458,9 @@ int host_hull_check(struct host_hull *hull,
                     struct host_error *error) {
     struct hull_check c = {.hull = hull, .listener = listener};
     hull->vertices = 0;
-    if (hull->count == 0) {
+    if (hull->count == 0)
         fault(&c, NULL, 0, NULL, 0, "there is no hull");
-    } else if (check_edges(&c, error) == 0 && !c.broken) {
+    else if (check_edges(&c, error) == 0 && !c.broken)
         check_winding(&c);
-    }
     return error->code;
 }

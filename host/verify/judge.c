@@ -46,12 +46,10 @@ int host_judge_make(struct host_judge *judge, const struct host_sites *sites,
     judge->groups = (judge->bricks + GROUP - 1) / GROUP;
     size_t boxes = (size_t)(judge->bricks + judge->groups);
     double *all = host_map(6 * boxes * sizeof *all);
-    if (all == NULL) {
+    if (all == NULL)
         return host_fail_memory(error, "the boxes of the bricks");
-    }
-    for (size_t d = 0; d < 6; d++) {
+    for (size_t d = 0; d < 6; d++)
         judge->side[d] = all + d * boxes;
-    }
     make_boxes(judge);
     return 0;
 }
@@ -104,17 +102,14 @@ static void set_ball(struct query *q) {
     memset(q->g, 0, sizeof q->g);
     memset(q->g_size, 0, sizeof q->g_size);
     q->volume = q->volume_size = 0;
-    for (int k = 0; k < 3; k++) {
-        for (int d = 0; d < 3; d++) {
+    for (int k = 0; k < 3; k++)
+        for (int d = 0; d < 3; d++)
             e[k][d] = q->at[k + 1][d] - q->at[0][d];
-        }
-    }
     for (int k = 0; k < 3; k++) {
         double n[3], size[3], square = 0;
         cross(e[(k + 1) % 3], e[(k + 2) % 3], n, size);
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             square += e[k][d] * e[k][d];
-        }
         for (int d = 0; d < 3; d++) {
             q->g[d] += square * n[d];
             q->g_size[d] += square * size[d];
@@ -165,23 +160,18 @@ static void mark_boxes(const struct query *q, uint64_t first, uint64_t n,
 /* Whether vertex v is inside; then it is the better apex. */
 static void try_vertex(struct query *q, uint32_t v) {
     double p[3];
-    if (!host_site_is_vertex(&q->judge->sites, v)) {
+    if (!host_site_is_vertex(&q->judge->sites, v))
         return;
-    }
-    for (int k = 0; k < 4; k++) {
-        if (q->t[k] == v) {
+    for (int k = 0; k < 4; k++)
+        if (q->t[k] == v)
             return;
-        }
-    }
     host_site(&q->judge->sites, v, p);
     if (q->half &&
-        incode_orient3d(&q->tally, q->at[0], q->at[1], q->at[2], p) <= 0) {
+        incode_orient3d(&q->tally, q->at[0], q->at[1], q->at[2], p) <= 0)
         return;
-    }
     if (q->ball && incode_in_sphere(&q->tally, q->at[0], q->at[1], q->at[2],
-                                    q->at[3], p) < 0) {
+                                    q->at[3], p) < 0)
         return;
-    }
     q->found = true;
     if (!q->any) {
         q->t[3] = v;
@@ -194,9 +184,8 @@ static void try_brick(struct query *q, uint64_t brick) {
     uint64_t first = brick * GROUP, left = q->judge->sites.count - first;
     for (uint64_t i = 0; i < GROUP && i < left; i++) {
         try_vertex(q, (uint32_t)(first + i));
-        if (q->found && q->any) {
+        if (q->found && q->any)
             return;
-        }
     }
 }
 
@@ -207,12 +196,10 @@ static void try_group(struct query *q, uint64_t group) {
     mark_boxes(q, first, n, may);
     for (uint64_t i = 0; i < n && !(q->found && q->any); i++) {
         uint8_t still = may[i];
-        if (still && q->found) { /* the ball has shrunk */
+        if (still && q->found) /* the ball has shrunk */
             mark_boxes(q, first + i, 1, &still);
-        }
-        if (still) {
+        if (still)
             try_brick(q, first + i);
-        }
     }
 }
 
@@ -222,20 +209,16 @@ static void search(struct query *q) {
     uint64_t groups = q->judge->groups;
     uint32_t own[4];
     memcpy(own, q->t, sizeof own);
-    for (int k = 0; k < 4 && !(q->found && q->any); k++) {
-        if (own[k] != INCODE_NONE) {
+    for (int k = 0; k < 4 && !(q->found && q->any); k++)
+        if (own[k] != INCODE_NONE)
             try_brick(q, own[k] / GROUP);
-        }
-    }
     for (uint64_t i = 0; i < groups && !(q->found && q->any); i += GROUP) {
         uint8_t may[GROUP];
         uint64_t n = groups - i < GROUP ? groups - i : GROUP;
         mark_boxes(q, q->judge->bricks + i, n, may);
-        for (uint64_t k = 0; k < n && !(q->found && q->any); k++) {
-            if (may[k]) {
+        for (uint64_t k = 0; k < n && !(q->found && q->any); k++)
+            if (may[k])
                 try_group(q, i + k);
-            }
-        }
     }
 }
 
@@ -253,9 +236,8 @@ static struct query query_of(const struct host_judge *judge, const uint32_t *v,
 bool host_judge_tetrahedron(const struct host_judge *judge,
                             const uint32_t t[4]) {
     struct query q = query_of(judge, t, 4);
-    if (incode_orient3d(&q.tally, q.at[0], q.at[1], q.at[2], q.at[3]) <= 0) {
+    if (incode_orient3d(&q.tally, q.at[0], q.at[1], q.at[2], q.at[3]) <= 0)
         return false;
-    }
     q.any = true;
     set_ball(&q);
     search(&q);

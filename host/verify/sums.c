@@ -57,9 +57,8 @@ static void leave_out(struct block *b, uint32_t i, const char *what) {
 
 /* What is wrong with a vertex number; NULL: it is a vertex. */
 static const char *vertex_fault(const struct host_sites *sites, uint32_t v) {
-    if (v >= sites->count) {
+    if (v >= sites->count)
         return "has a vertex that is no row of the points";
-    }
     return host_site_is_vertex(sites, v) ? NULL
            : sites->order == NULL ? "uses a row that repeats an earlier one"
                                   : "has a vertex that is no point";
@@ -71,9 +70,8 @@ static void check_vertices(struct block *b) {
     b->v = (const uint32_t(*)[4])b->kept;
     for (uint32_t i = 0; i < b->n; i++) {
         const char *what = NULL;
-        for (int k = 0; k < 4 && what == NULL; k++) {
+        for (int k = 0; k < 4 && what == NULL; k++)
             what = vertex_fault(b->c->sites, b->kept[i][k]);
-        }
         if (what != NULL) {
             leave_out(b, i, what);
             memset(b->kept[i], 0, sizeof b->kept[i]);
@@ -92,11 +90,9 @@ static inline void order_two(uint32_t *a, uint32_t *b, uint32_t *odd) {
  * of range at once, other wrong ones once any is known to be there. */
 static void sort_vertices(struct block *b) {
     uint32_t most = 0;
-    for (uint32_t i = 0; i < b->n; i++) {
-        for (int k = 0; k < 4; k++) {
+    for (uint32_t i = 0; i < b->n; i++)
+        for (int k = 0; k < 4; k++)
             b->sorted[k][i] = b->v[i][k];
-        }
-    }
     for (uint32_t i = 0; i < BLOCK; i++) {
         uint32_t v0 = b->sorted[0][i], v1 = b->sorted[1][i];
         uint32_t v2 = b->sorted[2][i], v3 = b->sorted[3][i], odd = 0;
@@ -112,9 +108,8 @@ static void sort_vertices(struct block *b) {
         b->odd[i] = odd;
         most = v3 > most ? v3 : most;
     }
-    if (most >= b->c->sites->count || b->c->careful) {
+    if (most >= b->c->sites->count || b->c->careful)
         check_vertices(b);
-    }
 }
 
 static void gather_points(struct block *b) {
@@ -144,9 +139,8 @@ static void filter_orientation(struct block *b) {
     for (uint32_t i = 0; i < BLOCK; i++) {
         double d[3][3], m[3];
         for (int k = 0; k < 3; k++) {
-            for (int j = 0; j < 3; j++) {
+            for (int j = 0; j < 3; j++)
                 d[j][k] = b->p[j + 1][k][i] - b->p[0][k][i];
-            }
             m[k] = larger(magnitude(d[0][k]),
                           larger(magnitude(d[1][k]), magnitude(d[2][k])));
         }
@@ -166,17 +160,14 @@ static void check_orientation(struct block *b) {
     int64_t sure = 1;
     gather_points(b);
     filter_orientation(b);
-    for (uint32_t i = 0; i < b->n; i++) {
+    for (uint32_t i = 0; i < b->n; i++)
         sure &= b->sure[i];
-    }
     for (uint32_t i = 0; i < b->n && sure == 0; i++) {
-        if (b->sure[i] != 0 || (b->bad >> i & 1) != 0) {
+        if (b->sure[i] != 0 || (b->bad >> i & 1) != 0)
             continue;
-        }
         double p[4][3];
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             host_site(b->c->sites, b->v[i][k], p[k]);
-        }
         int s = incode_orient3d(&b->tally, p[0], p[1], p[2], p[3]);
         if (s <= 0) {
             leave_out(b, i,
@@ -229,11 +220,9 @@ static void add_sums(const struct block *b, uint64_t *sum, uint8_t *used) {
         }
         return;
     }
-    for (uint32_t i = 0; i < b->n; i++) {
-        if ((b->bad >> i & 1) == 0) {
+    for (uint32_t i = 0; i < b->n; i++)
+        if ((b->bad >> i & 1) == 0)
             add_one(b, i, sum, used);
-        }
-    }
 }
 
 static void sum_part(void *context, unsigned number) {
@@ -302,12 +291,10 @@ static void list_part(void *context, unsigned number) {
     for (uint64_t i = part->first; i < part->last; i++) {
         const uint32_t *t = c->tets->v[i];
         if (check_is_bad(c, i) ||
-            (hot[t[0]] | hot[t[1]] | hot[t[2]] | hot[t[3]]) == 0) {
+            (hot[t[0]] | hot[t[1]] | hot[t[2]] | hot[t[3]]) == 0)
             continue; /* most */
-        }
-        if (is_candidate(hot, t)) {
+        if (is_candidate(hot, t))
             part->list[listed++] = (uint32_t)(i - part->first);
-        }
     }
     part->listed = listed;
 }
@@ -347,9 +334,8 @@ static void sum_all(struct check *c) {
 /* Once more, with a look at each vertex. */
 static void sum_carefully(struct check *c) {
     size_t count = (size_t)c->sites->count;
-    for (unsigned i = 0; i < c->parts; i++) {
+    for (unsigned i = 0; i < c->parts; i++)
         memset(c->part[i].sum, 0, count * sizeof *c->part[i].sum);
-    }
     memset(c->used, 0, count);
     memset(c->bad, 0, ((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
     c->any_bad = c->any_unused = false;
@@ -362,12 +348,10 @@ int check_sums(struct check *c) {
     size_t count = (size_t)c->sites->count;
     if (make_room(c)) {
         sum_all(c);
-        if (c->any_false) {
+        if (c->any_false)
             sum_carefully(c);
-        }
-        if (c->depth == HOST_CHECK_TILING) {
+        if (c->depth == HOST_CHECK_TILING)
             run(c, c->parts, list_part);
-        }
     } else {
         host_fail_memory(c->error, "the check");
     }

@@ -31,11 +31,9 @@ const char *host_look_name(enum node_question what) {
 }
 
 enum node_question host_look_question(const char *name) {
-    for (unsigned i = 0; name != NULL && i <= NODE_QUESTIONS; i++) {
-        if (names[i] != NULL && strcmp(names[i], name) == 0) {
+    for (unsigned i = 0; name != NULL && i <= NODE_QUESTIONS; i++)
+        if (names[i] != NULL && strcmp(names[i], name) == 0)
             return (enum node_question)i;
-        }
-    }
     return (enum node_question)0;
 }
 
@@ -63,9 +61,8 @@ static size_t read_of(pid_t pid, const char *name, char *text, size_t size) {
     snprintf(path, sizeof path, "/proc/%ld/%s", (long)pid, name);
     int file = open(path, O_RDONLY | O_CLOEXEC);
     ssize_t n = file < 0 ? -1 : read(file, text, size - 1);
-    if (file >= 0) {
+    if (file >= 0)
         close(file);
-    }
     text[n > 0 ? n : 0] = '\0';
     return n > 0 ? (size_t)n : 0;
 }
@@ -73,20 +70,16 @@ static size_t read_of(pid_t pid, const char *name, char *text, size_t size) {
 static void find_command(struct host_holder *holder) {
     char line[sizeof holder->command];
     size_t used = read_of(holder->pid, "cmdline", line, sizeof line);
-    while (used > 0 && line[used - 1] == '\0') {
+    while (used > 0 && line[used - 1] == '\0')
         used--;
-    }
-    for (size_t i = 0; i < used; i++) {
+    for (size_t i = 0; i < used; i++)
         line[i] = line[i] == '\0' ? ' ' : line[i];
-    }
     size_t name = strcspn(line, " ");
-    while (name > 0 && line[name - 1] != '/') {
+    while (name > 0 && line[name - 1] != '/')
         name--;
-    }
     host_text_printable(holder->command, sizeof holder->command, line + name);
-    if (used == 0) {
+    if (used == 0)
         snprintf(holder->command, sizeof holder->command, "a program");
-    }
 }
 
 static void find_user(struct host_holder *holder) {
@@ -105,12 +98,10 @@ static void find_since(struct host_holder *holder) {
     struct timespec up;
     const char *at = NULL;
     long a_second = sysconf(_SC_CLK_TCK);
-    if (read_of(holder->pid, "stat", text, sizeof text) > 0) {
+    if (read_of(holder->pid, "stat", text, sizeof text) > 0)
         at = strrchr(text, ')'); /* the name before it may hold anything */
-    }
-    for (int field = 2; at != NULL && field < START_FIELD; field++) {
+    for (int field = 2; at != NULL && field < START_FIELD; field++)
         at = strchr(at + 1, ' ');
-    }
     if (at != NULL && a_second > 0 && clock_gettime(CLOCK_BOOTTIME, &up) == 0) {
         int64_t began_s = strtoll(at, NULL, 10) / a_second;
         holder->since_s = (int64_t)time(NULL) - (int64_t)up.tv_sec + began_s;
@@ -122,9 +113,8 @@ static bool host_holder_of(struct host_holder *holder, int file) {
     socklen_t size = sizeof peer;
     memset(holder, 0, sizeof *holder);
     if (getsockopt(file, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
-        peer.pid <= 0) {
+        peer.pid <= 0)
         return false;
-    }
     holder->pid = peer.pid;
     holder->uid = peer.uid;
     find_command(holder);
@@ -171,9 +161,8 @@ static bool is_at(const struct sockaddr *peer, const char *text) {
     struct tcp_address address;
     const struct sockaddr *to = &address.to.any;
     if (tcp_address_parse(&address, text) != 0 ||
-        peer->sa_family != to->sa_family) {
+        peer->sa_family != to->sa_family)
         return false;
-    }
     if (to->sa_family == AF_INET) {
         const struct sockaddr_in *a = (const void *)peer, *b = (const void *)to;
         return a->sin_port == b->sin_port &&
@@ -194,15 +183,12 @@ static bool is_wire(pid_t pid, int file, const char *wire) {
     socklen_t size = sizeof peer;
     const char *path = strchr(wire, ':');
     memset(&peer, 0, sizeof peer);
-    if (path++ == NULL) {
+    if (path++ == NULL)
         return false;
-    }
-    if (strncmp(wire, "serial:", 7) == 0) {
+    if (strncmp(wire, "serial:", 7) == 0)
         return is_device(file, path);
-    }
-    if (getpeername(file, &peer.any, &size) != 0) {
+    if (getpeername(file, &peer.any, &size) != 0)
         return false;
-    }
     return peer.any.sa_family == AF_UNIX ? is_called(pid, &peer.un, path)
                                          : is_at(&peer.any, path);
 }
@@ -225,12 +211,10 @@ static bool has_open(const struct host_holder *holder, const char *wire) {
             close(file);
         }
     }
-    if (folder != NULL) {
+    if (folder != NULL)
         closedir(folder);
-    }
-    if (process >= 0) {
+    if (process >= 0)
         close(process);
-    }
     return found;
 }
 
@@ -262,9 +246,8 @@ bool host_holder_find(struct host_holder *holder, const char *wire) {
         snprintf(holder->command, sizeof holder->command,
                  "a program that stands still");
     }
-    if (file >= 0) {
+    if (file >= 0)
         close(file);
-    }
     return found;
 }
 
@@ -310,9 +293,8 @@ static int fail_silent(const struct host_look *look, const char *what,
 static bool make_room(struct host_look *l) {
     size_t room = l->room == 0 ? LINE_FIRST : 2 * l->room;
     char *line = room > ANSWER_MAX ? NULL : realloc(l->line, room);
-    if (line == NULL) {
+    if (line == NULL)
         return false;
-    }
     l->line = line;
     l->room = room;
     return true;
@@ -325,20 +307,16 @@ static int read_line(struct host_look *l, uint64_t wait_us,
     l->used = 0;
     for (;; passed_us = host_now_us() - begun_us) {
         struct pollfd wait = {l->file, POLLIN, 0};
-        if (passed_us >= wait_us) {
+        if (passed_us >= wait_us)
             return fail_silent(l, "has the cube, and does not answer", error);
-        }
-        if (poll(&wait, 1, (int)((wait_us - passed_us + 999) / 1000)) <= 0) {
+        if (poll(&wait, 1, (int)((wait_us - passed_us + 999) / 1000)) <= 0)
             continue;
-        }
-        if (l->used == l->room && !make_room(l)) {
+        if (l->used == l->room && !make_room(l))
             return host_fail_memory(error, "an answer");
-        }
         ssize_t n =
             recv(l->file, l->line + l->used, l->room - l->used, MSG_DONTWAIT);
-        if (n < 0 && (errno == EAGAIN || errno == EINTR)) {
+        if (n < 0 && (errno == EAGAIN || errno == EINTR))
             continue;
-        }
         if (n <= 0) {
             return host_fail(error, HOST_CUBE,
                              "who had the cube has ended; try again");
@@ -355,9 +333,8 @@ static int read_line(struct host_look *l, uint64_t wait_us,
 static json_t *read_object(struct host_look *l, uint64_t wait_us,
                            struct host_error *error) {
     char why[160], text[HOST_HOLDER_TEXT];
-    if (read_line(l, wait_us, error) != 0) {
+    if (read_line(l, wait_us, error) != 0)
         return NULL;
-    }
     json_t *object = json_loads(l->line, 0, NULL);
     const char *said = json_string_value(json_object_get(object, "error"));
     if (object == NULL) {
@@ -381,27 +358,23 @@ static uint64_t number(const json_t *object, const char *key) {
 
 static int take_greeting(struct host_look *l, struct host_error *error) {
     json_t *object = read_object(l, GREETING_US, error);
-    if (object == NULL) {
+    if (object == NULL)
         return error->code;
-    }
     uint64_t protocol = number(object, "protocol");
     uint64_t nodes = number(object, "nodes");
     l->dimension = (unsigned)number(object, "dimension");
     l->serial_baud = (uint32_t)number(object, "serial_baud");
     json_decref(object);
     if (protocol != NODE_PROTOCOL || nodes == 0 || nodes > CUBE_NODES_MAX ||
-        l->dimension > CUBE_DIMENSION_MAX || nodes != 1u << l->dimension) {
+        l->dimension > CUBE_DIMENSION_MAX || nodes != 1u << l->dimension)
         return fail_silent(l, "has the cube, and is of another version", error);
-    }
     l->nodes = (unsigned)nodes;
     l->node = calloc(nodes, sizeof *l->node);
     l->answers = malloc(nodes * CUBE_PAYLOAD_MAX);
-    if (l->node == NULL || l->answers == NULL) {
+    if (l->node == NULL || l->answers == NULL)
         return host_fail_memory(error, "the nodes' answers");
-    }
-    for (size_t i = 0; i < nodes; i++) {
+    for (size_t i = 0; i < nodes; i++)
         l->node[i].answer = l->answers + i * CUBE_PAYLOAD_MAX;
-    }
     return 0;
 }
 
@@ -446,9 +419,8 @@ static void take_answer(struct host_look *l, const char *key, const char *hex) {
     size_t size;
     if (*key == '\0' || *end != '\0' || node >= l->nodes || hex == NULL ||
         sodium_hex2bin(l->node[node].answer, CUBE_PAYLOAD_MAX, hex, strlen(hex),
-                       NULL, &size, NULL) != 0) {
+                       NULL, &size, NULL) != 0)
         return;
-    }
     l->node[node].size = size;
     l->node[node].answered = true;
 }
@@ -473,21 +445,18 @@ int host_look_ask(struct host_look *look, const struct host_node_set *set,
     struct host_look *l = look;
     const char *key;
     json_t *value;
-    for (unsigned i = 0; i < l->nodes; i++) {
+    for (unsigned i = 0; i < l->nodes; i++)
         l->node[i].answered = false;
-    }
     if (host_look_name(what) == NULL) {
         return host_fail(error, HOST_CUBE,
                          "that is not for those who look on; wait until the "
                          "cube is free");
     }
-    if (send_question(l, set, what, error) != 0) {
+    if (send_question(l, set, what, error) != 0)
         return error->code;
-    }
     json_t *object = read_object(l, wait_us, error);
-    if (object == NULL) {
+    if (object == NULL)
         return error->code;
-    }
     l->committed = number(object, "committed");
     l->bricks = number(object, "bricks");
     l->tetrahedra = number(object, "tetrahedra");
@@ -499,9 +468,8 @@ int host_look_ask(struct host_look *look, const struct host_node_set *set,
 }
 
 void host_look_close(struct host_look *look) {
-    if (look->file >= 0) {
+    if (look->file >= 0)
         close(look->file);
-    }
     free(look->line);
     free(look->node);
     free(look->answers);

@@ -40,9 +40,8 @@ static void drop(struct host_offer *o, unsigned i) {
     free(looker->out);
     memset(looker, 0, sizeof *looker);
     looker->file = -1;
-    if (o->asked == (int)i) {
+    if (o->asked == (int)i)
         o->asked = -1; /* the answers come, and are nobody's */
-    }
 }
 
 /* --- what they are told --------------------------------------------------- */
@@ -70,9 +69,8 @@ static void flush(struct host_offer *o, unsigned i, uint64_t now_us) {
                          MSG_NOSIGNAL | MSG_DONTWAIT);
         if (n <= 0) {
             bool waits = n < 0 && (errno == EAGAIN || errno == EINTR);
-            if (!waits || now_us - looker->moved_us > STALL_US) {
+            if (!waits || now_us - looker->moved_us > STALL_US)
                 drop(o, i);
-            }
             return;
         }
         looker->out_at += (size_t)n;
@@ -111,9 +109,8 @@ static json_t *refusal(const char *why) {
 
 static void turn_away(int file, const char *why) {
     char *line = line_of(refusal(why));
-    if (line != NULL) {
+    if (line != NULL)
         (void)!send(file, line, strlen(line), MSG_NOSIGNAL | MSG_DONTWAIT);
-    }
     free(line);
     close(file);
 }
@@ -123,9 +120,8 @@ static bool welcome(struct host_offer *o, uint64_t now_us) {
     int file = accept4(o->listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     struct ucred peer;
     socklen_t size = sizeof peer;
-    if (file < 0) {
+    if (file < 0)
         return false;
-    }
     if (getsockopt(file, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
         (peer.uid != geteuid() && peer.uid != 0)) {
         turn_away(file, "it is another user's; ask them");
@@ -166,18 +162,16 @@ static void hear(struct host_offer *o, unsigned i, uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
     ssize_t n = recv(looker->file, looker->line + looker->used,
                      sizeof looker->line - looker->used, MSG_DONTWAIT);
-    if (n < 0 && (errno == EAGAIN || errno == EINTR)) {
+    if (n < 0 && (errno == EAGAIN || errno == EINTR))
         return;
-    }
     if (n <= 0) {
         drop(o, i);
         return;
     }
     looker->used += (size_t)n;
     char *end = memchr(looker->line, '\n', looker->used);
-    if (end == NULL && looker->used < sizeof looker->line) {
+    if (end == NULL && looker->used < sizeof looker->line)
         return;
-    }
     if (end == NULL || end + 1 != looker->line + looker->used) {
         drop(o, i); /* one question at a time, and a short one */
         return;
@@ -193,11 +187,10 @@ static void hear(struct host_offer *o, unsigned i, uint64_t now_us) {
 
 static void serve(struct host_offer *o, unsigned i, uint64_t now_us) {
     struct host_looker *looker = &o->looker[i];
-    if (looker->file >= 0 && looker->out != NULL) {
+    if (looker->file >= 0 && looker->out != NULL)
         flush(o, i, now_us);
-    } else if (looker->file >= 0 && !looker->asks && o->asked != (int)i) {
+    else if (looker->file >= 0 && !looker->asks && o->asked != (int)i)
         hear(o, i, now_us);
-    }
 }
 
 /* --- as the service sees it ----------------------------------------------- */
@@ -205,17 +198,13 @@ static void serve(struct host_offer *o, unsigned i, uint64_t now_us) {
 static bool ask(void *context, uint64_t now_us,
                 struct host_onlookers_question *question) {
     struct host_offer *o = context;
-    if (o->listener < 0 && now_us - o->tried_us > TRY_US) {
+    if (o->listener < 0 && now_us - o->tried_us > TRY_US)
         take_place(o, now_us);
-    }
-    for (unsigned k = 0; k < CALLS_A_LOOK && o->listener >= 0; k++) {
-        if (!welcome(o, now_us)) {
+    for (unsigned k = 0; k < CALLS_A_LOOK && o->listener >= 0; k++)
+        if (!welcome(o, now_us))
             break;
-        }
-    }
-    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
+    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         serve(o, i, now_us);
-    }
     for (unsigned k = 0; k < HOST_LOOKERS_MAX; k++) {
         unsigned i = (o->turn + k) % HOST_LOOKERS_MAX;
         if (o->looker[i].asks) {
@@ -270,9 +259,8 @@ void host_offer_begin(struct host_offer *offer, const char *wire) {
     memset(offer, 0, sizeof *offer);
     snprintf(offer->wire, sizeof offer->wire, "%s", wire);
     offer->asked = -1;
-    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
+    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         offer->looker[i].file = -1;
-    }
     offer->onlookers = (struct host_onlookers){.context = offer,
                                                .ask = ask,
                                                .answer = answer,
@@ -289,17 +277,13 @@ void host_offer_machine(struct host_offer *offer,
 }
 
 void host_offer_end(struct host_offer *offer) {
-    if (offer->onlookers.context == NULL) {
+    if (offer->onlookers.context == NULL)
         return; /* it has not begun */
-    }
-    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
-        if (offer->looker[i].file >= 0) {
+    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
+        if (offer->looker[i].file >= 0)
             drop(offer, i);
-        }
-    }
-    if (offer->listener >= 0) {
+    if (offer->listener >= 0)
         close(offer->listener);
-    }
     json_decref(offer->answers);
     memset(offer, 0, sizeof *offer);
 }

@@ -334,9 +334,8 @@ static void take_cells(struct incode_complex *x, const struct cavity *cavity,
 
 /* Those that give way and whose places nobody has taken are free. */
 static void free_cells(struct incode_complex *x, const struct cavity *cavity) {
-    for (uint32_t j = cavity->facets; j < cavity->gone; j++) {
+    for (uint32_t j = cavity->facets; j < cavity->gone; j++)
         incode_complex_free_cell(x, cavity->cell[j]);
-    }
 }
 
 /* Takes from the cells that give way what the new ones need to know; returns

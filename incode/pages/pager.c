@@ -157,10 +157,9 @@ bool incode_pager_loading(const struct incode_pager *pager, uint32_t page) {
 }
 
 uint32_t incode_pager_awaited(const struct incode_pager *pager) {
-    for (uint16_t i = 0; pager->loading > 0 && i < pager->free; i++) {
+    for (uint16_t i = 0; pager->loading > 0 && i < pager->free; i++)
         if (pager->slots[i].state == INCODE_FRAME_LOADING)
             return pager->slots[i].number;
-    }
     return INCODE_NONE;
 }
 
@@ -311,9 +310,8 @@ uint32_t incode_cell_along(double lo, double hi, uint32_t cells, double p) {
     /* Halves first: hi - lo of two finite numbers may overflow. */
     double side = 0.5 * hi - 0.5 * lo;
     double t = (0.5 * p - 0.5 * lo) / side * (double)cells;
-    if (!(t > 0)) { /* below the box, or a side of no length: NaN */
+    if (!(t > 0)) /* below the box, or a side of no length: NaN */
         return 0;
-    }
     return t < (double)cells ? (uint32_t)t : cells - 1;
 }
 

@@ -34,9 +34,8 @@ void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
 
 uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page) {
     uint32_t level = 0;
-    while (level < tree->levels && page >= tree->base[level + 1]) {
+    while (level < tree->levels && page >= tree->base[level + 1])
         level++;
-    }
     return level;
 }
 

@@ -115,10 +115,9 @@ static void problem_init(struct problem *s, const double *const p[],
     }
     s->span = most > least ? most - least : 0;
     problem_clear(s, degree);
-    for (int32_t i = 0; i < points; i++) {
+    for (int32_t i = 0; i < points; i++)
         for (int32_t k = 0; k < 3; k++)
             s->p[i][k].e -= s->p[i][k].sign != 0 ? least : 0;
-    }
 }
 
 /* r = a * b, neither of which is zero. */
@@ -236,10 +235,9 @@ static void settle(struct settled *to, const struct problem *s) {
     }
     while (first < last && to->limb[first] == 0)
         first++;
-    if (carry < 0) { /* the complement, and 1 more */
+    if (carry < 0) /* the complement, and 1 more */
         for (int32_t i = first; i < last; i++)
             to->limb[i] = ~to->limb[i] + (i == first);
-    }
     while (last > first && to->limb[last - 1] == 0)
         last--;
     to->first = first;
@@ -340,10 +338,9 @@ static void add_all(struct sums *sums, struct problem *s,
         int32_t n = 0;
         if (q[0].sign == 0 && q[1].sign == 0 && q[2].sign == 0)
             continue;
-        for (uint8_t k = 0; k < 5; k++) {
+        for (uint8_t k = 0; k < 5; k++)
             if (k != i)
                 rest[n++] = k;
-        }
         incode_breathe(pause, UNITS);
         set_orient3d(s, rest);
         settle(&d, s);

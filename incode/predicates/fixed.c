@@ -59,10 +59,9 @@ bool incode_fixed_differences(int64_t d[][3], const double *const p[],
             n[i] += rest;
         }
     }
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             d[i][k] = n[i][k];
-    }
     return !any4(bad);
 }
 
@@ -322,10 +321,9 @@ static uint32_t rank_short(const int64_t d[4][3]) {
         key[i] = (i128)d[i][0] * ((i128)1 << 64) + low;
     }
     key[4] = 0;
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 5; i++)
         for (int j = i + 1; j < 5; j++)
             above += INCODE_TIE_ABOVE(i, j, key[i] > key[j]);
-    }
     return above;
 }
 
@@ -372,10 +370,9 @@ int incode_fixed_in_sphere(const int64_t d[4][3], bool near_zero) {
     if (bits >> zeros >> (near_zero ? 31 : 24) != 0)
         return in_sphere_long(d);
     int64_t n[4][3];
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         for (int k = 0; k < 3; k++)
             n[i][k] = d[i][k] >> zeros;
-    }
     return in_sphere_short((const int64_t(*)[3])n);
 }
 

@@ -99,10 +99,9 @@ int incode_lexicographic(const double a[3], const double b[3]) {
 static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
     uint32_t above = 0;
     int cofactor[5];
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 5; i++)
         for (int j = i + 1; j < 5; j++)
             above += INCODE_TIE_ABOVE(i, j, higher(p[i], p[j]));
-    }
     for (int i = 0; i < 4; i++) {
         const double *q[4] = {p[0], p[1], p[2], p[3]};
         q[i] = p[4];

@@ -29,18 +29,16 @@ static const uint8_t mark[] = {0x55, 0xaa};
 bool loader_card_open(struct loader_card *card) {
     card->first = card->held = 0;
     if (!card->read(card->device, 0, card->bytes) ||
-        memcmp(card->bytes + AT_MARK, mark, sizeof mark) != 0) {
+        memcmp(card->bytes + AT_MARK, mark, sizeof mark) != 0)
         return false;
-    }
     for (unsigned i = 0; i < PARTITIONS && card->first == 0; i++) {
         const uint8_t *entry =
             card->bytes + AT_PARTITION + (size_t)i * PARTITION_BYTES;
         uint32_t first = bytes_get32(entry + AT_FIRST);
         if (entry[AT_TYPE] == LOADER_CARD_TYPE &&
             bytes_get32(entry + AT_BLOCKS) >= LOADER_CARD_BLOCKS &&
-            first <= UINT32_MAX - LOADER_CARD_BLOCKS) {
+            first <= UINT32_MAX - LOADER_CARD_BLOCKS)
             card->first = first;
-        }
     }
     return card->first != 0;
 }
@@ -60,15 +58,13 @@ bool loader_card_format(struct loader_card *card) {
 
 /* Into card->bytes. */
 static bool fetch(struct loader_card *card, uint32_t number) {
-    if (card->first == 0 && !loader_card_open(card)) {
+    if (card->first == 0 && !loader_card_open(card))
         return false;
-    }
     uint32_t block = card->first + number;
     if (card->held != block) {
         card->held = 0;
-        if (!card->read(card->device, block, card->bytes)) {
+        if (!card->read(card->device, block, card->bytes))
             return false;
-        }
         card->held = block;
     }
     return true;
@@ -87,11 +83,10 @@ void loader_card_read(void *context, uint32_t at, void *bytes, size_t size) {
         uint32_t within = (at + (uint32_t)done) % BLOCK;
         size_t part =
             size - done < BLOCK - within ? size - done : BLOCK - within;
-        if (at + done < BYTES && fetch(card, (at + (uint32_t)done) / BLOCK)) {
+        if (at + done < BYTES && fetch(card, (at + (uint32_t)done) / BLOCK))
             memcpy(out + done, card->bytes + within, part);
-        } else {
+        else
             memset(out + done, 0xff, part);
-        }
         done += part;
     }
 }
@@ -103,24 +98,19 @@ bool loader_card_program(void *context, uint32_t at, const void *bytes,
     struct loader_card *card = context;
     const uint8_t *in = bytes;
     uint32_t within = at % BLOCK;
-    if (at >= BYTES || size > BLOCK - within || !fetch(card, at / BLOCK)) {
+    if (at >= BYTES || size > BLOCK - within || !fetch(card, at / BLOCK))
         return false;
-    }
-    for (size_t i = 0; i < size; i++) {
-        if ((card->bytes[within + i] & in[i]) != in[i]) {
+    for (size_t i = 0; i < size; i++)
+        if ((card->bytes[within + i] & in[i]) != in[i])
             return false;
-        }
-    }
     memcpy(card->bytes + within, in, size);
     return store(card, at / BLOCK);
 }
 
 static bool erased(const uint8_t *bytes) {
-    for (unsigned i = 0; i < BLOCK; i++) {
-        if (bytes[i] != 0xff) {
+    for (unsigned i = 0; i < BLOCK; i++)
+        if (bytes[i] != 0xff)
             return false;
-        }
-    }
     return true;
 }
 
@@ -129,18 +119,15 @@ static bool erased(const uint8_t *bytes) {
 bool loader_card_erase(void *context, uint32_t sector) {
     struct loader_card *card = context;
     if (sector >= LOADER_CARD_SECTORS ||
-        (card->first == 0 && !loader_card_open(card))) {
+        (card->first == 0 && !loader_card_open(card)))
         return false;
-    }
     for (uint32_t i = 0; i < SECTOR_BLOCKS; i++) {
         uint32_t number = sector * SECTOR_BLOCKS + i;
-        if (fetch(card, number) && erased(card->bytes)) {
+        if (fetch(card, number) && erased(card->bytes))
             continue;
-        }
         memset(card->bytes, 0xff, BLOCK);
-        if (!store(card, number)) {
+        if (!store(card, number))
             return false;
-        }
     }
     return true;
 }
@@ -177,9 +164,8 @@ bool loader_ram_program(void *context, uint32_t at, const void *bytes,
     const uint8_t *in = bytes;
     bool good = true;
     if (size > LOADER_RAM_PAGE - at % LOADER_RAM_PAGE ||
-        at >= LOADER_RAM_SECTORS * LOADER_RAM_SECTOR) {
+        at >= LOADER_RAM_SECTORS * LOADER_RAM_SECTOR)
         return false;
-    }
     for (size_t i = 0; i < size; i++) {
         memory[at + i] = (uint8_t)(memory[at + i] & in[i]);
         good = memory[at + i] == in[i] && good;
@@ -189,11 +175,9 @@ bool loader_ram_program(void *context, uint32_t at, const void *bytes,
 
 bool loader_ram_erase(void *context, uint32_t sector) {
     volatile uint8_t *memory = context;
-    if (sector >= LOADER_RAM_SECTORS) {
+    if (sector >= LOADER_RAM_SECTORS)
         return false;
-    }
-    for (size_t i = 0; i < LOADER_RAM_SECTOR; i++) {
+    for (size_t i = 0; i < LOADER_RAM_SECTOR; i++)
         memory[sector * LOADER_RAM_SECTOR + i] = 0xff;
-    }
     return true;
 }

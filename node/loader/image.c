@@ -31,9 +31,8 @@ static const uint8_t magic[AT_BYTES] = {'i', 'n', 'c', 'o', 'd', 'e', 'I', '1'};
 /* The signature covers what is before it; what is behind it says nothing. */
 static bool is_unsaid(const uint8_t bytes[LOADER_HEADER_BYTES]) {
     uint8_t all = 0;
-    for (unsigned i = AT_ZEROS; i < AT_CRC; i++) {
+    for (unsigned i = AT_ZEROS; i < AT_CRC; i++)
         all |= bytes[i];
-    }
     return all == 0;
 }
 
@@ -42,9 +41,8 @@ loader_image_unpack(struct loader_image *image,
                     const uint8_t bytes[LOADER_HEADER_BYTES]) {
     if (memcmp(bytes, magic, sizeof magic) != 0 ||
         bytes_get32(bytes + AT_CRC) != frame_crc32c(0, bytes, AT_CRC) ||
-        !is_unsaid(bytes) || bytes_get32(bytes + AT_BYTES) == 0) {
+        !is_unsaid(bytes) || bytes_get32(bytes + AT_BYTES) == 0)
         return LOADER_NO_IMAGE;
-    }
     *image = (struct loader_image){.bytes = bytes_get32(bytes + AT_BYTES),
                                    .address = bytes_get32(bytes + AT_ADDRESS),
                                    .number = bytes_get32(bytes + AT_NUMBER),
@@ -59,9 +57,8 @@ loader_image_unpack(struct loader_image *image,
 
 /* Up to the text's end: what is behind it is of no meaning. */
 static void put_text(uint8_t *at, const char *text, size_t size) {
-    for (size_t i = 0; i < size && text[i] != '\0'; i++) {
+    for (size_t i = 0; i < size && text[i] != '\0'; i++)
         at[i] = (uint8_t)text[i];
-    }
 }
 
 void loader_image_pack(const struct loader_image *image,
@@ -84,12 +81,10 @@ enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
                                       const struct sign_suite *suite,
                                       const uint8_t key[SIGN_PUBLIC_BYTES]) {
     static const uint8_t nobody[SIGN_PUBLIC_BYTES];
-    if (memcmp(bytes + AT_KEY, nobody, sizeof nobody) == 0) {
+    if (memcmp(bytes + AT_KEY, nobody, sizeof nobody) == 0)
         return LOADER_UNSIGNED;
-    }
-    if (memcmp(bytes + AT_KEY, key, SIGN_PUBLIC_BYTES) != 0) {
+    if (memcmp(bytes + AT_KEY, key, SIGN_PUBLIC_BYTES) != 0)
         return LOADER_WRONG_KEY;
-    }
     return suite->good(bytes + AT_SIGNATURE, bytes, LOADER_SIGNED_BYTES, key)
                ? LOADER_GOOD
                : LOADER_WRONG_SIGNATURE;
@@ -191,12 +186,10 @@ static enum loader_fault begin(struct loader_look *look,
     uint8_t header[LOADER_HEADER_BYTES];
     read_header(slots, look->slot, header);
     enum loader_fault fault = loader_slots_suits(slots, header, image);
-    if (fault == LOADER_GOOD) {
+    if (fault == LOADER_GOOD)
         fault = loader_image_signed(header, rules->suite, rules->key);
-    }
-    if (fault == LOADER_GOOD) {
+    if (fault == LOADER_GOOD)
         loader_look_hash(look, slots, header, image, look->slot);
-    }
     return fault;
 }
 
@@ -241,9 +234,8 @@ struct loader_layout loader_layout(const struct loader_flash *flash) {
     struct loader_layout layout;
     memset(&layout, 0, sizeof layout);
     layout.first = flash->sectors >= LARGE ? LARGE_FIRST : SMALL_FIRST;
-    if (flash->sectors <= layout.first) {
+    if (flash->sectors <= layout.first)
         return layout;
-    }
     uint32_t most = SLOT_BYTES_MAX / flash->sector_bytes;
     layout.sectors = (flash->sectors - layout.first) / LOADER_SLOTS;
     layout.sectors = layout.sectors < most ? layout.sectors : most;
@@ -251,9 +243,8 @@ struct loader_layout loader_layout(const struct loader_flash *flash) {
     uint32_t marks =
         loader_marks_in(flash) + loader_mark_apart(flash) * (blocks + 1);
     layout.journal = (marks + flash->sector_bytes - 1) / flash->sector_bytes;
-    if (layout.sectors > layout.journal) {
+    if (layout.sectors > layout.journal)
         layout.bytes = (layout.sectors - layout.journal) * flash->sector_bytes;
-    }
     return layout;
 }
 
@@ -291,9 +282,8 @@ static bool compare(const struct loader_flash *flash, uint32_t at,
         flash->read(flash->context, at + done, piece, part);
         for (uint32_t i = 0; i < part; i++) {
             uint8_t wanted = bytes == NULL ? 0xff : bytes[done + i];
-            if ((takes ? piece[i] & wanted : piece[i]) != wanted) {
+            if ((takes ? piece[i] & wanted : piece[i]) != wanted)
                 return false;
-            }
         }
     }
     return true;

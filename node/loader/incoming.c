@@ -64,9 +64,8 @@ static void refuse(struct loader_incoming *in, enum loader_fault fault) {
 
 /* False: too many of them of late; the transfer ends. */
 static bool affords(struct loader_incoming *in, bool affordable) {
-    if (!affordable) {
+    if (!affordable)
         refuse(in, LOADER_TOO_OFTEN);
-    }
     return affordable;
 }
 
@@ -108,18 +107,16 @@ void loader_incoming_begin(struct loader_incoming *incoming,
     struct loader_incoming *in = incoming;
     bool same = memcmp(in->header, header, LOADER_HEADER_BYTES) == 0;
     INCODE_ASSERT(in->work == LOADER_NO_WORK);
-    if (same && (in->phase == LOADER_TAKES || in->phase == LOADER_WHOLE)) {
+    if (same && (in->phase == LOADER_TAKES || in->phase == LOADER_WHOLE))
         return;
-    }
     memcpy(in->header, header, LOADER_HEADER_BYTES);
     memset(in->map, 0, sizeof in->map);
     in->blocks = in->held = in->failures = in->inherited = 0;
     in->fault = in->slots->worn
                     ? LOADER_WORN
                     : loader_slots_suits(in->slots, header, &in->image);
-    if (in->fault == LOADER_GOOD && bytes != bytes_of(in)) {
+    if (in->fault == LOADER_GOOD && bytes != bytes_of(in))
         in->fault = LOADER_NO_IMAGE;
-    }
     if (in->fault != LOADER_GOOD) {
         refuse(in, in->fault);
         return;
@@ -132,20 +129,16 @@ void loader_incoming_begin(struct loader_incoming *incoming,
 static void prove(struct loader_incoming *in) {
     const struct loader_rules *rules = in->slots->rules;
     struct loader_budget *budget = rules->budget;
-    if (!affords(in,
-                 budget == NULL || loader_budget_has(budget, LOADER_FALSE))) {
+    if (!affords(in, budget == NULL || loader_budget_has(budget, LOADER_FALSE)))
         return;
-    }
     enum loader_fault fault =
         loader_image_signed(in->header, rules->suite, rules->key);
-    if (fault == LOADER_WRONG_SIGNATURE && budget != NULL) {
+    if (fault == LOADER_WRONG_SIGNATURE && budget != NULL)
         (void)loader_budget_take(budget, LOADER_FALSE);
-    }
-    if (fault != LOADER_GOOD) {
+    if (fault != LOADER_GOOD)
         refuse(in, fault);
-    } else {
+    else
         go_on(in, LOADER_CHOOSES);
-    }
 }
 
 /* What is the image in use already, or has it been brought by now. */
@@ -170,9 +163,8 @@ static unsigned begun_slot(const struct loader_incoming *in) {
         const struct loader_layout layout = layout_of(in);
         if (begins_with_header(in,
                                loader_slot_at(&layout, flash_of(in), slot)) ||
-            begins_with_header(in, journal_at(in, slot))) {
+            begins_with_header(in, journal_at(in, slot)))
             return slot;
-        }
     }
     return 0;
 }
@@ -183,10 +175,9 @@ static unsigned begun_slot(const struct loader_incoming *in) {
 static void make_ready(struct loader_incoming *in, unsigned slot) {
     struct loader_budget *budget = in->slots->rules->budget;
     in->slot = slot;
-    if (affords(in, budget == NULL ||
-                        loader_budget_take(budget, LOADER_TRANSFERS))) {
+    if (affords(in,
+                budget == NULL || loader_budget_take(budget, LOADER_TRANSFERS)))
         go_on(in, LOADER_READIES);
-    }
 }
 
 /* The slot that is not in use; of two good ones, of which one is on trial, that
@@ -205,16 +196,14 @@ static void choose(struct loader_incoming *in) {
         return;
     }
     if (state->trial && !slots->known[other]) {
-        if (in->next++ == 0) {
+        if (in->next++ == 0)
             loader_look_begin(&in->look, slots, other);
-        }
         (void)loader_look_step(&in->look, slots);
         return;
     }
     if (state->trial && slots->fault[other] == LOADER_GOOD) {
-        if (!loader_slots_use(slots, other, false)) {
+        if (!loader_slots_use(slots, other, false))
             refuse(in, LOADER_WORN);
-        }
         return; /* that may be the one which is to come */
     }
     make_ready(in, other);
@@ -241,9 +230,8 @@ static void ready(struct loader_incoming *in) {
     } else if (in->next <= layout.journal &&
                (in->next > 1 || !begins_with_header(in, at))) {
         at += (in->next++ - 1) * flash->sector_bytes;
-        if (!loader_flash_blank(flash, at, flash->sector_bytes)) {
+        if (!loader_flash_blank(flash, at, flash->sector_bytes))
             (void)clear(in, at);
-        }
     } else if (begins_with_header(in, at) ||
                put(in, at, in->header, LOADER_HEADER_BYTES)) {
         go_on(in, LOADER_COUNTS);
@@ -257,14 +245,12 @@ static bool is_marked(struct loader_incoming *in, uint32_t block) {
     const struct loader_flash *flash = flash_of(in);
     uint8_t mark[LOADER_MARK_BYTES];
     flash->read(flash->context, mark_at(in, block), mark, sizeof mark);
-    if (bytes_get32(mark) == (uint32_t)ERASED_MARK) {
+    if (bytes_get32(mark) == (uint32_t)ERASED_MARK)
         return false;
-    }
     flash->read(flash->context, slot_at(in) + block * LOADER_BLOCK_BYTES,
                 in->block, size_of(in, block));
-    if (block == 0) {
+    if (block == 0)
         memcpy(in->block, in->header, LOADER_HEADER_BYTES);
-    }
     return bytes_get32(mark) == frame_crc32c(0, in->block, size_of(in, block));
 }
 
@@ -290,9 +276,8 @@ void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
     if (in->phase != LOADER_TAKES || number >= in->blocks ||
         size != size_of(in, number) || holds(in, number) ||
         frame_crc32c(0, bytes, size) != crc ||
-        (number == 0 && memcmp(bytes, in->header, LOADER_HEADER_BYTES) != 0)) {
+        (number == 0 && memcmp(bytes, in->header, LOADER_HEADER_BYTES) != 0))
         return;
-    }
     memcpy(in->block, bytes, size);
     in->number = number;
     in->size = size;
@@ -317,12 +302,10 @@ static bool is_ready(const struct loader_incoming *in, uint32_t sector) {
     uint32_t at = sector * size;
     blocks_of(in, sector, &first, &last);
     bool begun = false;
-    for (uint32_t b = first; b < last; b++) {
+    for (uint32_t b = first; b < last; b++)
         begun = begun || holds(in, b);
-    }
-    if (!begun) {
+    if (!begun)
         return loader_flash_blank(flash, slot_at(in) + at, size);
-    }
     uint32_t begin = in->number * LOADER_BLOCK_BYTES, end = begin + in->size;
     uint32_t own = in->number == 0 ? LOADER_HEADER_BYTES : begin;
     own = own > at ? own : at;
@@ -335,9 +318,8 @@ static bool is_ready(const struct loader_incoming *in, uint32_t sector) {
 static void erase(struct loader_incoming *in, uint32_t sector) {
     uint32_t first, last;
     blocks_of(in, sector, &first, &last);
-    for (uint32_t b = first; b < last; b++) {
+    for (uint32_t b = first; b < last; b++)
         set_held(in, b, false);
-    }
     in->phase = LOADER_TAKES;
     (void)clear(in, slot_at(in) + sector * flash_of(in)->sector_bytes);
 }
@@ -350,17 +332,15 @@ static void program(struct loader_incoming *in) {
     in->work = LOADER_NO_WORK;
     if (!put(in, slot_at(in) + in->number * LOADER_BLOCK_BYTES + skip,
              in->block + skip, in->size - skip)) {
-        if (++in->failures > FAILURES_MAX) {
+        if (++in->failures > FAILURES_MAX)
             refuse(in, LOADER_WORN);
-        }
         return;
     }
     bytes_put32(mark, in->crc);
     (void)put(in, mark_at(in, in->number), mark, sizeof mark);
     set_held(in, in->number, true);
-    if (in->held == in->blocks) {
+    if (in->held == in->blocks)
         in->phase = LOADER_WHOLE;
-    }
 }
 
 /* A sector a step is erased, at most; then the block is programmed. */
@@ -394,9 +374,8 @@ void loader_incoming_verify(struct loader_incoming *incoming) {
 
 static void check(struct loader_incoming *in) {
     bool good = false;
-    if (!loader_look_slice(&in->look, in->slots, &good)) {
+    if (!loader_look_slice(&in->look, in->slots, &good))
         go_on(in, good ? LOADER_SEALS : LOADER_DROPS);
-    }
 }
 
 /* Programmed once more where it is there already: it may have been torn. */
@@ -418,9 +397,8 @@ static void seal(struct loader_incoming *in) {
  * there before, it is taken anew. */
 static void drop(struct loader_incoming *in) {
     uint32_t at = in->next++ == 0 ? slot_at(in) : journal_at(in, in->slot);
-    if (!clear(in, at) || in->next < 2) {
+    if (!clear(in, at) || in->next < 2)
         return;
-    }
     memset(in->map, 0, sizeof in->map);
     in->held = 0;
     if (in->inherited > 0) {
@@ -437,7 +415,6 @@ void loader_incoming_step(struct loader_incoming *incoming) {
         [LOADER_READIES] = ready, [LOADER_COUNTS] = count,
         [LOADER_WRITES] = write,  [LOADER_CHECKS] = check,
         [LOADER_SEALS] = seal,    [LOADER_DROPS] = drop};
-    if (incoming->work != LOADER_NO_WORK) {
+    if (incoming->work != LOADER_NO_WORK)
         works[incoming->work](incoming);
-    }
 }

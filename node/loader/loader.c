@@ -39,9 +39,8 @@ struct loader *loader_start(const struct node_board *board,
     memcpy(config.pipes, board->pipes, sizeof config.pipes);
     INCODE_ASSERT((uintptr_t)board->arena % NODE_ALIGNMENT == 0);
     *why = cube_config_fault(&config);
-    if (*why != NULL) {
+    if (*why != NULL)
         return NULL;
-    }
     size_t cube = node_aligned(cube_arena_bytes(&config));
     if (board->arena_bytes < own + cube) {
         *why = "the memory does not hold the links' windows";
@@ -77,9 +76,8 @@ static void take_ping(struct loader *l, const struct cube_message *message) {
 static void take_begin(struct loader *l, const struct cube_message *message) {
     struct loader_begin_message begin;
     unsigned self = l->board->identity.self;
-    if (message->size != sizeof begin) {
+    if (message->size != sizeof begin)
         return;
-    }
     memcpy(&begin, message->data, sizeof begin);
     if (begin.transfer != 0 && (begin.nodes[self / 8] >> self % 8 & 1) != 0) {
         l->transfer = begin.transfer;
@@ -89,9 +87,8 @@ static void take_begin(struct loader *l, const struct cube_message *message) {
 
 static void take_block(struct loader *l, const struct cube_message *message) {
     struct loader_block_message head;
-    if (message->size < sizeof head) {
+    if (message->size < sizeof head)
         return;
-    }
     memcpy(&head, message->data, sizeof head);
     if (head.transfer == l->transfer) {
         loader_incoming_block(
@@ -110,13 +107,11 @@ static void leave(struct loader *l) {
 
 static void take_order(struct loader *l, const struct cube_message *message) {
     struct loader_do_message order;
-    if (message->size != sizeof order) {
+    if (message->size != sizeof order)
         return;
-    }
     memcpy(&order, message->data, sizeof order);
-    if (order.transfer != 0 && order.transfer != l->transfer) {
+    if (order.transfer != 0 && order.transfer != l->transfer)
         return;
-    }
     switch (order.what) {
     case LOADER_VERIFY:
         loader_incoming_verify(&l->incoming);
@@ -125,9 +120,8 @@ static void take_order(struct loader *l, const struct cube_message *message) {
         leave(l);
         break;
     case LOADER_NAME:
-        if (order.transfer != 0 && loader_incoming_proved(&l->incoming)) {
+        if (order.transfer != 0 && loader_incoming_proved(&l->incoming))
             (void)loader_slots_name(l->slots->rules->flash, order.serial);
-        }
         break;
     default: /* of a later version */
         break;
@@ -164,11 +158,10 @@ static void serve_message(struct loader *l,
 }
 
 static void take_message(struct loader *l, const struct cube_message *message) {
-    if (node_answers_is_for(message)) {
+    if (node_answers_is_for(message))
         node_answers_take(&l->answers, message, l->now_us);
-    } else if (message->source == CUBE_HOST) {
+    else if (message->source == CUBE_HOST)
         serve_message(l, message);
-    }
     l->counted.received +=
         message->source == CUBE_HOST && message->type != NODE_STOP;
 }
@@ -209,9 +202,8 @@ static unsigned read_link(struct loader *l, unsigned d) {
 /* The host begins again with all nodes; what has come of the image stays. */
 static void follow_wiring(struct loader *l) {
     const struct cube_wiring *wiring = cube_wiring(l->cube);
-    if (wiring_together(wiring, &l->followed)) {
+    if (wiring_together(wiring, &l->followed))
         return;
-    }
     l->followed = *wiring;
     l->pinged = l->owes_pong = l->owes_state = l->owes_fault = false;
     l->counted.received = l->counted.sent = 0;
@@ -300,14 +292,12 @@ static size_t tell_log(void *context, char *text, size_t size) {
 static void send(struct loader *l) {
     const struct node_teller teller = {
         .context = l, .who = tell_who, .log = tell_log};
-    if (l->owes_fault) {
+    if (l->owes_fault)
         l->owes_fault = !send_fault(l);
-    } else if (l->owes_pong) {
+    else if (l->owes_pong)
         l->owes_pong = !send_pong(l);
-    }
-    if (l->owes_state) {
+    if (l->owes_state)
         l->owes_state = !send_state(l);
-    }
     (void)node_answers_send(&l->answers, &teller, l->now_us);
 }
 
@@ -329,18 +319,16 @@ enum node_event loader_step(struct loader *loader) {
     follow_wiring(l);
     bool news = node_looks_silent(&l->looks, l->now_us);
     l->owes_pong = l->owes_pong || (news && l->pinged);
-    for (unsigned d = 0; d < cube_links(l->cube); d++) {
+    for (unsigned d = 0; d < cube_links(l->cube); d++)
         moved += read_link(l, d);
-    }
     send(l);
     if (loader_incoming_busy(&l->incoming)) {
         loader_incoming_step(&l->incoming);
         moved++;
     }
     look_at_phase(l);
-    if (loader_reset_why(l) != NODE_RESET_OVER) {
+    if (loader_reset_why(l) != NODE_RESET_OVER)
         return NODE_STOPPED;
-    }
     return moved > 0 ? NODE_BUSY : NODE_IDLE;
 }
 

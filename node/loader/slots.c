@@ -67,9 +67,8 @@ bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial) {
     next.slot = (uint8_t)slot;
     next.trial = trial;
     next.tries = 0;
-    if (!write_state(slots->rules->flash, &next)) {
+    if (!write_state(slots->rules->flash, &next))
         return false;
-    }
     slots->state = next;
     return true;
 }
@@ -91,20 +90,16 @@ enum loader_fault loader_slots_suits(const struct loader_slots *slots,
                                      struct loader_image *image) {
     const struct loader_rules *rules = slots->rules;
     const struct loader_layout layout = loader_layout(rules->flash);
-    if (loader_image_unpack(image, header) != LOADER_GOOD) {
+    if (loader_image_unpack(image, header) != LOADER_GOOD)
         return LOADER_NO_IMAGE;
-    }
     if (layout.bytes < LOADER_HEADER_BYTES ||
         image->bytes > layout.bytes - LOADER_HEADER_BYTES ||
-        image->bytes > rules->room) {
+        image->bytes > rules->room)
         return LOADER_TOO_LARGE;
-    }
-    if (!same_name(image->board, rules->board)) {
+    if (!same_name(image->board, rules->board))
         return LOADER_WRONG_BOARD;
-    }
-    if (image->address != rules->address) {
+    if (image->address != rules->address)
         return LOADER_WRONG_ADDRESS;
-    }
     return image->number < slots->state.floor ? LOADER_TOO_OLD : LOADER_GOOD;
 }
 
@@ -117,9 +112,8 @@ uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot) {
 static bool is_good(struct loader_slots *slots, unsigned slot) {
     struct loader_look look;
     loader_look_begin(&look, slots, slot);
-    while (loader_look_step(&look, slots)) {
+    while (loader_look_step(&look, slots))
         loader_slots_alive(slots);
-    }
     return slots->fault[slot] == LOADER_GOOD;
 }
 
@@ -136,20 +130,17 @@ static void fall_back(struct loader_slots *slots) {
 unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly) {
     const struct loader_state *state = &slots->state;
     if (state->slot < LOADER_SLOTS && state->trial &&
-        (state->tries >= LOADER_TRIES || (ended_badly && state->tries > 0))) {
+        (state->tries >= LOADER_TRIES || (ended_badly && state->tries > 0)))
         fall_back(slots);
-    }
-    if (state->slot >= LOADER_SLOTS) {
+    if (state->slot >= LOADER_SLOTS)
         return LOADER_SLOTS;
-    }
     if (slots->known[state->slot] || is_good(slots, state->slot)) {
         return slots->fault[state->slot] == LOADER_GOOD ? state->slot
                                                         : LOADER_SLOTS;
     }
     unsigned other = 1u - state->slot;
-    if (is_good(slots, other) && loader_slots_use(slots, other, true)) {
+    if (is_good(slots, other) && loader_slots_use(slots, other, true))
         return other;
-    }
     return LOADER_SLOTS;
 }
 
@@ -183,16 +174,14 @@ bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
     uint8_t header[LOADER_HEADER_BYTES];
     struct loader_image image;
     *up = before;
-    if (slot >= LOADER_SLOTS || before.slot != slot) {
+    if (slot >= LOADER_SLOTS || before.slot != slot)
         return false; /* of an image that was not started from there */
-    }
     flash->read(flash->context, loader_slot_at(&layout, flash, slot), header,
                 sizeof header);
     up->trial = up->tries = 0;
     if (loader_image_unpack(&image, header) == LOADER_GOOD &&
-        (image.flags & LOADER_NO_WAY_BACK) != 0 && image.number > up->floor) {
+        (image.flags & LOADER_NO_WAY_BACK) != 0 && image.number > up->floor)
         up->floor = image.number;
-    }
     return up->trial != before.trial || up->floor != before.floor;
 }
 
@@ -204,9 +193,8 @@ bool loader_slots_confirm(const struct loader_flash *flash,
 bool loader_slots_lived(const struct loader_flash *flash, unsigned slot) {
     struct loader_state state = read_state(flash);
     if (slot >= LOADER_SLOTS || state.slot != slot || !state.trial ||
-        state.tries <= 1) {
+        state.tries <= 1)
         return true;
-    }
     state.tries = 1; /* this start: it may still end badly */
     return write_state(flash, &state);
 }
@@ -215,14 +203,11 @@ bool loader_slots_install(const struct loader_flash *flash,
                           const uint8_t *image, uint32_t bytes) {
     const struct loader_layout layout = loader_layout(flash);
     const struct loader_state state = {.slot = 0};
-    if (bytes > layout.bytes) {
+    if (bytes > layout.bytes)
         return false;
-    }
-    for (uint32_t s = 0; s < layout.sectors; s++) {
-        if (!flash->erase(flash->context, layout.first + s)) {
+    for (uint32_t s = 0; s < layout.sectors; s++)
+        if (!flash->erase(flash->context, layout.first + s))
             return false;
-        }
-    }
     return loader_flash_put(flash, loader_slot_at(&layout, flash, 0), image,
                             bytes) &&
            write_state(flash, &state);
@@ -232,11 +217,9 @@ bool loader_slots_install(const struct loader_flash *flash,
  */
 
 static bool blank(const uint8_t *bytes, uint32_t size) {
-    for (uint32_t i = 0; i < size; i++) {
-        if (bytes[i] != 0xff) {
+    for (uint32_t i = 0; i < size; i++)
+        if (bytes[i] != 0xff)
             return false;
-        }
-    }
     return true;
 }
 
@@ -251,12 +234,10 @@ static bool find_serial(const struct loader_flash *flash, uint32_t *at,
         flash->read(flash->context, i, record, SERIAL_BYTES);
         if (bytes_get32(record) == SERIAL_MARK &&
             bytes_get32(record + 4 + LOADER_SERIAL_BYTES) ==
-                frame_crc32c(0, record, 4 + LOADER_SERIAL_BYTES)) {
+                frame_crc32c(0, record, 4 + LOADER_SERIAL_BYTES))
             return true;
-        }
-        if (!blank(record, SERIAL_BYTES)) {
+        if (!blank(record, SERIAL_BYTES))
             *at = i + SERIAL_BYTES;
-        }
     }
     return false;
 }
@@ -267,9 +248,8 @@ bool loader_slots_serial(const struct loader_flash *flash,
     uint32_t at;
     bool found = find_serial(flash, &at, record);
     memset(serial, 0, LOADER_SERIAL_BYTES);
-    if (found) {
+    if (found)
         memcpy(serial, record + 4, LOADER_SERIAL_BYTES);
-    }
     return found;
 }
 
@@ -277,14 +257,12 @@ bool loader_slots_name(const struct loader_flash *flash,
                        const uint8_t serial[LOADER_SERIAL_BYTES]) {
     uint8_t record[SERIAL_BYTES];
     uint32_t at, end = (LOADER_SERIAL_SECTOR + 1) * flash->sector_bytes;
-    if (find_serial(flash, &at, record)) {
+    if (find_serial(flash, &at, record))
         return true;
-    }
     if (at == end) { /* torn ones alone, or what was there before */
         at = end - flash->sector_bytes;
-        if (!loader_flash_clear(flash, at)) {
+        if (!loader_flash_clear(flash, at))
             return false;
-        }
     }
     memset(record, 0xff, sizeof record);
     bytes_put32(record, SERIAL_MARK);
@@ -309,9 +287,8 @@ static uint32_t sum(const struct loader_budget *budget) {
 }
 
 void loader_budget_open(struct loader_budget *budget) {
-    if (budget->magic != MAGIC || budget->crc != sum(budget)) {
+    if (budget->magic != MAGIC || budget->crc != sum(budget))
         *budget = (struct loader_budget){.magic = MAGIC};
-    }
     budget->passed_s = 0;
     budget->crc = sum(budget);
 }
@@ -319,9 +296,8 @@ void loader_budget_open(struct loader_budget *budget) {
 void loader_budget_pass(struct loader_budget *budget, uint64_t now_us) {
     uint32_t now_s = (uint32_t)(now_us / 1000000);
     uint32_t passed_s = now_s - budget->passed_s;
-    if (passed_s == 0) {
+    if (passed_s == 0)
         return;
-    }
     budget->passed_s = now_s;
     for (unsigned i = 0; i < LOADER_EXPENSES; i++) {
         uint32_t *debt_s = &budget->debt_s[i];
@@ -338,9 +314,8 @@ bool loader_budget_has(const struct loader_budget *budget,
 
 bool loader_budget_take(struct loader_budget *budget,
                         enum loader_expense what) {
-    if (!loader_budget_has(budget, what)) {
+    if (!loader_budget_has(budget, what))
         return false;
-    }
     budget->debt_s[what] += limits[what].period_s;
     budget->crc = sum(budget);
     return true;
@@ -382,11 +357,9 @@ static uint32_t number_of(const struct loader_records *records,
 }
 
 static bool erased(const uint8_t *record, uint32_t bytes) {
-    for (uint32_t i = 0; i < bytes; i++) {
-        if (record[i] != 0xff) {
+    for (uint32_t i = 0; i < bytes; i++)
+        if (record[i] != 0xff)
             return false;
-        }
-    }
     return true;
 }
 
@@ -404,9 +377,8 @@ static struct sector look(const struct loader_records *records,
     for (uint32_t at = 0; at < flash->sector_bytes; at += apart) {
         flash->read(flash->context, begin_of(records, sector) + at, record,
                     records->bytes);
-        if (erased(record, records->bytes)) {
+        if (erased(record, records->bytes))
             continue;
-        }
         uint32_t number = number_of(records, record);
         found.end = at + apart;
         found.torn++;
@@ -465,9 +437,8 @@ static bool loader_records_append(const struct loader_records *records,
         if (end == flash->sector_bytes) {
             last = 1 - last;
             end = 0;
-            if (!flash->erase(flash->context, records->first + last)) {
+            if (!flash->erase(flash->context, records->first + last))
                 return false;
-            }
         }
         next++;
         if (put(records, begin_of(records, last) + end, body, next)) {

@@ -172,9 +172,8 @@ void loader_slots_open(struct loader_slots *slots,
                        const struct loader_rules *rules);
 
 static inline void loader_slots_alive(const struct loader_slots *slots) {
-    if (slots->rules->alive != NULL) {
+    if (slots->rules->alive != NULL)
         slots->rules->alive();
-    }
 }
 
 /* A board's start, before all else: counts it (boots.h), opens, and chooses.

@@ -12,11 +12,9 @@ void node_waves_init(struct node_waves *waves,
     memset(waves, 0, sizeof *waves);
     waves->counted = counted;
     waves->fault = fault;
-    for (unsigned d = 0; 1u << d < setup->nodes; d++) {
-        if ((counted->self & ((2u << d) - 1)) == 0) {
+    for (unsigned d = 0; 1u << d < setup->nodes; d++)
+        if ((counted->self & ((2u << d) - 1)) == 0)
             waves->children |= (uint16_t)(1u << d);
-        }
-    }
 }
 
 static void begin(struct node_waves *w, uint32_t number, uint8_t command) {
@@ -57,9 +55,8 @@ static void take_answer(struct node_waves *w,
                         const struct cube_message *message) {
     struct node_wave_answer_message answer = {.number = 0};
     uint32_t bit = message->source ^ w->counted->self;
-    if (message->size == sizeof answer) {
+    if (message->size == sizeof answer)
         memcpy(&answer, message->data, sizeof answer);
-    }
     if (message->size != sizeof answer || (bit & (bit - 1)) != 0 ||
         (w->to_answer & bit) == 0 || answer.number != w->number) {
         node_fault_set(w->fault, "an answer to wave # from node #", w->number,
@@ -76,9 +73,8 @@ static void take_answer(struct node_waves *w,
  * is for. */
 static bool node_waves_take(struct node_waves *waves,
                             const struct cube_message *message) {
-    if (message->type == NODE_WAVE) {
+    if (message->type == NODE_WAVE)
         return take_wave(waves, message);
-    }
     take_answer(waves, message);
     return false;
 }
@@ -155,9 +151,8 @@ unsigned node_waves_send(struct node_waves *waves,
     bool may_answer =
         w->command == NODE_WAVE_READY ? state->ready : state->quiet;
     *command = 0;
-    if (!w->open || w->to_answer != 0 || w->to_tell != 0 || !may_answer) {
+    if (!w->open || w->to_answer != 0 || w->to_tell != 0 || !may_answer)
         return sent;
-    }
     struct node_wave_answer_message answer = w->sum;
     answer.sent += state->sent;
     answer.received += state->received;
@@ -289,26 +284,23 @@ static void take_to_all(struct exchange *e,
     uint32_t page = node_lending_take_to_all(&e->lending, &t->requests.check,
                                              t->triangulator, message);
     if (page != INCODE_NONE &&
-        incode_triangulator_awaits(t->triangulator, page)) {
+        incode_triangulator_awaits(t->triangulator, page))
         node_requests_again(&t->requests, page, false);
-    }
     t->bytes_in += message->size;
 }
 
 /* What node 0 asks all nodes for. */
 static void follow(struct exchange *e, uint8_t command) {
-    if (command == NODE_WAVE_SEED) {
+    if (command == NODE_WAVE_SEED)
         incode_triangulator_seed(e->triangulation.triangulator);
-    }
 }
 
 /* Tetrahedra wait until what they may spill has room on its way to the host. */
 static bool exchange_may_take(void *self, const struct cube_message *message) {
     struct exchange *e = self;
     uint32_t count = message->size / sizeof(struct node_shared);
-    if (message->type != NODE_SHARE) {
+    if (message->type != NODE_SHARE)
         return true;
-    }
     e->holds =
         !incode_triangulator_may_take(e->triangulation.triangulator, count);
     return !e->holds;
@@ -323,9 +315,8 @@ static void exchange_message(void *self, const struct cube_message *message,
         break;
     case NODE_WAVE:
     case NODE_WAVE_ANSWER:
-        if (node_waves_take(&e->waves, message)) {
+        if (node_waves_take(&e->waves, message))
             follow(e, e->waves.command);
-        }
         break;
     case NODE_LOAN_ASK:
     case NODE_LOAN:
@@ -365,9 +356,8 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct exchange *e = context;
     struct incode_triangulator *t = e->triangulation.triangulator;
     uint64_t before = incode_triangulator_spent(t);
-    if (node_fault_is_set(e->fault)) {
+    if (node_fault_is_set(e->fault))
         return false;
-    }
     bool worked = use_found(e, units) ||
                   node_triangulation_step(&e->triangulation, units, spent) ||
                   node_loans_help(&e->loans, t, units);
@@ -379,9 +369,8 @@ static unsigned exchange_work(void *self, struct node_pace *pace) {
     struct exchange *e = self;
     e->waves.now_us = pace->begun_us;
     /* Not before all others can receive. */
-    if (!e->waves.begun) {
+    if (!e->waves.begun)
         return 0;
-    }
     unsigned worked = node_pace_work(pace, work_on, e);
     node_triangulation_close(&e->triangulation);
     return worked;
@@ -399,9 +388,8 @@ static unsigned exchange_send(void *self) {
     unsigned sent = node_shares_send(&e->shares) +
                     node_lending_send(&e->lending, t->triangulator) +
                     node_triangulation_send(&e->triangulation);
-    if (e->waves.begun && !node_fault_is_set(e->fault)) {
+    if (e->waves.begun && !node_fault_is_set(e->fault))
         sent += node_loans_send(&e->loans, t->triangulator);
-    }
     const struct node_waves_state state = {
         .ready = t->jobs.epoch != 0 && node_shares_ready(&e->shares),
         .quiet = is_quiet(e),
@@ -409,9 +397,8 @@ static unsigned exchange_send(void *self) {
         .received = e->received,
         .left = incode_triangulator_left(t->triangulator)};
     /* Jobs are given out when all nodes have their role. */
-    if (e->self == 0 && t->jobs.epoch != 0 && e->waves.number == 0) {
+    if (e->self == 0 && t->jobs.epoch != 0 && e->waves.number == 0)
         node_waves_begin(&e->waves);
-    }
     sent += node_waves_send(&e->waves, &state, &command);
     follow(e, command);
     return sent;

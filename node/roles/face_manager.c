@@ -41,9 +41,8 @@ bool node_face_manager_start(struct node_face_manager *f, void *memory,
                              struct node_counted *counted,
                              struct node_fault *fault) {
     size_t boxes = node_outlet_bytes(bytes);
-    if (!is_sound(setup, fault)) {
+    if (!is_sound(setup, fault))
         return false;
-    }
     if (bytes < boxes + incode_manager_min()) {
         node_fault_set(fault, "the node's memory does not hold a list of faces",
                        0, 0);
@@ -79,9 +78,8 @@ static void take_unspill(struct node_face_manager *f,
     if (node_outlet_take_unspill(&f->outlet, message->data, message->size,
                                  &header, faces) &&
         incode_manager_unspill(&f->manager, header.brick, faces, header.count,
-                               header.last != 0) != 0) {
+                               header.last != 0) != 0)
         node_outlet_refuse_unspill(&f->outlet, header.brick);
-    }
 }
 
 bool node_face_manager_message(struct node_face_manager *f,
@@ -91,15 +89,13 @@ bool node_face_manager_message(struct node_face_manager *f,
         take_job(f, message, now_us);
         return true;
     }
-    if (message->type != NODE_UNSPILL && message->type != NODE_CREDIT) {
+    if (message->type != NODE_UNSPILL && message->type != NODE_CREDIT)
         return false;
-    }
     f->bytes_in += message->size;
-    if (message->type == NODE_UNSPILL) {
+    if (message->type == NODE_UNSPILL)
         take_unspill(f, message);
-    } else {
+    else
         node_outlet_take_credit(&f->outlet, message->data, message->size);
-    }
     return true;
 }
 
@@ -110,9 +106,8 @@ static bool take_answers(struct node_face_manager *f) {
     size_t size;
     const void *data;
     if (!incode_manager_is_free(&f->manager) ||
-        (data = f->carrier.first(f->carrier.context, &size)) == NULL) {
+        (data = f->carrier.first(f->carrier.context, &size)) == NULL)
         return false;
-    }
     bool fits =
         size >= offsetof(struct incode_answers, v) && size <= sizeof answers;
     answers.count = 0;
@@ -150,15 +145,13 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct node_face_manager *f = context;
     uint64_t before = f->manager.spent;
     if (!f->jobs.working || f->drained || node_fault_is_set(f->fault) ||
-        !node_outlet_has_room(&f->outlet)) {
+        !node_outlet_has_room(&f->outlet))
         return false;
-    }
     bool moved = take_answers(f);
     enum incode_step step = incode_manager_step(&f->manager, units);
     moved = lend(f) || moved;
-    if (step == INCODE_BROKEN) {
+    if (step == INCODE_BROKEN)
         node_fault_set(f->fault, incode_manager_fault(&f->manager), 0, 0);
-    }
     f->drained = step == INCODE_FINISHED;
     *spent = (uint32_t)(f->manager.spent - before);
     return moved || step == INCODE_WORKED || f->drained;
@@ -167,9 +160,8 @@ static bool work_on(void *context, uint32_t units, uint32_t *spent) {
 unsigned node_face_manager_work(struct node_face_manager *f,
                                 struct node_pace *pace) {
     unsigned worked = node_pace_work(pace, work_on, f);
-    if (f->drained) {
+    if (f->drained)
         node_outlet_close(&f->outlet);
-    }
     return worked;
 }
 
@@ -233,9 +225,8 @@ struct manager {
 
 static unsigned count_builders(const struct node_setup_message *setup) {
     unsigned count = 0;
-    for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
+    for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++)
         count += node_is_builder(setup, i);
-    }
     return count;
 }
 
@@ -286,9 +277,8 @@ static bool manager_start(void *self, size_t bytes,
                           struct node_fault *fault) {
     struct manager *m = self;
     uint8_t *memory = (uint8_t *)self + node_aligned(sizeof *m);
-    if (!builders_fit(setup, counted->self, fault)) {
+    if (!builders_fit(setup, counted->self, fault))
         return false;
-    }
     uint32_t inbox = places(bytes, setup);
     size_t own = node_aligned(sizeof *m) + node_lists_bytes(inbox);
     if (bytes < own) {
@@ -299,11 +289,9 @@ static bool manager_start(void *self, size_t bytes,
     m->inbox_bytes = node_lists_bytes(inbox);
     node_lists_init(&m->lists, memory, inbox, NODE_LIST, setup->jobs_per_worker,
                     counted, fault);
-    for (unsigned i = 0; i < setup->nodes; i++) {
-        if (node_is_builder(setup, i)) {
+    for (unsigned i = 0; i < setup->nodes; i++)
+        if (node_is_builder(setup, i))
             node_lists_add(&m->lists, (uint16_t)i);
-        }
-    }
     const struct node_carrier carrier = node_lists_carrier(&m->lists);
     return node_face_manager_start(&m->faces, memory + m->inbox_bytes,
                                    bytes - own, setup, &carrier, counted,

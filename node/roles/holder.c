@@ -56,9 +56,8 @@ static bool holder_start(void *self, size_t bytes,
         node_fault_set(fault, "invalid setup: a holder among # holders", 0, 0);
         return false;
     }
-    if (!node_keepers_fit(setup, counted->self, true, fault)) {
+    if (!node_keepers_fit(setup, counted->self, true, fault))
         return false;
-    }
     memset(h, 0, sizeof *h);
     h->counted = counted;
     h->fault = fault;
@@ -109,9 +108,8 @@ static void take_request(struct holder *h, const struct cube_message *message) {
 static void take_page(struct holder *h, const struct cube_message *message) {
     struct node_page page;
     bool right = node_page_check_take(&h->check, message, &page);
-    if (page.number == INCODE_NONE) {
+    if (page.number == INCODE_NONE)
         return;
-    }
     struct frame *frame = frame_of(h, page.number);
     bool due = page.source == CUBE_HOST && frame->loading &&
                frame->message.head.page == page.number;
@@ -183,9 +181,8 @@ static unsigned send_pages(struct holder *h) {
  * goes to who waits for it first: otherwise two pages of one frame could
  * displace each other for ever. */
 static bool claim(struct holder *h, struct frame *frame, uint32_t page) {
-    if (frame->loading || frame->fresh) {
+    if (frame->loading || frame->fresh)
         return false;
-    }
     h->frames_used += frame->size == 0;
     frame->message.head.page = page;
     frame->size = 0;
@@ -198,18 +195,15 @@ static bool claim(struct holder *h, struct frame *frame, uint32_t page) {
  * the request is sure to leave. */
 static unsigned ask_host(struct holder *h) {
     uint32_t wanted[NODE_PAGES_A_REQUEST], count = 0;
-    if (cube_room(h->counted->cube, CUBE_HOST) == 0) {
+    if (cube_room(h->counted->cube, CUBE_HOST) == 0)
         return 0;
-    }
     for (uint32_t i = 0; i < h->queued && count < NODE_PAGES_A_REQUEST; i++) {
         struct frame *frame = frame_of(h, h->page[i]);
-        if (!holds(frame, h->page[i]) && claim(h, frame, h->page[i])) {
+        if (!holds(frame, h->page[i]) && claim(h, frame, h->page[i]))
             wanted[count++] = h->page[i];
-        }
     }
-    if (count == 0) {
+    if (count == 0)
         return 0;
-    }
     node_counted_put(h->counted, CUBE_HOST, NODE_PAGE_REQUEST, wanted,
                      count * sizeof wanted[0]);
     h->bytes_out += count * sizeof wanted[0];

@@ -50,21 +50,18 @@ void node_lending_to_all(struct node_lending *lending, uint32_t first) {
 /* The uniform grid's lists are the host's. */
 static uint16_t owner_of(const struct node_lending *l, uint32_t page) {
     uint32_t level = incode_tree_level(&l->tree, page);
-    if (level == l->tree.levels) {
+    if (level == l->tree.levels)
         return CUBE_HOST;
-    }
     uint64_t brick = page - l->tree.base[level];
-    for (uint32_t i = 0; i < level; i++) {
+    for (uint32_t i = 0; i < level; i++)
         brick *= INCODE_FANOUT;
-    }
     return node_shares_owner(l->shares, (uint32_t)brick);
 }
 
 uint16_t node_lending_keeper(const struct node_lending *lending,
                              uint32_t page) {
-    if (page >= lending->to_all && page < lending->next) {
+    if (page >= lending->to_all && page < lending->next)
         return NODE_LENDING_COMES;
-    }
     uint16_t owner = owner_of(lending, page);
     return owner == lending->counted->self ? CUBE_HOST : owner;
 }
@@ -78,18 +75,16 @@ uint32_t node_lending_room(const struct node_lending *lending,
 
 void node_lending_asked(struct node_lending *lending, uint16_t keeper,
                         uint32_t pages) {
-    if (keeper != CUBE_HOST) {
+    if (keeper != CUBE_HOST)
         lending->asked[keeper] = (uint8_t)(lending->asked[keeper] + pages);
-    }
 }
 
 void node_lending_came(struct node_lending *lending, uint32_t page) {
     uint16_t keeper = page < lending->tree.pages ? owner_of(lending, page)
                                                  : lending->counted->self;
     if (keeper != CUBE_HOST && keeper != lending->counted->self &&
-        lending->asked[keeper] > 0) {
+        lending->asked[keeper] > 0)
         lending->asked[keeper]--;
-    }
 }
 
 /* ---- what others ask for ---- */
@@ -132,13 +127,11 @@ uint32_t node_lending_take_to_all(struct node_lending *lending,
         node_fault_set(l->fault, "page # to all, expected the one below #",
                        page.number, l->next);
     }
-    if (node_fault_is_set(l->fault) || l->next == l->to_all) {
+    if (node_fault_is_set(l->fault) || l->next == l->to_all)
         return INCODE_NONE;
-    }
     l->next--;
-    if (!right) {
+    if (!right)
         return l->next;
-    }
     if (incode_triangulator_put(triangulator, page.number, page.bytes,
                                 page.size) != 0) {
         node_fault_set(l->fault,
@@ -147,9 +140,8 @@ uint32_t node_lending_take_to_all(struct node_lending *lending,
         return INCODE_NONE;
     }
     uint64_t *label = incode_triangulator_label(triangulator, page.number);
-    if (label != NULL) {
+    if (label != NULL)
         *label = page.tag;
-    }
     return INCODE_NONE;
 }
 
@@ -163,9 +155,8 @@ static bool lend(struct node_lending *l, struct incode_triangulator *t,
                  const struct node_lent *lent) {
     struct node_page_message body;
     uint16_t to = (uint16_t)lent->node;
-    if (cube_room(l->counted->cube, to) == 0) {
+    if (cube_room(l->counted->cube, to) == 0)
         return false;
-    }
     body.head.page = lent->page;
     size_t size =
         sizeof body.head + incode_triangulator_copy(t, lent->page, body.data);
@@ -181,9 +172,8 @@ static bool lend(struct node_lending *l, struct incode_triangulator *t,
 static bool pass(struct node_lending *l, const struct node_lent *lent) {
     const uint32_t words[2] = {lent->node, lent->page};
     if (node_counted_write(l->counted, CUBE_HOST, NODE_PAGE_PASSED, words,
-                           sizeof words) != 0) {
+                           sizeof words) != 0)
         return false;
-    }
     l->bytes_out += sizeof words;
     l->passed++;
     return true;

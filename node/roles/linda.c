@@ -28,9 +28,8 @@ static size_t linda_builder_arena_min(size_t memory,
 static bool build(void *self, struct tuple *tuple) {
     struct linda_builder *b = self;
     b->runs = !b->share.ended;
-    if (b->runs) {
+    if (b->runs)
         return false;
-    }
     b->share.ended = false;
     tuple->field[1] = TUPLE_UINT32(b->share.taken);
     b->share.taken = 0; /* the next process counts its own */
@@ -54,9 +53,8 @@ static bool linda_builder_start(void *self, size_t bytes,
     }
     memset(b, 0, sizeof *b);
     b->share_bytes = share;
-    if (!node_share_init(&b->share, memory, setup, build, b, counted, fault)) {
+    if (!node_share_init(&b->share, memory, setup, build, b, counted, fault))
         return false;
-    }
     const struct node_carrier carrier =
         node_share_carrier(&b->share, NODE_SHARE_RESULT, NODE_SHARE_JOB, 1);
     return node_tetra_builder_start(&b->tetra, memory + share, bytes - own,
@@ -195,9 +193,8 @@ static bool linda_manager_start(void *self, size_t bytes,
     m->share_bytes = share;
     m->worker = -1;
     if (!node_share_init(&m->share, memory, setup, no_process, m, counted,
-                         fault)) {
+                         fault))
         return false;
-    }
     m->workers = m->share.places - 1u;
     if (setup->manager != counted->self || m->workers == 0) {
         node_fault_set(fault, "invalid setup: face manager # has # builders",
@@ -396,13 +393,12 @@ static void take_out(struct linda_worker *w,
 static void linda_worker_message(void *self, const struct cube_message *message,
                                  uint64_t now_us) {
     struct linda_worker *w = self;
-    if (message->type == NODE_TUPLES) {
+    if (message->type == NODE_TUPLES)
         node_share_take(&w->share, message);
-    } else if (message->type == NODE_OUT) {
+    else if (message->type == NODE_OUT)
         take_out(w, message);
-    } else {
+    else
         node_worker_role.message(w->worker, message, now_us);
-    }
 }
 
 static bool put_regions(struct linda_worker *w) {
@@ -419,9 +415,8 @@ static bool take_region(struct linda_worker *w) {
     struct incode_job job;
     if (w->busy || tuples_room(w->share.space) < 2 ||
         !node_share_in_bytes(&w->share, NODE_SHARE_REGION, &w->region, &job,
-                             sizeof job)) {
+                             sizeof job))
         return false;
-    }
     const struct node_taken taken = {w->counted->self, job.first, job.last};
     w->busy = true;
     bool put =
@@ -435,9 +430,8 @@ static bool tell(struct linda_worker *w) {
     struct node_taken_message message;
     if (cube_room(w->counted->cube, CUBE_HOST) == 0 ||
         !node_share_in_bytes(&w->share, NODE_SHARE_TAKEN, &w->taken,
-                             &message.taken, sizeof message.taken)) {
+                             &message.taken, sizeof message.taken))
         return false;
-    }
     message.header.epoch = 0;
     message.header.sent = w->counted->sent;
     return node_counted_write(w->counted, CUBE_HOST, NODE_TAKEN, &message,
@@ -452,9 +446,8 @@ static unsigned linda_worker_work(void *self, struct node_pace *pace) {
         moved += put_regions(w);
         moved += tell(w);
     }
-    if (w->runs) {
+    if (w->runs)
         moved += take_region(w);
-    }
     return moved + node_worker_role.work(w->worker, pace);
 }
 

@@ -33,9 +33,8 @@ void node_lists_add(struct node_lists *lists, uint16_t peer) {
  * none may have one more. */
 static uint32_t idlest(const struct node_lists *l) {
     uint32_t best = NODE_BUILDERS_MAX, least = l->each_max;
-    if (l->out + l->inbox.used >= l->inbox.slot_count) {
+    if (l->out + l->inbox.used >= l->inbox.slot_count)
         return best;
-    }
     for (uint32_t k = 0; k < l->peers && least > 0; k++) {
         uint32_t i =
             l->next + k < l->peers ? l->next + k : l->next + k - l->peers;
@@ -49,9 +48,8 @@ static uint32_t idlest(const struct node_lists *l) {
 
 static bool has_room(void *context) {
     struct node_lists *l = context;
-    if (l->sends == NODE_ANSWERS) {
+    if (l->sends == NODE_ANSWERS)
         return cube_room(l->counted->cube, l->peer[0]) > 0;
-    }
     return idlest(l) < NODE_BUILDERS_MAX;
 }
 
@@ -71,9 +69,8 @@ static void send(void *context, const void *data, size_t size) {
 static const void *first(void *context, size_t *size) {
     const struct node_lists *l = context;
     const struct node_outbox_slot *slot = node_outbox_first(&l->inbox);
-    if (slot == NULL) {
+    if (slot == NULL)
         return NULL;
-    }
     *size = slot->size;
     return slot->data;
 }
@@ -91,9 +88,8 @@ struct node_carrier node_lists_carrier(struct node_lists *lists) {
 
 static uint32_t find(const struct node_lists *l, uint16_t peer) {
     uint32_t i = 0;
-    while (i < l->peers && l->peer[i] != peer) {
+    while (i < l->peers && l->peer[i] != peer)
         i++;
-    }
     return i;
 }
 
@@ -101,9 +97,8 @@ static uint32_t find(const struct node_lists *l, uint16_t peer) {
 static bool is_whole(const struct node_lists *l,
                      const struct cube_message *message) {
     uint32_t head[2];
-    if (message->size < sizeof head) {
+    if (message->size < sizeof head)
         return false;
-    }
     memcpy(head, message->data, sizeof head);
     return head[1] <= INCODE_LIST_MAX &&
            message->size == (l->sends == NODE_LIST
@@ -149,11 +144,9 @@ void node_lists_take(struct node_lists *lists,
 }
 
 uint16_t node_lists_owing(const struct node_lists *lists) {
-    for (uint32_t i = 0; i < lists->peers; i++) {
-        if (lists->owed[i] > 0) {
+    for (uint32_t i = 0; i < lists->peers; i++)
+        if (lists->owed[i] > 0)
             return lists->peer[i];
-        }
-    }
     return CUBE_HOST;
 }
 

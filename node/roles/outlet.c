@@ -107,16 +107,13 @@ static void outside_emit(void *context, uint32_t vertex,
                          const uint32_t (*apexes)[3], size_t count) {
     struct node_outlet *o = context;
     while (count > 0 && !overrun(o)) {
-        if (!o->open) {
+        if (!o->open)
             open_batch(o);
-        }
         size_t written = 0;
-        if (node_result_finder(&o->writer, o->finder)) {
+        if (node_result_finder(&o->writer, o->finder))
             written = node_result_star(&o->writer, vertex, apexes, count);
-        }
-        if (written < count) {
+        if (written < count)
             close_batch(o);
-        }
         apexes += written;
         count -= written;
     }
@@ -125,12 +122,10 @@ static void outside_emit(void *context, uint32_t vertex,
 static void outside_commit(void *context, uint32_t brick) {
     struct node_outlet *o = context;
     while (!overrun(o)) {
-        if (!o->open) {
+        if (!o->open)
             open_batch(o);
-        }
-        if (node_result_commit(&o->writer, brick)) {
+        if (node_result_commit(&o->writer, brick))
             return;
-        }
         close_batch(o);
     }
 }
@@ -157,29 +152,25 @@ static size_t spill_room(const struct node_outlet *o) {
 static bool outside_spill(void *context, const struct incode_face *faces,
                           size_t count) {
     struct node_outlet *o = context;
-    if (spill_room(o) < count) {
+    if (spill_room(o) < count)
         (void)node_outlet_send(o);
-    }
-    if (spill_room(o) < count) {
+    if (spill_room(o) < count)
         return false;
-    }
     for (size_t i = 0; i < count; i++) {
         uint8_t *data = node_outbox_open(&o->spills);
         memcpy(data + sizeof(struct node_spill_header) +
                    o->spill_count * sizeof *faces,
                &faces[i], sizeof *faces);
-        if (++o->spill_count == NODE_FACES_A_MESSAGE) {
+        if (++o->spill_count == NODE_FACES_A_MESSAGE)
             close_spill(o);
-        }
     }
     return true;
 }
 
 static bool outside_unspill(void *context, uint32_t brick) {
     struct node_outlet *o = context;
-    if (node_outbox_free(&o->spills) < 2) {
+    if (node_outbox_free(&o->spills) < 2)
         return false;
-    }
     close_spill(o); /* what was spilled before is part of the list */
     struct node_spill_header header = {o->epoch, brick, 0, 0, 0};
     memcpy(node_outbox_open(&o->spills), &header, sizeof header);
@@ -218,9 +209,8 @@ bool node_outlet_take_unspill(struct node_outlet *o, const uint8_t *data,
                        (uint32_t)size);
         return false;
     }
-    if (header->epoch != o->epoch || header->sent != o->counted->received) {
+    if (header->epoch != o->epoch || header->sent != o->counted->received)
         return false;
-    }
     memcpy(faces, data + sizeof *header, header->count * sizeof faces[0]);
     return true;
 }
@@ -252,9 +242,8 @@ void node_outlet_take_credit(struct node_outlet *o, const uint8_t *data,
 /* Sends the first message of an outbox; false where the link has no room. */
 static bool send_first(struct node_outlet *o, struct node_outbox *box) {
     struct node_outbox_slot *slot = node_outbox_first(box);
-    if (slot == NULL) {
+    if (slot == NULL)
         return false;
-    }
     if (slot->type != NODE_SPILL) {
         size_t at = slot->type == NODE_RESULT
                         ? offsetof(struct node_result_header, sent)
@@ -262,9 +251,8 @@ static bool send_first(struct node_outlet *o, struct node_outbox *box) {
         memcpy(slot->data + at, &o->counted->sent, sizeof o->counted->sent);
     }
     if (node_counted_write(o->counted, CUBE_HOST, slot->type, slot->data,
-                           slot->size) != 0) {
+                           slot->size) != 0)
         return false;
-    }
     o->bytes_out += slot->size;
     node_outbox_drop(box);
     return true;
@@ -280,12 +268,10 @@ bool node_outlet_few(const struct node_outlet *outlet) {
 unsigned node_outlet_send(struct node_outlet *outlet) {
     struct node_outlet *o = outlet;
     unsigned sent = 0;
-    if (o->spills.used == 0) {
+    if (o->spills.used == 0)
         close_spill(o);
-    }
-    while (send_first(o, &o->spills)) {
+    while (send_first(o, &o->spills))
         sent++;
-    }
     while ((int32_t)(o->credit - o->sent) > 0 && send_first(o, &o->results)) {
         o->sent++;
         sent++;

@@ -43,22 +43,18 @@ static bool send_batch(struct node_requests *r, uint32_t i) {
     uint32_t count = 0, left = i;
     uint16_t to = keeper_of(r, r->wanted[i]);
     uint32_t most = room_at(r, to);
-    if (most == 0) {
+    if (most == 0)
         return false;
-    }
     most = most < NODE_PAGES_A_REQUEST ? most : NODE_PAGES_A_REQUEST;
-    for (; i < r->wanted_count; i++) {
-        if (count < most && keeper_of(r, r->wanted[i]) == to) {
+    for (; i < r->wanted_count; i++)
+        if (count < most && keeper_of(r, r->wanted[i]) == to)
             batch[count++] = r->wanted[i] & ~OF_HOST;
-        } else {
+        else
             r->wanted[left++] = r->wanted[i];
-        }
-    }
     r->wanted_count = left;
     r->in_flight += count;
-    if (r->lending != NULL) {
+    if (r->lending != NULL)
         node_lending_asked(r->lending, to, count);
-    }
     node_counted_put(r->counted, to, NODE_PAGE_REQUEST, batch,
                      count * sizeof batch[0]);
     r->bytes_out += count * sizeof batch[0];
@@ -68,24 +64,20 @@ static bool send_batch(struct node_requests *r, uint32_t i) {
 /* Sends for wanted pages, a message or more for each node that has some. */
 static void send_wanted(struct node_requests *r) {
     uint32_t i = 0;
-    while (i < r->wanted_count) {
+    while (i < r->wanted_count)
         i += !send_batch(r, i);
-    }
 }
 
 static bool outside_request(void *context, uint32_t page) {
     struct node_requests *r = context;
     if (r->lending != NULL &&
-        node_lending_keeper(r->lending, page) == NODE_LENDING_COMES) {
+        node_lending_keeper(r->lending, page) == NODE_LENDING_COMES)
         return true;
-    }
-    if (r->wanted_count >= NODE_WANTED_MAX) {
+    if (r->wanted_count >= NODE_WANTED_MAX)
         send_wanted(r);
-    }
     if (r->wanted_count >= NODE_WANTED_MAX ||
-        r->wanted_count + r->in_flight >= NODE_PAGES_IN_FLIGHT_MAX) {
+        r->wanted_count + r->in_flight >= NODE_PAGES_IN_FLIGHT_MAX)
         return false;
-    }
     r->wanted[r->wanted_count++] = page;
     return true;
 }
@@ -98,11 +90,10 @@ struct incode_page_source node_requests_source(struct node_requests *requests) {
  * another node's copies of it were altered twice. */
 static void refuse(struct node_requests *r, const struct node_page *page,
                    const char *words) {
-    if (page->source != CUBE_HOST) {
+    if (page->source != CUBE_HOST)
         node_page_check_report(&r->check, page->source, page->number);
-    } else if (!r->altered) {
+    else if (!r->altered)
         node_fault_set(r->fault, words, page->number, (uint32_t)page->size);
-    }
 }
 
 bool node_requests_take(struct node_requests *requests,
@@ -113,9 +104,8 @@ bool node_requests_take(struct node_requests *requests,
     bool due = page->number != INCODE_NONE && r->in_flight > 0 &&
                (page->source == CUBE_HOST ||
                 keeper_of(r, page->number & ~OF_HOST) == page->source);
-    if (right && !due) {
+    if (right && !due)
         refuse(r, page, "page # was not requested");
-    }
     r->altered = r->altered || !right;
     page->number = due ? page->number : INCODE_NONE;
     return right && due;
@@ -129,9 +119,8 @@ void node_requests_judge(struct node_requests *requests, int status,
         return;
     }
     r->in_flight--;
-    if (r->lending != NULL) {
+    if (r->lending != NULL)
         node_lending_came(r->lending, page->number);
-    }
     if (status != 0) {
         node_fault_set(r->fault,
                        "content of page # in # bytes is out of its limits",

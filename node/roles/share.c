@@ -26,9 +26,8 @@ static uint16_t find_places(const struct node_setup_message *setup,
     uint16_t places = 0;
     for (unsigned i = 0; i < NODE_BUILDERS_MAX + 1; i++) {
         if (is_place(setup, i)) {
-            if (node_of != NULL) {
+            if (node_of != NULL)
                 node_of[places] = (uint16_t)i;
-            }
             places++;
         }
     }
@@ -40,11 +39,10 @@ static uint16_t place_of(const struct node_share *s, uint16_t node) {
     uint16_t first = 0, last = s->places;
     while (first < last) {
         uint16_t middle = (uint16_t)((first + last) / 2);
-        if (s->node_of[middle] < node) {
+        if (s->node_of[middle] < node)
             first = (uint16_t)(middle + 1);
-        } else {
+        else
             last = middle;
-        }
     }
     return first < s->places && s->node_of[first] == node ? first : s->places;
 }
@@ -97,9 +95,8 @@ static struct tuples_config configure(const struct node_setup_message *setup,
                 ? wanted
                 : NODE_SHARE_STORE_MAX / record;
     config.store_bytes = record;
-    if (store) {
+    if (store)
         config.store_bytes += *jobs * record + WORKERS_EACH * workers * 32;
-    }
     return config;
 }
 
@@ -111,9 +108,8 @@ static bool is_sound(const struct node_setup_message *setup) {
 
 size_t node_share_bytes(const struct node_setup_message *setup) {
     uint32_t jobs;
-    if (!is_sound(setup)) {
+    if (!is_sound(setup))
         return 0;
-    }
     struct tuples_config config =
         configure(setup, find_places(setup, NULL), true, &jobs);
     return node_aligned(tuples_arena_bytes(&config));
@@ -144,9 +140,8 @@ bool node_share_init(struct node_share *share, void *memory,
     s->fault = fault;
     s->process = process;
     s->role = role;
-    for (unsigned i = 0; i < NODE_SHARE_TAKES_MAX; i++) {
+    for (unsigned i = 0; i < NODE_SHARE_TAKES_MAX; i++)
         s->taking[i] = -1;
-    }
     s->places = find_places(setup, s->node_of);
     uint16_t self = place_of(s, counted->self);
     if (!is_sound(setup) || s->node_of[s->places - 1] >= setup->nodes ||
@@ -223,9 +218,8 @@ bool node_share_end_all(struct node_share *share, uint32_t *count,
 /* Whether the tuple has come that is asked for, or is from now on. */
 static bool has_come(struct node_share *s, int *operation,
                      const struct tuple *pattern, struct tuple *tuple) {
-    if (*operation < 0) {
+    if (*operation < 0)
         *operation = tuples_in(s->space, pattern);
-    }
     return *operation >= 0 &&
            tuples_poll(s->space, *operation, tuple) == TUPLES_DONE;
 }
@@ -239,9 +233,8 @@ bool node_share_in_worker(struct node_share *share, int *operation) {
     struct tuple tuple, pattern = tuple_of(share, NODE_SHARE_WORKER,
                                            TUPLE_FORMAL(TUPLE_TYPE_UINT32));
     bool came = has_come(share, operation, &pattern, &tuple);
-    if (came) {
+    if (came)
         close(share, operation);
-    }
     return came;
 }
 
@@ -249,9 +242,8 @@ bool node_share_in_bytes(struct node_share *share, enum node_share_kind kind,
                          int *operation, void *into, size_t size) {
     struct tuple tuple,
         pattern = tuple_of(share, kind, TUPLE_FORMAL(TUPLE_TYPE_BYTES));
-    if (!has_come(share, operation, &pattern, &tuple)) {
+    if (!has_come(share, operation, &pattern, &tuple))
         return false;
-    }
     bool whole = tuple.field[1].size == size;
     if (whole) {
         memcpy(into, tuple.field[1].as.bytes, size);
@@ -267,9 +259,8 @@ bool node_share_out_bytes(struct node_share *share, enum node_share_kind kind,
                           const void *data, size_t size) {
     struct tuple tuple = tuple_of(share, kind, TUPLE_BYTES(data, size));
     int put = tuples_out(share->space, &tuple);
-    if (put >= 0) {
+    if (put >= 0)
         tuples_close(share->space, put);
-    }
     return put >= 0;
 }
 
@@ -279,15 +270,12 @@ uint16_t node_share_owing(const struct node_share *share) {
     uint16_t owing = CUBE_HOST;
     for (uint16_t i = 0; i < share->places; i++) {
         struct tuples_account account = tuples_account(share->space, i);
-        if (share->node_of[i] == share->counted->self) {
+        if (share->node_of[i] == share->counted->self)
             continue;
-        }
-        if (tuples_due(share->space, i) > 0) {
+        if (tuples_due(share->space, i) > 0)
             return share->node_of[i];
-        }
-        if (owing == CUBE_HOST && account.taken != account.put) {
+        if (owing == CUBE_HOST && account.taken != account.put)
             owing = share->node_of[i];
-        }
     }
     return owing;
 }
@@ -322,27 +310,23 @@ static void drop(void *context) {
 static void ask(struct node_share *s) {
     struct tuple pattern =
         tuple_of(s, s->takes, TUPLE_FORMAL(TUPLE_TYPE_BYTES));
-    for (uint32_t i = 0; i < s->takes_max; i++) {
-        if (s->taking[i] < 0) {
+    for (uint32_t i = 0; i < s->takes_max; i++)
+        if (s->taking[i] < 0)
             s->taking[i] = tuples_in(s->space, &pattern);
-        }
-    }
 }
 
 static const void *first(void *context, size_t *size) {
     struct node_share *s = context;
     struct tuple tuple;
     uint32_t looked = 0;
-    if (s->ended) {
+    if (s->ended)
         return NULL;
-    }
     ask(s);
     while (s->taking[s->next] < 0 ||
            tuples_poll(s->space, s->taking[s->next], &tuple) != TUPLES_DONE) {
         s->next = (s->next + 1) % s->takes_max;
-        if (++looked == s->takes_max) {
+        if (++looked == s->takes_max)
             return NULL;
-        }
     }
     *size = tuple.field[1].size;
     if (*size == 0 && s->takes == NODE_SHARE_JOB) { /* EndMessage */

@@ -27,9 +27,8 @@ void node_shares_init(struct node_shares *shares, void *memory,
     shares->batch =
         (struct node_share_batch *)(void *)((uint8_t *)memory +
                                             table_bytes(setup->nodes));
-    for (uint32_t i = 0; i < NODE_SHARE_BATCHES; i++) {
+    for (uint32_t i = 0; i < NODE_SHARE_BATCHES; i++)
         shares->batch[i].count = 0;
-    }
 }
 
 /* ---- regions ---- */
@@ -37,23 +36,20 @@ void node_shares_init(struct node_shares *shares, void *memory,
 bool node_shares_regions(struct node_shares *shares, const uint8_t *data,
                          size_t size) {
     struct node_regions_message regions;
-    if (size < sizeof regions) {
+    if (size < sizeof regions)
         return false;
-    }
     memcpy(&regions, data, sizeof regions);
     size -= sizeof regions;
     if (regions.first != shares->known ||
         regions.count > shares->nodes + 1 - shares->known ||
-        size != regions.count * sizeof *shares->first) {
+        size != regions.count * sizeof *shares->first)
         return false;
-    }
     memcpy(shares->first + shares->known, data + sizeof regions, size);
     for (uint32_t i = 0; i < regions.count; i++, shares->known++) {
         uint32_t before =
             shares->known == 0 ? 0 : shares->first[shares->known - 1];
-        if (shares->first[shares->known] < before) {
+        if (shares->first[shares->known] < before)
             return false;
-        }
     }
     return true;
 }
@@ -68,11 +64,10 @@ uint16_t node_shares_owner(const struct node_shares *shares, uint32_t brick) {
     uint32_t low = 0, high = shares->nodes;
     while (high - low > 1) {
         uint32_t middle = low + (high - low) / 2;
-        if (shares->first[middle] <= brick) {
+        if (shares->first[middle] <= brick)
             low = middle;
-        } else {
+        else
             high = middle;
-        }
     }
     return (uint16_t)low;
 }
@@ -87,9 +82,8 @@ static size_t shares_room(void *context) {
     const struct node_shares *s = context;
     size_t free = NODE_SHARE_BATCHES - s->used, others = s->nodes - 1;
     size_t told = others < OTHERS_MAX ? others : (size_t)OTHERS_MAX;
-    if (told == 0) {
+    if (told == 0)
         return (size_t)NODE_SHARE_BATCHES * EACH;
-    }
     size_t room = free / told;
     if (free > others) {
         size_t whole = (free * EACH - others * (EACH - 1)) / told;
@@ -106,9 +100,8 @@ static void tell(struct node_shares *s, uint16_t to, const uint32_t v[4]) {
             batch = b;
             break;
         }
-        if (b->count == 0 && batch == NULL) {
+        if (b->count == 0 && batch == NULL)
             batch = b;
-        }
     }
     INCODE_ASSERT(batch != NULL); /* it was asked for room */
     if (batch->count == 0) {
@@ -126,9 +119,8 @@ static void shares_share(void *context, const uint32_t v[4]) {
     for (unsigned i = 0; i < 4 && v[i] != INCODE_NONE; i++) {
         uint16_t owner = node_shares_owner(s, v[i] / INCODE_BRICK_POINTS);
         bool again = owner == s->counted->self;
-        for (unsigned k = 0; k < told; k++) {
+        for (unsigned k = 0; k < told; k++)
             again = again || to[k] == owner;
-        }
         if (!again) {
             to[told++] = owner;
             tell(s, owner, v);
@@ -148,9 +140,8 @@ unsigned node_shares_send(struct node_shares *shares) {
         size_t size = b->count * sizeof b->share[0];
         if (b->count == 0 ||
             node_counted_write(shares->counted, b->to, NODE_SHARE, b->share,
-                               size) != 0) {
+                               size) != 0)
             continue;
-        }
         shares->bytes_out += size;
         b->count = 0;
         shares->used--;

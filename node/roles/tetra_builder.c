@@ -37,9 +37,8 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
                               struct node_counted *counted,
                               struct node_fault *fault) {
     if (!is_sound(setup, fault) ||
-        !node_keepers_fit(setup, counted->self, false, fault)) {
+        !node_keepers_fit(setup, counted->self, false, fault))
         return false;
-    }
     if (bytes < node_tetra_builder_min(setup)) {
         node_fault_set(fault, "the node's memory is too small for a builder", 0,
                        0);
@@ -60,9 +59,8 @@ bool node_tetra_builder_message(struct node_tetra_builder *t,
                                 const struct cube_message *message) {
     struct incode_maker *maker = &t->builder.maker;
     struct node_page page;
-    if (message->type != NODE_PAGE) {
+    if (message->type != NODE_PAGE)
         return message->type == NODE_CREDIT;
-    }
     t->bytes_in += message->size;
     if (node_requests_take(&t->requests, message, &page)) {
         int status =
@@ -82,9 +80,8 @@ static bool take_list(struct node_tetra_builder *t) {
     size_t size;
     const void *data;
     if (incode_builder_held(&t->builder) == t->builder.lists ||
-        (data = t->carrier.first(t->carrier.context, &size)) == NULL) {
+        (data = t->carrier.first(t->carrier.context, &size)) == NULL)
         return false;
-    }
     bool fits = size >= offsetof(struct incode_list, v) && size <= sizeof list;
     list.count = 0;
     memcpy(&list, data, fits ? size : 0);
@@ -99,9 +96,8 @@ static bool take_list(struct node_tetra_builder *t) {
 
 static bool send_answers(struct node_tetra_builder *t) {
     const struct incode_answers *answers = incode_builder_answers(&t->builder);
-    if (answers == NULL || !t->carrier.has_room(t->carrier.context)) {
+    if (answers == NULL || !t->carrier.has_room(t->carrier.context))
         return false;
-    }
     t->carrier.send(t->carrier.context, answers,
                     incode_answers_bytes(answers->count));
     incode_builder_drop(&t->builder);
@@ -111,15 +107,13 @@ static bool send_answers(struct node_tetra_builder *t) {
 static bool work_on(void *context, uint32_t units, uint32_t *spent) {
     struct node_tetra_builder *t = context;
     uint64_t before = t->builder.spent;
-    if (node_fault_is_set(t->fault)) {
+    if (node_fault_is_set(t->fault))
         return false;
-    }
     bool moved = take_list(t);
     enum incode_step step = incode_builder_step(&t->builder, units);
     moved = send_answers(t) || moved;
-    if (step == INCODE_BROKEN) {
+    if (step == INCODE_BROKEN)
         node_fault_set(t->fault, incode_builder_fault(&t->builder), 0, 0);
-    }
     *spent = (uint32_t)(t->builder.spent - before);
     return moved || step == INCODE_WORKED;
 }

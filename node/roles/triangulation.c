@@ -58,9 +58,8 @@ bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
                        jobs->epoch);
         return false;
     }
-    if (!job_is_sound(jobs, &given)) {
+    if (!job_is_sound(jobs, &given))
         return false;
-    }
     jobs->epoch = given.epoch;
     jobs->working = true;
     jobs->start_us = now_us;
@@ -101,9 +100,8 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
                        0);
         return false;
     }
-    if (!node_keepers_fit(setup, counted->self, false, fault)) {
+    if (!node_keepers_fit(setup, counted->self, false, fault))
         return false;
-    }
     memset(t, 0, sizeof *t);
     t->fault = fault;
     t->before = before;
@@ -118,24 +116,21 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
         .pause = counted->pause};
     t->triangulator = incode_triangulator_init(memory + before, bytes - before,
                                                &setup->setup, &outside, &why);
-    if (t->triangulator == NULL) {
+    if (t->triangulator == NULL)
         node_fault_set(fault, why, 0, 0);
-    }
     return t->triangulator != NULL;
 }
 
 static void take_job(struct node_triangulation *t,
                      const struct cube_message *message, uint64_t now_us) {
     struct incode_job job;
-    if (!node_jobs_take(&t->jobs, message, now_us, &job)) {
+    if (!node_jobs_take(&t->jobs, message, now_us, &job))
         return;
-    }
     node_outlet_begin(&t->outlet, t->jobs.epoch);
     /* A region without points has nothing to be worked on. */
     t->drained = job.first == job.last;
-    if (!t->drained) {
+    if (!t->drained)
         incode_triangulator_start(t->triangulator, &job);
-    }
 }
 
 static void take_page(struct node_triangulation *t,
@@ -144,9 +139,8 @@ static void take_page(struct node_triangulation *t,
     if (node_requests_take(&t->requests, message, &page)) {
         int status = incode_triangulator_page(t->triangulator, page.number,
                                               page.bytes, page.size);
-        if (status == 0) {
+        if (status == 0)
             *incode_triangulator_label(t->triangulator, page.number) = page.tag;
-        }
         node_requests_judge(&t->requests, status, &page);
     } else if (page.number != INCODE_NONE &&
                incode_triangulator_awaits(t->triangulator, page.number)) {
@@ -160,9 +154,8 @@ static void take_unspill(struct node_triangulation *t, const uint8_t *data,
     struct incode_face faces[NODE_FACES_A_MESSAGE];
     if (node_outlet_take_unspill(&t->outlet, data, size, &header, faces) &&
         incode_triangulator_unspill(t->triangulator, header.brick, faces,
-                                    header.count, header.last != 0) != 0) {
+                                    header.count, header.last != 0) != 0)
         node_outlet_refuse_unspill(&t->outlet, header.brick);
-    }
 }
 
 bool node_triangulation_message(struct node_triangulation *t,
@@ -191,9 +184,8 @@ bool node_triangulation_message(struct node_triangulation *t,
 bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent) {
     struct node_triangulation *t = context;
     if (!t->jobs.working || t->drained || node_fault_is_set(t->fault) ||
-        (!t->exchanges && !node_outlet_has_room(&t->outlet))) {
+        (!t->exchanges && !node_outlet_has_room(&t->outlet)))
         return false;
-    }
     uint64_t before = incode_triangulator_spent(t->triangulator);
     incode_triangulator_allow(t->triangulator, units);
     enum incode_step step = incode_triangulator_step(t->triangulator);
@@ -207,9 +199,8 @@ bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent) {
 }
 
 void node_triangulation_close(struct node_triangulation *t) {
-    if (t->drained) {
+    if (t->drained)
         node_outlet_close(&t->outlet);
-    }
 }
 
 static unsigned node_triangulation_work(struct node_triangulation *t,
@@ -225,9 +216,8 @@ static unsigned node_triangulation_work(struct node_triangulation *t,
  * on, it waits for more, as each message by itself wakes the host. */
 static bool may_wait(struct node_triangulation *t) {
     if (!t->worked || !node_requests_few(&t->requests) ||
-        !node_outlet_few(&t->outlet)) {
+        !node_outlet_few(&t->outlet))
         return false;
-    }
     if (!t->holds) {
         t->holds = true;
         t->held_us = t->now_us;
@@ -236,9 +226,8 @@ static bool may_wait(struct node_triangulation *t) {
 }
 
 unsigned node_triangulation_send(struct node_triangulation *t) {
-    if (may_wait(t)) {
+    if (may_wait(t))
         return 0;
-    }
     t->holds = false;
     return node_requests_send(&t->requests) + node_outlet_send(&t->outlet);
 }

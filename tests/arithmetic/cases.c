@@ -112,10 +112,9 @@ static void filter_in_sphere(struct record *record, const double p[5][3]) {
 
 static bool distinct(const double p[5][3]) {
     for (int i = 0; i < 5; i++) {
-        for (int j = 0; j < i; j++) {
+        for (int j = 0; j < i; j++)
             if (incode_lexicographic(p[i], p[j]) == 0)
                 return false;
-        }
     }
     return true;
 }
@@ -145,10 +144,9 @@ static bool draw_case(struct draw *draw, enum draw_family family, bool positive,
 }
 
 static void record_points(struct record *record, const double p[5][3]) {
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 5; i++)
         for (int k = 0; k < 3; k++)
             record_double(record, point_names[i][k], p[i][k]);
-    }
 }
 
 /* Most cases are such that the filters can tell; a quarter is hard. */
@@ -186,10 +184,9 @@ static void filter_case(struct draw *draw, uint32_t number,
 /* The largest |p[i][k] - origin[k]|. */
 static double reach(const double *const p[], int count, const double *origin) {
     double most = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++)
         for (int k = 0; k < 3; k++)
             most = larger(most, __builtin_fabs(p[i][k] - origin[k]));
-    }
     return most;
 }
 
@@ -199,10 +196,9 @@ static bool record_integers(struct record *record, int64_t n[4][3],
                             const double *origin, double most) {
     bool there = incode_fixed_differences(n, p, count, origin, most);
     record_word(record, "integers of one scale", there);
-    for (int i = 0; i < count && there; i++) {
+    for (int i = 0; i < count && there; i++)
         for (int k = 0; k < 3; k++)
             record_word(record, difference_names[i][k], (uint64_t)n[i][k]);
-    }
     return there;
 }
 

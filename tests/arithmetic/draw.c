@@ -88,10 +88,9 @@ static int64_t integer(struct draw *draw, int bits) {
 static void plane(struct draw *draw, double p[5][3]) {
     int64_t n[5][3];
     int bits = 20 + (int)draw_below(draw, 36);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++)
             n[i][k] = integer(draw, bits);
-    }
     for (int i = 3; i < 5; i++) {
         int64_t s = integer(draw, 6), t = integer(draw, 6);
         for (int k = 0; k < 3; k++)
@@ -133,10 +132,9 @@ static void box(struct draw *draw, double p[5][3]) {
         corner[0][k] = integer(draw, 1 + (int)draw_below(draw, 41));
         corner[1][k] = corner[0][k] + 1 + (integer(draw, 33) & UINT32_MAX);
     }
-    for (int i = 0; i < 5; i++, at += step) {
+    for (int i = 0; i < 5; i++, at += step)
         for (int k = 0; k < 3; k++)
             p[i][k] = number(corner[at >> k & 1][k], 0);
-    }
     if (draw_below(draw, 4) == 0) {
         uint32_t k = draw_below(draw, 3);
         p[4][k] = shaken(draw, p[4][k]);

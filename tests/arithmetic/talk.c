@@ -87,10 +87,9 @@ static void steps(struct talk *talk, uint32_t block, uint32_t number) {
 /* Whether the line begins with the word; then *at is behind it. */
 static bool word(const char **at, const char *expected) {
     const char *c = *at;
-    for (; *expected != 0; c++, expected++) {
+    for (; *expected != 0; c++, expected++)
         if (*c != *expected)
             return false;
-    }
     *at = c;
     return true;
 }

@@ -62,21 +62,18 @@ int qemu_plugin_install(qemu_plugin_id_t id, const struct qemu_info *info,
     static const char folder[] = "folder=";
     char path[4096];
     (void)info;
-    if (argc != 1 || strncmp(argv[0], folder, sizeof folder - 1) != 0) {
+    if (argc != 1 || strncmp(argv[0], folder, sizeof folder - 1) != 0)
         return -1;
-    }
     snprintf(path, sizeof path, "%s/%ld.count", argv[0] + sizeof folder - 1,
              (long)getpid());
     int fd = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (fd < 0 || ftruncate(fd, COUNTS_MAX * sizeof *counts) != 0) {
+    if (fd < 0 || ftruncate(fd, COUNTS_MAX * sizeof *counts) != 0)
         return -1;
-    }
     counts = mmap(NULL, COUNTS_MAX * sizeof *counts, PROT_READ | PROT_WRITE,
                   MAP_SHARED, fd, 0);
     close(fd);
-    if (counts == MAP_FAILED) {
+    if (counts == MAP_FAILED)
         return -1;
-    }
     qemu_plugin_register_vcpu_tb_trans_cb(id, new_block);
     return 0;
 }

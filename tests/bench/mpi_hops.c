@@ -39,9 +39,8 @@ static void open_link(unsigned i, int peer, int tag) {
 
 static int poll_links(unsigned count) {
     int moved = 0;
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         moved += link_poll(links[i], now_us());
-    }
     return moved;
 }
 
@@ -55,21 +54,17 @@ static void rest(unsigned count) {
 }
 
 static void put(unsigned i, unsigned count, const void *data, size_t size) {
-    while (link_write(links[i], data, size, NULL, 0) != 0) {
-        if (poll_links(count) == 0) {
+    while (link_write(links[i], data, size, NULL, 0) != 0)
+        if (poll_links(count) == 0)
             rest(count);
-        }
-    }
 }
 
 /* The next message of link i, copied. */
 static size_t get(unsigned i, unsigned count, uint8_t *data) {
     struct link_message message;
-    while (!link_read(links[i], &message)) {
-        if (poll_links(count) == 0) {
+    while (!link_read(links[i], &message))
+        if (poll_links(count) == 0)
             rest(count);
-        }
-    }
     size_t size = message.size;
     memcpy(data, message.data, size);
     link_release(links[i]);
@@ -93,9 +88,8 @@ static void pass_on(void) {
                 moved++;
             }
         }
-        if (moved == 0) {
+        if (moved == 0)
             rest(2);
-        }
     }
 }
 
@@ -110,9 +104,8 @@ static void first(const char *name, unsigned hops) {
     }
     double round = (double)(now_us() - start) / ROUNDS;
     start = now_us();
-    for (unsigned i = 0; i < BULK; i++) {
+    for (unsigned i = 0; i < BULK; i++)
         put(0, 1, data, MESSAGE);
-    }
     put(0, 1, data, 8);
     while (get(0, 1, data) != 8) {
     }
@@ -121,66 +114,53 @@ static void first(const char *name, unsigned hops) {
            round, 1e-6 * BULK * MESSAGE / seconds);
     fflush(stdout);
     put(0, 1, data, 0);
-    while (!link_idle(links[0])) {
-        if (poll_links(1) == 0) {
+    while (!link_idle(links[0]))
+        if (poll_links(1) == 0)
             rest(1);
-        }
-    }
 }
 
 /* Answers short messages, takes long ones. */
 static void last(void) {
     static uint8_t data[LINK_MESSAGE_MAX];
     size_t size;
-    while ((size = get(0, 1, data)) != 0) {
-        if (size == 8) {
+    while ((size = get(0, 1, data)) != 0)
+        if (size == 8)
             put(0, 1, data, 8);
-        }
-    }
     uint64_t end = now_us() + 20000;
-    while (now_us() < end) {
+    while (now_us() < end)
         (void)poll_links(1);
-    }
 }
 
 /* The chain of these ranks, of which this rank is number `at`. */
 static void chain(const char *name, const int *ranks, int count, int tag) {
     int at = -1;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i++)
         at = ranks[i] == place.rank ? i : at;
-    }
     unsigned ends = 0;
-    if (at > 0) {
+    if (at > 0)
         open_link(ends++, ranks[at - 1], tag);
-    }
-    if (at >= 0 && at < count - 1) {
+    if (at >= 0 && at < count - 1)
         open_link(ends++, ranks[at + 1], tag);
-    }
-    if (at == 0) {
+    if (at == 0)
         first(name, (unsigned)count - 1);
-    } else if (at == count - 1) {
+    else if (at == count - 1)
         last();
-    } else if (at > 0) {
+    else if (at > 0)
         pass_on();
-    }
     (void)mpi_place_part(&place, pipes, ends, UINT64_MAX);
-    for (unsigned i = 0; i < ends; i++) {
+    for (unsigned i = 0; i < ends; i++)
         free(links[i]);
-    }
 }
 
 int main(int argc, char **argv) {
     int ranks[MPI_RANKS_MAX] = {0};
     MPI_Init(&argc, &argv);
-    if (mpi_place_open(&place) != 0) {
+    if (mpi_place_open(&place) != 0)
         MPI_Abort(MPI_COMM_WORLD, 2);
-    }
-    for (int i = 0; i < place.ranks; i++) {
+    for (int i = 0; i < place.ranks; i++)
         ranks[i] = i;
-    }
-    for (int count = 2; count <= place.ranks; count++) {
+    for (int count = 2; count <= place.ranks; count++)
         chain("chain", ranks, count, count);
-    }
     ranks[1] = place.ranks - 1;
     chain("straight", ranks, 2, 100);
     mpi_place_close(&place);

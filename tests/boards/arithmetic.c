@@ -34,10 +34,9 @@ _Noreturn void bare_main(void) {
     for (;;) {
         unsigned length = 0;
         uint8_t byte;
-        while ((byte = next(&bare_uart[0].receive)) != '\n') {
+        while ((byte = next(&bare_uart[0].receive)) != '\n')
             if (length < ASKED_MAX && byte >= ' ')
                 asked[length++] = (char)byte;
-        }
         asked[length] = 0;
         talk_answer(asked, put, NULL);
     }

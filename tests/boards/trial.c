@@ -30,9 +30,8 @@ static uint8_t next(void) {
     uint8_t byte = 0;
     while (!bare_ring_take(&bare_uart[0].receive, &byte)) {
         uint32_t before = board_lock();
-        if (!bare_uart_heard(&bare_uart[0])) {
+        if (!bare_uart_heard(&bare_uart[0]))
             board_wait(10000);
-        }
         board_unlock(before);
         board_feed();
     }
@@ -72,9 +71,8 @@ static void be_deaf(void) {
         }
     }
     say("overruns ", "", bare_uarts_overruns(), "");
-    while (bare_uart_heard(&bare_uart[0])) {
+    while (bare_uart_heard(&bare_uart[0]))
         (void)next();
-    }
 }
 
 static uint8_t *data_end(void) {
@@ -118,9 +116,8 @@ _Noreturn void bare_main(void) {
     board_guard(GUARD_US);
     board_unlock(0);
     struct bare_reason reason = bare_reason_take();
-    if (board_facts.flash != NULL) {
+    if (board_facts.flash != NULL)
         (void)loader_boots_next(board_facts.flash, &boot);
-    }
     say(bare_reason_name(reason.kind), ", boot ", boot, "");
     for (;;) {
         say("ready, faults ", "", reason.faults, reason.text);

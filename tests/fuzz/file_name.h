@@ -16,13 +16,11 @@ static inline void file_name(enum host_use use, unsigned choice,
     char list[HOST_FORMAT_LIST_MAX];
     unsigned count = 1;
     host_format_list(use, list, sizeof list);
-    for (const char *c = list; *c != '\0'; c++) {
+    for (const char *c = list; *c != '\0'; c++)
         count += *c == ' ';
-    }
     const char *at = list;
-    for (unsigned skip = choice % count; skip > 0; skip--) {
+    for (unsigned skip = choice % count; skip > 0; skip--)
         at = strchr(at, ' ') + 1;
-    }
     (void)snprintf(name, FILE_NAME_MAX, "a%.*s%s", (int)strcspn(at, " "), at,
                    choice >= FILE_NAME_PACKED ? ".gz" : "");
 }

@@ -35,21 +35,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};
     char *text = malloc(size + 1);
-    if (text == NULL) {
+    if (text == NULL)
         return 0;
-    }
     memcpy(text, data, size);
     text[size] = '\0';
     int code = host_cube_file_parse(&file, "/nowhere/a.cube", text, &error);
     if (code != error.code || (code != 0) != (error.text[0] != '\0') ||
-        (code != 0 && strncmp(error.text, "/nowhere/a.cube:", 16) != 0)) {
+        (code != 0 && strncmp(error.text, "/nowhere/a.cube:", 16) != 0))
         abort();
-    }
     for (unsigned i = 0; code == 0 && i < file.nodes; i++) {
         unsigned count = host_cube_node_options(&file, i, options);
-        if (count < 4 || count > HOST_NODE_OPTIONS_MAX) {
+        if (count < 4 || count > HOST_NODE_OPTIONS_MAX)
             abort();
-        }
     }
     host_cube_file_free(&file);
     free(text);

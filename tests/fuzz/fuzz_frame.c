@@ -61,9 +61,8 @@ struct input {
 };
 
 static unsigned next_byte(struct input *in) {
-    if (in->size == 0) {
+    if (in->size == 0)
         return 0;
-    }
     in->size--;
     return *in->data++;
 }
@@ -78,9 +77,8 @@ static void put_frame(struct stream *s, struct input *in, uint32_t epoch) {
     h.acknowledge = (uint16_t)(0x123 + next_byte(in));
     h.size = (uint16_t)next_byte(in);
     h.session = session(epoch, 0x123);
-    for (unsigned i = 0; i < h.size; i++) {
+    for (unsigned i = 0; i < h.size; i++)
         payload[i] = (uint8_t)next_byte(in);
-    }
     if (h.kind == 1 && h.size == 0) {
         /* A greeting that fits, but for its sixth byte on. */
         const uint8_t hello[24] = {1,
@@ -116,9 +114,8 @@ static void put_frame(struct stream *s, struct input *in, uint32_t epoch) {
 static void check_message(const struct link_message *message) {
     volatile uint8_t sum = 0;
     LINK_ASSERT(message->size <= 200);
-    for (size_t i = 0; i < message->size; i++) {
+    for (size_t i = 0; i < message->size; i++)
         sum = (uint8_t)(sum + message->data[i]);
-    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -139,21 +136,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     while (in.size > 0) {
         unsigned what = next_byte(&in), count = next_byte(&in) % 64;
         struct link_message message;
-        if (stream.begin == stream.end) {
+        if (stream.begin == stream.end)
             stream.begin = stream.end = 0;
-        }
-        if (stream.end + 700 > sizeof stream.bytes) {
+        if (stream.end + 700 > sizeof stream.bytes)
             stream.begin = stream.end = 0;
-        }
-        if (what % 4 == 0) {
-            for (unsigned i = 0; i < count; i++) {
+        if (what % 4 == 0)
+            for (unsigned i = 0; i < count; i++)
                 stream.bytes[stream.end++] = (uint8_t)next_byte(&in);
-            }
-        } else if (what % 4 < 3) {
+        else if (what % 4 < 3)
             put_frame(&stream, &in, 0xfff0u + what / 4 % 4);
-        } else {
+        else
             link_write(link, "head", 4, memory, count);
-        }
         now_us += 1000 * (uint64_t)count;
         link_poll(link, now_us);
         if (what < 200 && link_read(link, &message)) {

@@ -40,9 +40,8 @@ struct script {
 };
 
 static uint8_t next(struct script *script) {
-    if (script->size == 0) {
+    if (script->size == 0)
         return 0;
-    }
     script->size--;
     return *script->bytes++;
 }
@@ -50,9 +49,8 @@ static uint8_t next(struct script *script) {
 static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     struct pipe *pipe = ((struct end *)context)->out;
     size_t room = PIPE - pipe->count;
-    if (pipe->closed) {
+    if (pipe->closed)
         return LINK_PIPE_CLOSED;
-    }
     size = size < room ? size : room;
     memcpy(pipe->bytes + pipe->count, bytes, size);
     pipe->count += size;
@@ -61,9 +59,8 @@ static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
 
 static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     struct pipe *pipe = ((struct end *)context)->in;
-    if (pipe->closed) {
+    if (pipe->closed)
         return LINK_PIPE_CLOSED;
-    }
     size = size < pipe->count ? size : pipe->count;
     memcpy(bytes, pipe->bytes, size);
     memmove(pipe->bytes, pipe->bytes + size, pipe->count - size);
@@ -78,29 +75,24 @@ static size_t message_size(uint8_t number) {
 static void write_message(struct end *end) {
     uint8_t data[MESSAGE];
     size_t size = message_size(end->sent);
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         data[i] = (uint8_t)(end->sent + i * 7u);
-    }
     size_t head = size / 3;
     if (end->sent < 250 &&
-        link_write(end->link, data, head, data + head, size - head) == 0) {
+        link_write(end->link, data, head, data + head, size - head) == 0)
         end->sent++;
-    }
 }
 
 static void read_messages(struct end *end, bool trusted) {
     struct link_message message;
     while (link_read(end->link, &message)) {
-        if (message.size > MESSAGE) {
+        if (message.size > MESSAGE)
             abort();
-        }
         bool right = message.size == message_size(end->received);
-        for (size_t i = 0; trusted && i < message.size; i++) {
+        for (size_t i = 0; trusted && i < message.size; i++)
             right &= message.data[i] == (uint8_t)(end->received + i * 7u);
-        }
-        if (trusted && !right) {
+        if (trusted && !right)
             abort();
-        }
         end->received++;
         link_release(end->link);
     }
@@ -115,21 +107,18 @@ static void tell(struct end *end, bool ask) {
 static void read_datagram(struct end *end, bool trusted) {
     struct link_message datagram;
     bool ask;
-    if (!link_take_datagram(end->link, &datagram, &ask)) {
+    if (!link_take_datagram(end->link, &datagram, &ask))
         return;
-    }
     if (datagram.size < 1 || datagram.size > LINK_DATAGRAM_MAX ||
         (trusted && (datagram.size > sizeof news ||
-                     memcmp(datagram.data, news, datagram.size) != 0))) {
+                     memcmp(datagram.data, news, datagram.size) != 0)))
         abort();
-    }
 }
 
 static void insert(struct pipe *pipe, size_t at, const uint8_t *bytes,
                    size_t size) {
-    if (pipe->count + size > PIPE) {
+    if (pipe->count + size > PIPE)
         return;
-    }
     memmove(pipe->bytes + at + size, pipe->bytes + at, pipe->count - at);
     memcpy(pipe->bytes + at, bytes, size);
     pipe->count += size;
@@ -146,9 +135,8 @@ static void forge(struct pipe *pipe, struct script *script) {
     header.sequence = (uint16_t)(next(script) * 257u);
     header.acknowledge = (uint16_t)(next(script) * 257u);
     header.size = next(script) % (PAYLOAD + 1);
-    for (size_t i = 0; i < header.size; i++) {
+    for (size_t i = 0; i < header.size; i++)
         payload[i] = next(script);
-    }
     insert(pipe, pipe->count, frame, frame_encode(frame, &header, payload));
 }
 
@@ -159,9 +147,8 @@ static void spoil(struct pipe *pipe, struct script *script) {
     size = size < pipe->count - at ? size : pipe->count - at;
     switch (next(script) % 5) {
     case 0:
-        if (pipe->count > 0) {
+        if (pipe->count > 0)
             pipe->bytes[at] ^= (uint8_t)(1u << next(script) % 8);
-        }
         break;
     case 1:
         memmove(pipe->bytes + at, pipe->bytes + at + size,
@@ -173,9 +160,8 @@ static void spoil(struct pipe *pipe, struct script *script) {
         insert(pipe, at, bytes, size);
         break;
     case 3:
-        for (size_t i = 0; i < sizeof bytes; i++) {
+        for (size_t i = 0; i < sizeof bytes; i++)
             bytes[i] = next(script);
-        }
         insert(pipe, at, bytes, sizeof bytes);
         break;
     default:
@@ -200,9 +186,8 @@ static void open_end(struct end *end, struct pipe *out, struct pipe *in,
     end->in = in;
     end->sent = end->received = 0;
     end->link = link_init(end->memory, MEMORY, &config);
-    if (end->link == NULL) {
+    if (end->link == NULL)
         abort();
-    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -227,9 +212,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
             spoil(pipe, &script);
             break;
         case 2:
-            if (hostile) {
+            if (hostile)
                 forge(pipe, &script);
-            }
             break;
         case 3:
             tell(step >> 7 ? &a : &b, (step & 8) != 0);
@@ -249,12 +233,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         (void)link_poll(b.link, now);
         read_messages(&a, true);
         read_messages(&b, true);
-        if (a.received == b.sent && b.received == a.sent) {
+        if (a.received == b.sent && b.received == a.sent)
             return 0;
-        }
     }
-    if (!hostile) {
+    if (!hostile)
         abort();
-    }
     return 0;
 }

@@ -21,9 +21,8 @@ static struct host_tetrahedra tets;
 static struct sim_end nowhere;
 
 static void demand(bool holds) {
-    if (!holds) {
+    if (!holds)
         abort();
-    }
 }
 
 static void told(void *context, const char *line) {
@@ -96,21 +95,18 @@ static void take(const uint8_t *data, size_t size) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct host_digest digest;
     struct host_error error = {0};
-    if (size == 0) {
+    if (size == 0)
         return 0;
-    }
     begin();
     take(data + 1, size - 1);
     host_tetrahedra_map(&tets, order.row);
-    for (uint64_t i = 0; i < 4 * tets.count; i++) {
+    for (uint64_t i = 0; i < 4 * tets.count; i++)
         demand(tets.v[i / 4][i % 4] < points.count);
-    }
     host_tetrahedra_sort(&tets);
     host_digest(&tets, &digest);
     unsigned formats = 0;
-    while (host_format_row(formats) != NULL) {
+    while (host_format_row(formats) != NULL)
         formats++;
-    }
     demand(formats > 0);
     const struct host_format *format = host_format_row(data[0] % formats);
     if (tets.count > 0 && format->write_tetrahedra != NULL) {

@@ -51,17 +51,15 @@ static struct end ends[2];
 static struct end *working; /* whose call it is */
 
 static uint8_t next(struct script *script) {
-    if (script->size == 0) {
+    if (script->size == 0)
         return 0;
-    }
     script->size--;
     return *script->bytes++;
 }
 
 static void expect(bool so) {
-    if (!so) {
+    if (!so)
         abort();
-    }
 }
 
 /* --- the suite, counted --------------------------------------------------- */
@@ -105,9 +103,8 @@ static int pipe_send(void *context, const uint8_t *bytes, size_t size) {
     struct end *end = context;
     size = limit(end, size, LANE - end->said.count);
     put(&end->said, bytes, size);
-    for (size_t i = 0; i < size && end->opened < sizeof end->opening; i++) {
+    for (size_t i = 0; i < size && end->opened < sizeof end->opening; i++)
         end->opening[end->opened++] = bytes[i];
-    }
     return (int)size;
 }
 
@@ -143,9 +140,8 @@ static void open_end(unsigned who, uint8_t salt, uint8_t key_salt,
 static void shake(struct end *end) {
     const struct end *peer = &ends[end == ends];
     struct link_pipe pipe = {end, pipe_send, pipe_receive};
-    if (end->status != 0) {
+    if (end->status != 0)
         return;
-    }
     working = end;
     end->status = secure_shake(&end->shake, &pipe);
     end->over = end->status < 0;
@@ -174,9 +170,8 @@ static void say(struct end *end, unsigned number) {
     struct link_pipe pipe = secure_records_pipe(&end->records);
     uint8_t bytes[RECORD_MAX];
     size_t size = record_size(number);
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         bytes[i] = record_byte(number, i);
-    }
     working = end;
     int sent = pipe.send(pipe.context, bytes, size);
     expect(sent == 0 || (size_t)sent == size || sent == LINK_PIPE_CLOSED);
@@ -193,17 +188,14 @@ static void check(struct end *end, const struct end *peer, uint8_t byte) {
     }
     if (end->at == 0 && end->gap) { /* which one, the second byte says */
         unsigned number = end->heard + 1;
-        while (number < peer->sent && record_byte(number, 0) != byte) {
+        while (number < peer->sent && record_byte(number, 0) != byte)
             number++;
-        }
         end->heard = number;
         end->gap = false;
     }
-    if (end->at == 1) {
-        while (end->heard < peer->sent && record_byte(end->heard, 1) != byte) {
+    if (end->at == 1)
+        while (end->heard < peer->sent && record_byte(end->heard, 1) != byte)
             end->heard += 255;
-        }
-    }
     expect(end->heard < peer->sent);
     expect(byte == record_byte(end->heard, end->at));
     end->at++;
@@ -220,9 +212,8 @@ static bool hear(struct end *end, const struct end *peer, size_t size) {
     working = end;
     int got = pipe.receive(pipe.context, bytes, size < 256 ? size : 256);
     end->over = end->over || got < 0;
-    for (int i = 0; i < got; i++) {
+    for (int i = 0; i < got; i++)
         check(end, peer, bytes[i]);
-    }
     return got > 0;
 }
 
@@ -249,9 +240,8 @@ static void remember(void) {
     for (unsigned turn = 0; turn < 10; turn++) {
         struct end *end = &ends[turn % 2];
         shake(end);
-        if (end->status > 0) {
+        if (end->status > 0)
             say(end, end->sent);
-        }
         put(&earlier[turn % 2], end->said.bytes, end->said.count);
         pass_on(turn % 2, LANE);
     }
@@ -268,9 +258,8 @@ static void spoil(unsigned who, struct script *script) {
                                           : &ends[1 - who].said;
     switch (how % 5) {
     case 0: /* a bit of what is under way */
-        if (hears->count > 0) {
+        if (hears->count > 0)
             hears->bytes[begin % hears->count] ^= (uint8_t)(1u << how / 5 % 8);
-        }
         break;
     case 1: /* cut */
         take(hears, size < hears->count ? size : hears->count);
@@ -285,9 +274,8 @@ static void spoil(unsigned who, struct script *script) {
         put(hears, from->bytes + begin, size);
         break;
     default:
-        for (size_t i = 0; i < sizeof noise; i++) {
+        for (size_t i = 0; i < sizeof noise; i++)
             noise[i] = next(script);
-        }
         put(hears, noise, 1 + size % sizeof noise);
         break;
     }
@@ -303,20 +291,17 @@ static void step(struct script *script, bool spoils_openings) {
         pass_on(1 - who, (size_t)next(script) * 4 + 1);
         break;
     case 1:
-        if (open || spoils_openings) {
+        if (open || spoils_openings)
             spoil(who, script);
-        }
         break;
     case 2:
-        if (end->status > 0 && !end->over) {
+        if (end->status > 0 && !end->over)
             say(end, end->sent);
-        }
         break;
     default:
         shake(end);
-        if (end->status > 0 && !end->over) {
+        if (end->status > 0 && !end->over)
             (void)hear(end, peer, 1 + (what >> 3) * 8u);
-        }
         break;
     }
 }
@@ -331,9 +316,8 @@ static void leave_alone(void) {
         end->most = 0;
         shake(end);
         pass_on(who, LANE);
-        if (end->status <= 0 || peer->status <= 0) {
+        if (end->status <= 0 || peer->status <= 0)
             continue;
-        }
         if (!end->over && said[who] < LAST_RECORDS) {
             unsigned sent = end->sent;
             say(end, end->sent);
@@ -354,9 +338,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
      * 2: another key; 3: nobody is there but who is between them */
     unsigned mode = how % 4;
     struct secure_ends wire[2] = {{{0, 0}, {0, 0}}, {{0, 0}, {0, 0}}};
-    if (earlier[0].count == 0) {
+    if (earlier[0].count == 0)
         remember();
-    }
     for (unsigned who = 0; who < 2; who++) {
         wire[who].self.node = next(&script);
         wire[who].peer.port = next(&script);
@@ -369,9 +352,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         ends[1 - alone].status = -1;
         ends[1 - alone].said.count = 0;
     }
-    while (script.size > 0) {
+    while (script.size > 0)
         step(&script, mode != 0);
-    }
     leave_alone();
     if (mode >= 2) {
         expect(ends[0].status <= 0 && ends[1].status <= 0);

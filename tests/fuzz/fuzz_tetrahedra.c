@@ -14,15 +14,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct host_error error = {0};
     struct host_digest digest;
     char name[FILE_NAME_MAX];
-    if (size == 0) {
+    if (size == 0)
         return 0;
-    }
     file_name(HOST_READ_TETRAHEDRA, data[0], name);
     int code =
         host_tetrahedra_parse(name, data + 1, size - 1, &tets, &points, &error);
-    if (code != error.code || (code != 0) != (error.text[0] != '\0')) {
+    if (code != error.code || (code != 0) != (error.text[0] != '\0'))
         abort();
-    }
     if (code == 0) {
         host_tetrahedra_sort(&tets);
         host_digest(&tets, &digest);

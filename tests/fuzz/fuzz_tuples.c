@@ -10,9 +10,8 @@ enum { PLACES = 3 };
 static uint64_t arena[2048];
 
 static void demand(bool condition) {
-    if (!condition) {
+    if (!condition)
         abort();
-    }
 }
 
 static int write_message(void *context, uint16_t place, const void *data,
@@ -41,9 +40,8 @@ static void call(struct tuples *space, unsigned which) {
                  : (which & 7) == 3 ? tuples_inp(space, &t)
                  : (which & 7) == 4 ? tuples_eval(space, 0, &t)
                                     : TUPLES_BUSY;
-    if (number >= 0 && (which & 64)) {
+    if (number >= 0 && (which & 64))
         tuples_close(space, number);
-    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

@@ -9,9 +9,8 @@
 static struct routes_altered table[2048];
 
 static void demand(bool condition) {
-    if (!condition) {
+    if (!condition)
         abort();
-    }
 }
 
 static void route(struct cube_wiring *wiring, unsigned dimension) {
@@ -41,9 +40,8 @@ struct bytes {
 static int receive(void *context, uint8_t *bytes, size_t size) {
     struct bytes *from = context;
     size = size < from->size ? size : from->size;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         bytes[i] = *from->next++;
-    }
     from->size -= size;
     return (int)size;
 }
@@ -56,11 +54,10 @@ static void learn(const uint8_t *data, size_t size) {
     bool ports = size % 2 == 0, known = true;
     uint64_t now_us = 0;
     while (from.size > 0) {
-        if (known && ports) {
+        if (known && ports)
             learner_init_ports(&learner, &pipe, 0, true);
-        } else if (known) {
+        else if (known)
             learner_init(&learner, &pipe, 1);
-        }
         learner_ask(&learner, now_us += LEARN_ASK_US / 3);
         known = learner_poll(&learner, &learned);
         if (known) {
@@ -76,9 +73,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     struct cube_wiring mine = {0}, theirs;
     uint8_t bytes[WIRING_BYTES_MAX];
     learn(data, size);
-    if (size < 2) {
+    if (size < 2)
         return 0;
-    }
     unsigned dimension = data[0] % (CUBE_DIMENSION_MAX + 1);
     data++;
     size--;

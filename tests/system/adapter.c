@@ -43,9 +43,8 @@ static bool plug_in(const char *name) {
                              ? NULL
                              : ptsname(port);
     far = device == NULL ? -1 : open(device, O_RDWR | O_NOCTTY | O_CLOEXEC);
-    if (far < 0 || tcgetattr(far, &raw) != 0) {
+    if (far < 0 || tcgetattr(far, &raw) != 0)
         return false;
-    }
     cfmakeraw(&raw);
     (void)unlink(name);
     return tcsetattr(far, TCSANOW, &raw) == 0 && symlink(device, name) == 0;
@@ -75,9 +74,8 @@ static bool pass(int from, int to) {
         struct pollfd room = {to, POLLOUT, 0};
         ssize_t part = write(to, bytes + done, (size_t)(n - done));
         /* clock: looks again */
-        if (part <= 0 && poll(&room, 1, TURN_MS) <= 0) {
+        if (part <= 0 && poll(&room, 1, TURN_MS) <= 0)
             break;
-        }
         done += part > 0 ? part : 0;
     }
     return n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
@@ -101,13 +99,11 @@ int main(int argc, char **argv) {
             /* clock: looks again */
         } else if (poll(fds, port < 0 ? 1 : 2, TURN_MS) > 0) {
             goes_on = fds[0].revents == 0 || pass(board, port);
-            if (port >= 0 && fds[1].revents != 0) {
+            if (port >= 0 && fds[1].revents != 0)
                 (void)pass(port, board);
-            }
         }
     }
-    if (port >= 0) {
+    if (port >= 0)
         pull_out(argv[1]);
-    }
     return 0;
 }

@@ -43,9 +43,8 @@ static bool find_answer(int fd, int64_t end_ms) {
     int last[3] = {1, 1, 1}, byte;
     while ((byte = next(fd, end_ms)) >= 0) {
         last[0] = last[1], last[1] = last[2], last[2] = byte;
-        if (last[0] == 0 && last[1] == 0xff && last[2] == '\r') {
+        if (last[0] == 0 && last[1] == 0xff && last[2] == '\r')
             return true;
-        }
     }
     return false;
 }
@@ -57,9 +56,8 @@ static bool is_torn(const char *text, const char *word) {
     for (const char *tail = word + 1; word[0] != 0 && *tail != 0; tail++) {
         size_t length = strlen(tail);
         if (strncmp(text, tail, length) == 0 &&
-            strncmp(text + length, unknown, sizeof unknown - 1) == 0) {
+            strncmp(text + length, unknown, sizeof unknown - 1) == 0)
             return true;
-        }
     }
     return false;
 }
@@ -70,11 +68,9 @@ static bool print_answer(int fd, int64_t end_ms, const char *word) {
     static char text[BYTES_MAX + 1];
     size_t size = 0;
     int byte;
-    while ((byte = next(fd, end_ms)) > 0) {
-        if (byte != '\r' && size < BYTES_MAX) {
+    while ((byte = next(fd, end_ms)) > 0)
+        if (byte != '\r' && size < BYTES_MAX)
             text[size++] = (char)byte;
-        }
-    }
     text[size] = 0;
     return byte == 0 && !is_torn(text, word) &&
            fwrite(text, 1, size, stdout) == size;
@@ -98,12 +94,10 @@ int main(int argc, char **argv) {
     int64_t end_ms = now_ms() + DEADLINE_MS, now;
     while ((now = now_ms()) < end_ms) {
         int64_t again_ms = now + AGAIN_MS < end_ms ? now + AGAIN_MS : end_ms;
-        if (send(fd, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) != size) {
+        if (send(fd, line, (size_t)size, MSG_NOSIGNAL | MSG_DONTWAIT) != size)
             break;
-        }
-        if (find_answer(fd, again_ms) && print_answer(fd, again_ms, argv[2])) {
+        if (find_answer(fd, again_ms) && print_answer(fd, again_ms, argv[2]))
             return 0;
-        }
     }
     return 1;
 }

@@ -19,9 +19,8 @@ int main(void) {
     struct termios raw;
     int board = posix_openpt(O_RDWR | O_NOCTTY);
     if (board < 0 || grantpt(board) != 0 || unlockpt(board) != 0 ||
-        tcgetattr(board, &raw) != 0) {
+        tcgetattr(board, &raw) != 0)
         return 1;
-    }
     cfmakeraw(&raw);
     (void)tcsetattr(board, TCSANOW, &raw);
     (void)fcntl(board, F_SETFL, O_NONBLOCK);

@@ -25,25 +25,22 @@ static uint8_t *open_chip(const char *path) {
     int fd = open(path, O_RDWR | O_CREAT, 0600);
     off_t size = fd < 0 ? -1 : lseek(fd, 0, SEEK_END);
     void *chip = MAP_FAILED;
-    if (size >= 0 && ftruncate(fd, CHIP) == 0) {
+    if (size >= 0 && ftruncate(fd, CHIP) == 0)
         chip = mmap(NULL, CHIP, PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    }
     if (chip == MAP_FAILED) {
         perror(path);
         exit(1);
     }
-    if (size != CHIP) {
+    if (size != CHIP)
         memset(chip, 0xff, CHIP);
-    }
     return chip;
 }
 
 static uint32_t read_image(const char *path, uint8_t *bytes) {
     FILE *file = fopen(path, "rb");
     size_t size = file == NULL ? 0 : fread(bytes, 1, IMAGE_MAX, file);
-    if (file != NULL) {
+    if (file != NULL)
         (void)fclose(file);
-    }
     if (size <= LOADER_HEADER_BYTES) {
         fprintf(stderr, "%s: no image\n", path);
         exit(1);
@@ -100,9 +97,8 @@ static void tell(const struct loader_flash *flash,
                     sizeof header);
         if (loader_image_unpack(&image, header) == LOADER_GOOD) {
             printf("slot %u: %s, number %u, ", i, image.board, image.number);
-            for (unsigned k = 0; k < 8; k++) {
+            for (unsigned k = 0; k < 8; k++)
                 printf("%02x", image.digest[k]);
-            }
             printf("\n");
         }
     }

@@ -48,9 +48,8 @@ static void print_point(const double p[3]) {
 static uint32_t *permutation(uint32_t count, uint64_t seed) {
     uint32_t *from = must(malloc((count + 1) * sizeof *from));
     uint64_t state = seed * 0x9e3779b97f4a7c15u + 0x2545f4914f6cdd1du;
-    for (uint32_t i = 0; i < count; i++) {
+    for (uint32_t i = 0; i < count; i++)
         from[i] = i;
-    }
     for (uint32_t i = count; i > 1; i--) {
         state ^= state << 13;
         state ^= state >> 7;
@@ -78,9 +77,8 @@ static int by_point(const void *a, const void *b) {
     uint32_t i = *(const uint32_t *)a, j = *(const uint32_t *)b;
     for (int d = 0; d < 3; d++) {
         double x = compared->p[i][d], y = compared->p[j][d];
-        if (x != y) {
+        if (x != y)
             return x < y ? -1 : 1;
-        }
     }
     return i < j ? -1 : 1;
 }
@@ -130,21 +128,17 @@ int main(int argc, char **argv) {
     struct set set = read_points(must(in));
     uint32_t *from = permutation(set.count, (uint64_t)argument);
     int status = 0;
-    if (strcmp(verb, "unshuffle") == 0) {
+    if (strcmp(verb, "unshuffle") == 0)
         status = unshuffle(&set, from);
-    }
     for (uint32_t i = 0; i < set.count && argc < 4; i++) {
         double p[3];
         memcpy(p, set.p[strcmp(verb, "shuffle") == 0 ? from[i] : i], sizeof p);
-        for (int d = 0; d < 3 && strcmp(verb, "scale") == 0; d++) {
+        for (int d = 0; d < 3 && strcmp(verb, "scale") == 0; d++)
             p[d] = ldexp(p[d], (int)argument);
-        }
-        if (strcmp(verb, "mirror") == 0) {
+        if (strcmp(verb, "mirror") == 0)
             p[0] = -p[0];
-        }
-        if (strcmp(verb, "rotate") == 0) {
+        if (strcmp(verb, "rotate") == 0)
             rotate(p);
-        }
         print_point(p);
     }
     free(from);

@@ -26,8 +26,7 @@ int main(int argc, char **argv) {
         }
         host_cube_file_free(&file);
     }
-    if (error.code != 0) {
+    if (error.code != 0)
         fprintf(stderr, "incode: %s\n", error.text);
-    }
     return error.code;
 }

@@ -38,14 +38,11 @@ static int relay_network(int argc, char **argv) {
     struct network_settings settings = {
         strtoull(argv[1], NULL, 10), strtoull(argv[2], NULL, 10),
         strtoull(argv[3], NULL, 10), strtoull(argv[4], NULL, 10)};
-    if (!network_open(&settings)) {
+    if (!network_open(&settings))
         return complain(argv[0]);
-    }
-    for (int i = 5; i < argc; i++) {
-        if (!network_add(argv[i])) {
+    for (int i = 5; i < argc; i++)
+        if (!network_add(argv[i]))
             return complain(argv[i]);
-        }
-    }
     network_run(&ended);
     network_print();
     return 0;
@@ -56,9 +53,8 @@ static int relay_network(int argc, char **argv) {
 static bool set_uart(struct uart_settings *settings, const char *text) {
     unsigned long long value = 0;
     char name[8];
-    if (sscanf(text, "%7[a-z]=%llu", name, &value) != 2 || value > UINT32_MAX) {
+    if (sscanf(text, "%7[a-z]=%llu", name, &value) != 2 || value > UINT32_MAX)
         return false;
-    }
     struct {
         const char *name;
         uint32_t *value;
@@ -94,17 +90,13 @@ static int relay_uarts(char **argv) {
     struct uart_settings settings = {.seed = 1, .baud = 115200};
     for (; *argv != NULL && set_uart(&settings, *argv); argv++) {
     }
-    if (settings.baud == 0 || !uart_wires_init(&wires, &settings)) {
+    if (settings.baud == 0 || !uart_wires_init(&wires, &settings))
         return complain("uart");
-    }
-    for (; *argv != NULL; argv++) {
-        if (!uart_wires_add(&wires, *argv)) {
+    for (; *argv != NULL; argv++)
+        if (!uart_wires_add(&wires, *argv))
             return complain(*argv);
-        }
-    }
-    while (!ended) {
+    while (!ended)
         uart_wires_wait(&wires, uart_wires_carry(&wires, chance_now_us()));
-    }
     uart_wires_close(&wires);
     print_uarts(&wires.counts);
     return 0;

@@ -21,13 +21,11 @@ static bool hears(int fd, const char *text) {
     struct pollfd wait = {fd, POLLIN, 0};
     while (size + 1 < sizeof said && poll(&wait, 1, ANSWER_MS) > 0) {
         ssize_t got = read(fd, said + size, 1);
-        if (got <= 0) {
+        if (got <= 0)
             return false;
-        }
         said[++size] = '\0';
-        if (strstr(said, text) != NULL) {
+        if (strstr(said, text) != NULL)
             return true;
-        }
     }
     return false;
 }

@@ -91,11 +91,9 @@ static uint64_t now_us(void) {
 /* --- who listens where ---------------------------------------------------- */
 
 static bool is_ours(pid_t pid) {
-    for (unsigned i = 0; i < all.processes; i++) {
-        if (all.process[i] == pid) {
+    for (unsigned i = 0; i < all.processes; i++)
+        if (all.process[i] == pid)
             return true;
-        }
-    }
     return false;
 }
 
@@ -104,16 +102,14 @@ static pid_t parent_of(const char *pid) {
     int parent = 0;
     snprintf(path, sizeof path, "/proc/%.16s/stat", pid);
     FILE *file = fopen(path, "re");
-    if (file == NULL) {
+    if (file == NULL)
         return 0;
-    }
     size_t size = fread(text, 1, sizeof text - 1, file);
     fclose(file);
     text[size] = '\0';
     const char *name_end = strrchr(text, ')');
-    if (name_end == NULL || sscanf(name_end + 1, " %*c %d", &parent) != 1) {
+    if (name_end == NULL || sscanf(name_end + 1, " %*c %d", &parent) != 1)
         return 0;
-    }
     return parent;
 }
 
@@ -133,9 +129,8 @@ static void find_processes(void) {
                 more = true;
             }
         }
-        if (directory != NULL) {
+        if (directory != NULL)
             closedir(directory);
-        }
     }
 }
 
@@ -152,36 +147,28 @@ static void find_sockets(void) {
             snprintf(link, sizeof link, "%s/%s", path, entry->d_name);
             if (readlink(link, what, sizeof what - 1) > 0 &&
                 sscanf(what, "socket:[%lu]", &inode) == 1 &&
-                all.sockets < SOCKETS_MAX) {
+                all.sockets < SOCKETS_MAX)
                 all.socket[all.sockets++] = inode;
-            }
         }
-        if (directory != NULL) {
+        if (directory != NULL)
             closedir(directory);
-        }
     }
 }
 
 static bool has_socket(unsigned long inode) {
-    for (unsigned i = 0; i < all.sockets; i++) {
-        if (all.socket[i] == inode) {
+    for (unsigned i = 0; i < all.sockets; i++)
+        if (all.socket[i] == inode)
             return true;
-        }
-    }
     return false;
 }
 
 static void add_target(const struct target *target) {
-    for (unsigned i = 0; i < all.targets; i++) {
+    for (unsigned i = 0; i < all.targets; i++)
         if (all.target[i].size == target->size &&
-            memcmp(&all.target[i].address, &target->address, target->size) ==
-                0) {
+            memcmp(&all.target[i].address, &target->address, target->size) == 0)
             return;
-        }
-    }
-    if (all.targets < TARGETS_MAX) {
+    if (all.targets < TARGETS_MAX)
         all.target[all.targets++] = *target;
-    }
 }
 
 /* A line of /proc/net/tcp or tcp6: number, address:port in hexadecimal, peer,
@@ -193,9 +180,8 @@ static void look_at_tcp(const char *line) {
     struct target t = {.size = sizeof t.address.in};
     if (sscanf(line, " %*d: %63[0-9A-Fa-f]:%x %*s %x %*s %*s %*s %*s %*s %lu",
                address, &port, &state, &inode) != 4 ||
-        state != 0x0a || !has_socket(inode)) {
+        state != 0x0a || !has_socket(inode))
         return;
-    }
     if (strlen(address) == 8) {
         t.address.in.sin_family = AF_INET;
         t.address.in.sin_port = htons((uint16_t)port);
@@ -218,9 +204,8 @@ static void look_at_unix(const char *line) {
     unsigned long inode;
     if (sscanf(line, "%*s %*s %*s %x %x %*s %lu %107s", &flags, &type, &inode,
                path) != 4 ||
-        (flags & 0x10000) == 0 || !has_socket(inode)) {
+        (flags & 0x10000) == 0 || !has_socket(inode))
         return;
-    }
     t.address.un.sun_family = AF_UNIX;
     memcpy(t.address.un.sun_path, path, strlen(path));
     t.size = sizeof t.address.un;
@@ -235,12 +220,10 @@ static void look_at_unix(const char *line) {
 static void look_into(const char *path, void (*look)(const char *line)) {
     char line[512];
     FILE *file = fopen(path, "re");
-    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    while (file != NULL && fgets(line, sizeof line, file) != NULL)
         look(line);
-    }
-    if (file != NULL) {
+    if (file != NULL)
         fclose(file);
-    }
 }
 
 static void look(void) {
@@ -262,20 +245,18 @@ static void speak(struct call *c) {
     static const uint8_t greeting[] = {'i', 'n', 'c', 'o', 'd', 'e', 's'};
     uint8_t bytes[BYTES_MAX] = {0};
     size_t size = 1 + draw(sizeof bytes);
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         bytes[i] = (uint8_t)draw(256);
-    }
     if (c->manner == HALF) {
         /* As a greeting begins, in any version, and no more of it. */
         memcpy(bytes, greeting, sizeof greeting);
         bytes[sizeof greeting] = (uint8_t)draw(8);
         size = 1 + draw(40);
     }
-    if (c->manner == NOISE || c->manner == HALF) {
+    if (c->manner == NOISE || c->manner == HALF)
         say(c, bytes, size);
-    } else if (c->manner == REPLAY) {
+    else if (c->manner == REPLAY)
         say(c, all.heard, all.heard_size);
-    }
     c->spoke = true;
 }
 
@@ -294,17 +275,15 @@ static void hear(struct call *c) {
     if (got > 0) {
         memcpy(all.heard, bytes, (size_t)got);
         all.heard_size = (size_t)got;
-        if (c->manner == ECHO) {
+        if (c->manner == ECHO)
             say(c, bytes, (size_t)got);
-        }
     }
 }
 
 static bool connect_as_nobody(int fd, const struct target *t) {
     bool root = geteuid() == 0;
-    if (root && seteuid(NOBODY) != 0) {
+    if (root && seteuid(NOBODY) != 0)
         return false;
-    }
     bool taken =
         connect(fd, &t->address.any, t->size) == 0 || errno == EINPROGRESS;
     return (!root || seteuid(0) == 0) && taken;
@@ -320,14 +299,12 @@ static enum manner draw_manner(const struct target *t) {
 static void call_one(void) {
     const struct target *t = &all.target[draw(all.targets)];
     struct call *c = &all.call[draw(CALLS_MAX)];
-    if (c->fd >= 0) {
+    if (c->fd >= 0)
         hang_up(c);
-    }
     int fd = socket(t->address.any.sa_family,
                     SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) {
+    if (fd < 0)
         return;
-    }
     bool taken = connect_as_nobody(fd, t);
     if (!taken) {
         all.refused++;
@@ -345,18 +322,14 @@ static void call_one(void) {
 
 static void serve(struct call *c) {
     struct pollfd p = {c->fd, POLLIN | (c->spoke ? 0 : POLLOUT), 0};
-    if (poll(&p, 1, 0) <= 0) {
+    if (poll(&p, 1, 0) <= 0)
         p.revents = 0;
-    }
-    if ((p.revents & POLLOUT) != 0 && !c->spoke) {
+    if ((p.revents & POLLOUT) != 0 && !c->spoke)
         speak(c);
-    }
-    if ((p.revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+    if ((p.revents & (POLLIN | POLLHUP | POLLERR)) != 0)
         hear(c);
-    }
-    if (c->fd >= 0 && now_us() >= c->end_us) {
+    if (c->fd >= 0 && now_us() >= c->end_us)
         hang_up(c);
-    }
 }
 
 static void run(void) {
@@ -366,14 +339,11 @@ static void run(void) {
             look();
             next_us = now_us() + LOOK_US;
         }
-        for (unsigned i = 0; i < CALLS_A_ROUND && all.targets > 0; i++) {
+        for (unsigned i = 0; i < CALLS_A_ROUND && all.targets > 0; i++)
             call_one();
-        }
-        for (unsigned i = 0; i < CALLS_MAX; i++) {
-            if (all.call[i].fd >= 0) {
+        for (unsigned i = 0; i < CALLS_MAX; i++)
+            if (all.call[i].fd >= 0)
                 serve(&all.call[i]);
-            }
-        }
         (void)poll(NULL, 0, ROUND_MS); /* clock: so often */
     }
 }
@@ -396,14 +366,12 @@ int main(int argc, char **argv) {
     (void)signal(SIGTERM, end);
     all.random = strtoull(argv[1], NULL, 10) * 2 + 1;
     all.process[0] = (pid_t)atoi(argv[2]);
-    for (unsigned i = 0; i < CALLS_MAX; i++) {
+    for (unsigned i = 0; i < CALLS_MAX; i++)
         all.call[i].fd = -1;
-    }
     run();
     printf("%lu tcp %lu unix calls taken, %lu refused\n", all.taken[0],
            all.taken[1], all.refused);
-    for (unsigned i = 0; i < all.targets; i++) {
+    for (unsigned i = 0; i < all.targets; i++)
         print_target(&all.target[i]);
-    }
     return 0;
 }

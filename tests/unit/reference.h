@@ -47,11 +47,9 @@ static inline uint64_t reference_hash(const uint32_t f[3]) {
 }
 
 static inline bool reference_same(const uint32_t f[3], const uint32_t g[3]) {
-    for (int i = 0; i < 3; i++) {
-        if (f[i] != g[0] && f[i] != g[1] && f[i] != g[2]) {
+    for (int i = 0; i < 3; i++)
+        if (f[i] != g[0] && f[i] != g[1] && f[i] != g[2])
             return false;
-        }
-    }
     return true;
 }
 
@@ -77,9 +75,8 @@ static inline bool reference_is_open(struct reference *r, const uint32_t f[3]) {
     size_t i = reference_hash(f) % REFERENCE_FACES;
     for (;; i = (i + 1) % REFERENCE_FACES) {
         uint32_t *g = r->face[i];
-        if (g[0] == 0 && g[1] == 0) {
+        if (g[0] == 0 && g[1] == 0)
             return false;
-        }
         if (g[0] != g[1] && reference_same(f, g)) {
             g[0] = g[1] = g[2] = 1;
             return true;
@@ -96,9 +93,8 @@ static inline bool reference_apex(struct reference *r, const uint32_t f[3],
     for (uint32_t p = 0; p < r->n; p++) {
         const double *q = reference_at(r, p);
         if (r->distinct[p] == 0 || p == f[0] || p == f[1] || p == f[2] ||
-            incode_orient3d(&r->tally, a, b, c, q) <= 0) {
+            incode_orient3d(&r->tally, a, b, c, q) <= 0)
             continue;
-        }
         if (!any || incode_in_sphere(&r->tally, a, b, c, reference_at(r, *apex),
                                      q) > 0) {
             *apex = p;
@@ -126,20 +122,17 @@ static inline void reference_add(struct reference *r,
 /* A point, its nearest, and whatever two points make their sphere empty. */
 static inline void reference_start(struct reference *r, uint32_t t[4]) {
     uint32_t a = 0, b = UINT32_MAX;
-    for (uint32_t p = 1; p < r->n; p++) {
+    for (uint32_t p = 1; p < r->n; p++)
         if (r->distinct[p] != 0 &&
             (b == UINT32_MAX ||
              incode_compare_distance(reference_at(r, a), reference_at(r, p),
-                                     reference_at(r, b)) < 0)) {
+                                     reference_at(r, b)) < 0))
             b = p;
-        }
-    }
     for (uint32_t c = 0; c < r->n; c++) {
         uint32_t f[3] = {a, b, c}, d = 0;
         if (r->distinct[c] == 0 || c == a || c == b ||
-            !reference_apex(r, f, &d)) {
+            !reference_apex(r, f, &d))
             continue;
-        }
         bool empty = true;
         for (uint32_t p = 0; p < r->n && empty; p++) {
             empty =
@@ -200,14 +193,12 @@ static inline bool reference_data(const char *name,
     (void)snprintf(path, sizeof path, "%s/%s",
                    folder != NULL ? folder : "../shared/data", name);
     FILE *file = fopen(path, "r");
-    if (file == NULL) {
+    if (file == NULL)
         return false;
-    }
     (void)fclose(file);
     int code = host_points_read(path, points, &error);
-    if (code != 0) {
+    if (code != 0)
         fprintf(stderr, "%s\n", error.text);
-    }
     return code == 0;
 }
 

@@ -46,9 +46,8 @@ static void share_words(struct mpi_place *place) {
     }
     count = (int)getpid();
     MPI_Allgather(&count, 1, MPI_INT, place->process, 1, MPI_INT, place->comm);
-    for (int i = 0; i < place->ranks; i++) {
+    for (int i = 0; i < place->ranks; i++)
         place->process[i] = place->bell[i] == NULL ? 0 : place->process[i];
-    }
     MPI_Group_free(&all);
     MPI_Group_free(&local);
     MPI_Barrier(place->local); /* nobody rings before the words are zero */
@@ -70,9 +69,8 @@ int mpi_place_open(struct mpi_place *place) {
 }
 
 void mpi_place_close(struct mpi_place *place) {
-    if (place->yields) {
+    if (place->yields)
         (void)opal_progress_set_yield_when_idle(true);
-    }
     MPI_Win_free(&place->window);
     MPI_Comm_free(&place->local);
     MPI_Comm_free(&place->comm);
@@ -88,16 +86,14 @@ static uint64_t now_us(void) {
 
 void mpi_ring(struct mpi_place *place, int rank) {
     _Atomic uint32_t *bell = place->bell[rank];
-    if (bell == NULL) {
+    if (bell == NULL)
         return;
-    }
     /* What was sent is seen before the word is: the sleeper sets it, and then
      * looks again. */
     atomic_thread_fence(memory_order_seq_cst);
     if (atomic_load_explicit(bell, memory_order_relaxed) != 0 &&
-        atomic_exchange(bell, 0) != 0) {
+        atomic_exchange(bell, 0) != 0)
         (void)syscall(SYS_futex, bell, FUTEX_WAKE, 1, NULL, NULL, 0);
-    }
 }
 
 static bool done(MPI_Request request) {
@@ -134,25 +130,22 @@ void mpi_sleep(struct mpi_place *place, struct mpi_pipe *pipes, unsigned count,
         uint64_t slice = wait_us - passed;
         atomic_store(bell, 1); /* before the last look */
         bool some = request != NULL && done(*request);
-        if (slice > MPI_LOOK_US && request != NULL && place->bell[0] == NULL) {
+        if (slice > MPI_LOOK_US && request != NULL && place->bell[0] == NULL)
             slice = MPI_LOOK_US;
-        }
         for (unsigned i = 0; i < count; i++) {
             settle(&pipes[i]);
             some = some || ready(&pipes[i]);
             if (slice > MPI_LOOK_US &&
-                (place->bell[pipes[i].peer] == NULL || pipes[i].pending)) {
+                (place->bell[pipes[i].peer] == NULL || pipes[i].pending))
                 slice = MPI_LOOK_US;
-            }
         }
         if (!some) {
             struct timespec wait = {(time_t)(slice / 1000000),
                                     (long)(slice % 1000000) * 1000};
             (void)syscall(SYS_futex, bell, FUTEX_WAIT, 1, &wait, NULL, 0);
         }
-        if (atomic_exchange(bell, 0) == 0 || some) {
+        if (atomic_exchange(bell, 0) == 0 || some)
             return;
-        }
         passed = now_us() - start;
     }
 }
@@ -181,17 +174,15 @@ void mpi_pipe_open(struct mpi_pipe *pipe, struct mpi_place *place, int peer,
 static int mpi_send(void *context, const uint8_t *bytes, size_t size) {
     struct mpi_pipe *pipe = context;
     size_t sent = 0;
-    if (pipe->closed) {
+    if (pipe->closed)
         return LINK_PIPE_CLOSED;
-    }
     for (unsigned i = 0; i < MPI_PIPE_SLOTS && sent < size; i++) {
         unsigned slot = slot_of(pipe->sent);
         MPI_Request *request = &pipe->out[slot];
         int complete = 0;
         MPI_Test(request, &complete, MPI_STATUS_IGNORE);
-        if (!complete) {
+        if (!complete)
             break;
-        }
         size_t part =
             size - sent < MPI_PIPE_BYTES ? size - sent : MPI_PIPE_BYTES;
         memcpy(pipe->out_bytes[slot], bytes + sent, part);
@@ -212,9 +203,8 @@ static int mpi_send(void *context, const uint8_t *bytes, size_t size) {
 static int mpi_receive(void *context, uint8_t *bytes, size_t size) {
     struct mpi_pipe *pipe = context;
     size_t got = 0;
-    if (pipe->closed) {
+    if (pipe->closed)
         return LINK_PIPE_CLOSED;
-    }
     settle(pipe);
     for (unsigned i = 0; i < MPI_PIPE_SLOTS && got < size; i++) {
         unsigned slot = slot_of(pipe->taken);
@@ -222,9 +212,8 @@ static int mpi_receive(void *context, uint8_t *bytes, size_t size) {
             int complete = 0;
             MPI_Status status;
             MPI_Test(&pipe->in[slot], &complete, &status);
-            if (!complete) {
+            if (!complete)
                 break;
-            }
             MPI_Get_count(&status, MPI_BYTE, &pipe->in_size);
             pipe->at = 0;
             pipe->closed = pipe->in_size == 0;
@@ -280,11 +269,9 @@ static bool drain(struct mpi_pipe *pipe) {
 }
 
 static void close_pipe(struct mpi_pipe *pipe) {
-    for (unsigned i = 0; i < MPI_PIPE_SLOTS; i++) {
-        if (pipe->in[i] != MPI_REQUEST_NULL) {
+    for (unsigned i = 0; i < MPI_PIPE_SLOTS; i++)
+        if (pipe->in[i] != MPI_REQUEST_NULL)
             MPI_Cancel(&pipe->in[i]);
-        }
-    }
     MPI_Waitall(MPI_PIPE_SLOTS, pipe->in, MPI_STATUSES_IGNORE);
     pipe->closed = true;
 }
@@ -299,25 +286,20 @@ bool mpi_place_part(struct mpi_place *place, struct mpi_pipe *pipes,
      * sent before them or are in the peer's receives. */
     while (!complete) {
         bool clear = true;
-        for (unsigned i = 0; i < count; i++) {
+        for (unsigned i = 0; i < count; i++)
             clear = drain(&pipes[i]) && clear;
-        }
         if (clear && !sent) {
             MPI_Ibarrier(place->comm, &all);
             sent = true;
         }
-        if (sent) {
+        if (sent)
             MPI_Test(&all, &complete, MPI_STATUS_IGNORE);
-        }
-        if (now_us() - start > wait_us) {
+        if (now_us() - start > wait_us)
             return false;
-        }
-        if (!complete) {
+        if (!complete)
             mpi_sleep(place, pipes, count, NULL, MPI_LOOK_US);
-        }
     }
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         close_pipe(&pipes[i]);
-    }
     return true;
 }

@@ -32,17 +32,15 @@ static void hash(uint8_t out[SECURE_KEY_BYTES],
 static void x25519(uint8_t out[SECURE_KEY_BYTES],
                    const uint8_t secret[SECURE_KEY_BYTES],
                    const uint8_t point[SECURE_KEY_BYTES]) {
-    if (crypto_scalarmult_curve25519(out, secret, point) != 0) {
+    if (crypto_scalarmult_curve25519(out, secret, point) != 0)
         memset(out, 0, SECURE_KEY_BYTES);
-    }
     burn_stack();
 }
 
 static void make_nonce(uint8_t nonce[12], uint64_t counter) {
     memset(nonce, 0, 12);
-    for (unsigned i = 0; i < 8; i++) {
+    for (unsigned i = 0; i < 8; i++)
         nonce[4 + i] = (uint8_t)(counter >> 8 * i);
-    }
 }
 
 static void seal(uint8_t *out, const uint8_t *in, size_t size,
@@ -89,9 +87,8 @@ static bool read_digits(const char text[DIGITS], uint8_t *key) {
     static const char digits[] = "0123456789abcdef";
     for (unsigned i = 0; i < DIGITS; i++) {
         const char *at = memchr(digits, text[i], sizeof digits - 1);
-        if (at == NULL) {
+        if (at == NULL)
             return false;
-        }
         key[i / 2] = (uint8_t)(key[i / 2] << 4 | (at - digits));
     }
     return true;
@@ -110,30 +107,25 @@ static enum key_file_state read_key(int fd, const char *mark, uint8_t *key) {
     char text[TEXT];
     size_t before = strlen(mark);
     LINK_ASSERT(before <= KEY_FILE_MARK_MAX);
-    if (fstat(fd, &about) != 0) {
+    if (fstat(fd, &about) != 0)
         return KEY_FILE_UNREADABLE;
-    }
     if (S_ISDIR(about.st_mode)) {
         errno = EISDIR;
         return KEY_FILE_UNREADABLE;
     }
-    if (!S_ISREG(about.st_mode)) {
+    if (!S_ISREG(about.st_mode))
         return KEY_FILE_NO_KEY;
-    }
-    if (about.st_uid != geteuid() && about.st_uid != 0) {
+    if (about.st_uid != geteuid() && about.st_uid != 0)
         return KEY_FILE_FOREIGN;
-    }
-    if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
+    if ((about.st_mode & (S_IWGRP | S_IWOTH)) != 0)
         return KEY_FILE_WRITABLE;
-    }
     ssize_t got = read_all(fd, text, before + DIGITS);
     bool whole = got == (ssize_t)before + DIGITS &&
                  memcmp(text, mark, before) == 0 &&
                  read_digits(text + before, key);
     secure_wipe(text, sizeof text);
-    if (!whole) {
+    if (!whole)
         return got < 0 ? KEY_FILE_UNREADABLE : KEY_FILE_NO_KEY;
-    }
     return (about.st_mode & (S_IRGRP | S_IROTH)) != 0 ? KEY_FILE_SEEN
                                                       : KEY_FILE_GOOD;
 }
@@ -146,12 +138,10 @@ enum key_file_state key_file_read_marked(const char *path, const char *mark,
     enum key_file_state state =
         fd < 0 ? KEY_FILE_UNREADABLE : read_key(fd, mark, key);
     int reason = errno;
-    if (fd >= 0) {
+    if (fd >= 0)
         close(fd);
-    }
-    if (state != KEY_FILE_GOOD && state != KEY_FILE_SEEN) {
+    if (state != KEY_FILE_GOOD && state != KEY_FILE_SEEN)
         secure_wipe(key, SECURE_KEY_BYTES);
-    }
     errno = reason;
     return state;
 }

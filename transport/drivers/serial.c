@@ -43,9 +43,8 @@ static size_t room(struct serial_pipe *pipe) {
         drain_by_clock(pipe);
         ahead = (size_t)((pipe->ahead_microbytes + 999999) / 1000000);
         if (pipe->counts && ioctl(pipe->fd, TIOCOUTQ, &queued) == 0 &&
-            queued > (int)ahead) {
+            queued > (int)ahead)
             ahead = (size_t)queued;
-        }
     }
     size_t most = ahead_most(pipe);
     return ahead < most ? most - ahead : 0;
@@ -60,36 +59,31 @@ static int result(struct serial_pipe *pipe, ssize_t moved) {
 
 static int serial_send(void *context, const uint8_t *bytes, size_t size) {
     struct serial_pipe *pipe = context;
-    if (pipe->closed) {
+    if (pipe->closed)
         return LINK_PIPE_CLOSED;
-    }
     size_t most = room(pipe);
     /* No dribble: a few bytes would wake the other end, whose few would wake
      * this one. */
-    if (most < size && most < ahead_most(pipe) / 2) {
+    if (most < size && most < ahead_most(pipe) / 2)
         most = 0;
-    }
     most = most < size ? most : size;
     int taken = most == 0 ? 0 : result(pipe, write(pipe->fd, bytes, most));
     pipe->blocked = taken >= 0 && (size_t)taken < size;
-    if (taken > 0 && pipe->baud != 0) {
+    if (taken > 0 && pipe->baud != 0)
         pipe->ahead_microbytes += UINT64_C(1000000) * (unsigned)taken;
-    }
     return taken;
 }
 
 static int serial_receive(void *context, uint8_t *bytes, size_t size) {
     struct serial_pipe *pipe = context;
-    if (pipe->closed && pipe->recover != NULL) {
+    if (pipe->closed && pipe->recover != NULL)
         pipe->recover(pipe->context);
-    }
     if (pipe->fd < 0) {
         pipe->closed = true;
         return LINK_PIPE_CLOSED;
     }
-    if (size == 0) {
+    if (size == 0)
         return pipe->closed ? LINK_PIPE_CLOSED : 0;
-    }
     /* With VMIN 1, no bytes is EAGAIN, and 0 is a terminal that hung up. */
     ssize_t got = read(pipe->fd, bytes, size);
     if (got == 0) {
@@ -114,16 +108,14 @@ struct link_pipe serial_link_pipe(struct serial_pipe *pipe) {
 }
 
 short serial_events(const struct serial_pipe *pipe) {
-    if (pipe->closed) {
+    if (pipe->closed)
         return 0;
-    }
     return pipe->blocked && pipe->baud == 0 ? POLLIN | POLLOUT : POLLIN;
 }
 
 uint64_t serial_wait_us(const struct serial_pipe *pipe) {
-    if (pipe->closed || !pipe->blocked || pipe->baud == 0) {
+    if (pipe->closed || !pipe->blocked || pipe->baud == 0)
         return UINT64_MAX;
-    }
     /* Until half of what may be ahead is on the wire. */
     return (uint64_t)ahead_most(pipe) / 2 * 10000000 / pipe->baud;
 }
@@ -134,9 +126,8 @@ int serial_raw(int fd) {
     struct termios t;
     int flags = fcntl(fd, F_GETFL);
     if (flags < 0 || fcntl(fd, F_SETFL, flags | O_NONBLOCK) != 0 ||
-        fcntl(fd, F_SETFD, FD_CLOEXEC) != 0 || tcgetattr(fd, &t) != 0) {
+        fcntl(fd, F_SETFD, FD_CLOEXEC) != 0 || tcgetattr(fd, &t) != 0)
         return -1;
-    }
     cfmakeraw(&t);
     t.c_iflag &= (tcflag_t) ~(IXOFF | IXANY | INPCK);
     t.c_cflag |= CLOCAL | CREAD;
@@ -160,12 +151,10 @@ static const struct {
 
 static int set_wire(int fd, uint32_t baud, bool rts_cts) {
     struct termios t;
-    if (tcgetattr(fd, &t) != 0) {
+    if (tcgetattr(fd, &t) != 0)
         return -1;
-    }
-    if (rts_cts) {
+    if (rts_cts)
         t.c_cflag |= CRTSCTS;
-    }
     for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
         if (speeds[i].baud == baud) {
             (void)cfsetispeed(&t, speeds[i].code);
@@ -179,9 +168,8 @@ static int set_wire(int fd, uint32_t baud, bool rts_cts) {
 
 int serial_open(const char *path, uint32_t baud, bool rts_cts) {
     int fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (fd < 0) {
+    if (fd < 0)
         return -1;
-    }
     if (ioctl(fd, TIOCEXCL) != 0 || serial_raw(fd) != 0 ||
         set_wire(fd, baud, rts_cts) != 0) {
         int reason = errno;
@@ -194,9 +182,8 @@ int serial_open(const char *path, uint32_t baud, bool rts_cts) {
 
 void serial_close(int fd) {
     struct termios t;
-    if (fd < 0) {
+    if (fd < 0)
         return;
-    }
     /* A close waits for bytes to go out, up to 30 s where CTS holds them. */
     if (tcgetattr(fd, &t) == 0 && (t.c_cflag & CRTSCTS) != 0) {
         t.c_cflag &= (tcflag_t)~CRTSCTS;
@@ -212,17 +199,14 @@ int serial_pair(int fds[2]) {
     fds[1] = -1;
     fds[0] = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
     if (fds[0] >= 0 && grantpt(fds[0]) == 0 && unlockpt(fds[0]) == 0 &&
-        ptsname_r(fds[0], path, sizeof path) == 0) {
+        ptsname_r(fds[0], path, sizeof path) == 0)
         fds[1] = open(path, O_RDWR | O_NOCTTY | O_CLOEXEC);
-    }
-    if (fds[1] >= 0 && serial_raw(fds[1]) == 0 && serial_raw(fds[0]) == 0) {
+    if (fds[1] >= 0 && serial_raw(fds[1]) == 0 && serial_raw(fds[0]) == 0)
         return 0;
-    }
     int reason = errno;
     for (int i = 0; i < 2; i++) {
-        if (fds[i] >= 0) {
+        if (fds[i] >= 0)
             close(fds[i]);
-        }
         fds[i] = -1;
     }
     errno = reason;

@@ -40,12 +40,10 @@ static bool is_master(const char *pid, const char *fd, int number) {
     int index = -1;
     snprintf(path, sizeof path, "/proc/%s/fdinfo/%s", pid, fd);
     FILE *file = fopen(path, "re");
-    while (file != NULL && fgets(line, sizeof line, file) != NULL) {
+    while (file != NULL && fgets(line, sizeof line, file) != NULL)
         (void)sscanf(line, "tty-index: %d", &index);
-    }
-    if (file != NULL) {
+    if (file != NULL)
         fclose(file);
-    }
     return index == number;
 }
 
@@ -66,17 +64,15 @@ static bool has_open(const char *pid, const struct stat *device) {
     while (fds != NULL && !made && (entry = readdir(fds)) != NULL) {
         if (entry->d_name[0] == '.' ||
             fstatat(dirfd(fds), entry->d_name, &about, 0) != 0 ||
-            !S_ISCHR(about.st_mode)) {
+            !S_ISCHR(about.st_mode))
             continue;
-        }
         found = found || is_same(&about, device);
         made = number >= 0 &&
                about.st_rdev == makedev(PTMX_MAJOR, PTMX_MINOR) &&
                is_master(pid, entry->d_name, number);
     }
-    if (fds != NULL) {
+    if (fds != NULL)
         closedir(fds);
-    }
     return found && !made;
 }
 
@@ -99,9 +95,8 @@ static int serial_port_holder(const char *device, char *name, size_t size) {
     struct stat about;
     struct dirent *entry;
     int holder = 0;
-    if (stat(device, &about) != 0) {
+    if (stat(device, &about) != 0)
         return 0;
-    }
     DIR *processes = opendir("/proc");
     while (processes != NULL && holder == 0 &&
            (entry = readdir(processes)) != NULL) {
@@ -113,9 +108,8 @@ static int serial_port_holder(const char *device, char *name, size_t size) {
             holder = pid;
         }
     }
-    if (processes != NULL) {
+    if (processes != NULL)
         closedir(processes);
-    }
     return holder;
 }
 
@@ -185,9 +179,8 @@ static int refuse(struct serial_port *port, const char *why, const char *help) {
 static int refuse_used(struct serial_port *port) {
     char name[64], why[128];
     int pid = serial_port_holder(port->device, name, sizeof name);
-    if (pid == 0) {
+    if (pid == 0)
         return refuse(port, "in use", "close the program that uses it");
-    }
     snprintf(why, sizeof why, "in use by process %d (%s)", pid, name);
     return refuse(port, why, "end that, or give another port");
 }
@@ -211,9 +204,8 @@ static void set_lines(const struct serial_port *port, int fd) {
     int lines = (port->settings.dtr ? TIOCM_DTR : 0) |
                 (port->settings.rts ? TIOCM_RTS : 0);
     int have = 0, mask = TIOCM_DTR | TIOCM_RTS;
-    if (port->settings.rts_cts) {
+    if (port->settings.rts_cts)
         mask = TIOCM_DTR; /* RTS is the driver's */
-    }
     if (ioctl(fd, TIOCMGET, &have) == 0 && (have & mask) != (lines & mask)) {
         lines = (have & ~mask) | (lines & mask);
         (void)ioctl(fd, TIOCMSET, &lines);
@@ -223,9 +215,8 @@ static void set_lines(const struct serial_port *port, int fd) {
 /* Rate and flow control by the library, which knows rates without a name. */
 static int set_rate(struct sp_port *library,
                     const struct serial_port_settings *s) {
-    if (s->baud != 0 && sp_set_baudrate(library, (int)s->baud) != SP_OK) {
+    if (s->baud != 0 && sp_set_baudrate(library, (int)s->baud) != SP_OK)
         return -1;
-    }
     return !s->rts_cts ||
                    sp_set_flowcontrol(library, SP_FLOWCONTROL_RTSCTS) == SP_OK
                ? 0
@@ -235,9 +226,8 @@ static int set_rate(struct sp_port *library,
 static int open_by_library(struct serial_port *port, const char *path) {
     struct sp_port *library = NULL;
     int fd = -1;
-    if (sp_get_port_by_name(path, &library) != SP_OK) {
+    if (sp_get_port_by_name(path, &library) != SP_OK)
         return refuse(port, "no such serial port", PLUG_IN);
-    }
     if (sp_open(library, SP_MODE_READ_WRITE) != SP_OK) {
         int reason = sp_last_error_code();
         sp_free_port(library);
@@ -267,9 +257,8 @@ static int open_by_library(struct serial_port *port, const char *path) {
 
 static int open_terminal(struct serial_port *port, const char *path) {
     int fd = serial_open(path, port->settings.baud, false);
-    if (fd < 0) {
+    if (fd < 0)
         return refuse_errno(port, errno);
-    }
     if (!hold(port, fd)) {
         serial_close(fd);
         return refuse_used(port);
@@ -282,12 +271,10 @@ static int open_terminal(struct serial_port *port, const char *path) {
 static int open_device(struct serial_port *port) {
     char path[PATH_MAX];
     struct stat about;
-    if (realpath(port->device, path) == NULL || stat(path, &about) != 0) {
+    if (realpath(port->device, path) == NULL || stat(path, &about) != 0)
         return refuse_errno(port, errno);
-    }
-    if (!S_ISCHR(about.st_mode)) {
+    if (!S_ISCHR(about.st_mode))
         return refuse(port, "not a serial port", "give the device of one");
-    }
     return is_pseudo_terminal(about.st_rdev) ? open_terminal(port, path)
                                              : open_by_library(port, path);
 }
@@ -301,9 +288,8 @@ static uint64_t clock_us(void) {
 static int look(struct serial_port *port) {
     int fd = find(port) == 0 ? open_device(port) : -1;
     port->look_us = clock_us();
-    if (fd < 0) {
+    if (fd < 0)
         return -1;
-    }
     port->pipe.fd = fd;
     port->pipe.counts = true;
     port->pipe.closed = false;
@@ -320,9 +306,8 @@ static void recover(void *context) {
         port->pipe.fd = -1;
         refuse(port, "the port is gone", "plug it in");
     }
-    if (clock_us() - port->look_us >= SERIAL_LOOK_US && look(port) == 0) {
+    if (clock_us() - port->look_us >= SERIAL_LOOK_US && look(port) == 0)
         port->returned++;
-    }
 }
 
 int serial_port_open(struct serial_port *port,

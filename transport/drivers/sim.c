@@ -30,23 +30,20 @@ static double exponential(uint64_t *state) {
         unsigned falling = 1;
         for (;;) {
             uint64_t next = sim_draw(state);
-            if (next >= last) {
+            if (next >= last)
                 break;
-            }
             last = next;
             falling++;
         }
-        if (falling % 2 == 1) {
+        if (falling % 2 == 1)
             return whole + (double)(first >> 11) * 0x1p-53;
-        }
     }
 }
 
 /* How many go well before the next that does not. */
 static uint64_t draw_gap(uint64_t *state, double chance) {
-    if (chance <= 0) {
+    if (chance <= 0)
         return UINT64_MAX;
-    }
     double gap = exponential(state) * (1 / chance - 0.5);
     return gap < 1e18 ? (uint64_t)gap : UINT64_MAX;
 }
@@ -55,9 +52,8 @@ static uint64_t draw_gap(uint64_t *state, double chance) {
 static bool strikes(struct sim_direction *direction, enum sim_fault kind,
                     uint64_t steps) {
     uint64_t *gap = &direction->gap[kind];
-    if (*gap == UINT64_MAX) {
+    if (*gap == UINT64_MAX)
         return false;
-    }
     if (*gap >= steps) {
         *gap -= steps;
         return false;
@@ -95,12 +91,10 @@ static uint64_t passed_of(const struct sim_direction *direction, uint32_t i,
                           uint64_t time_ns) {
     const struct sim_segment *s = segment_at(direction, i);
     uint64_t end = segment_end(direction, i);
-    if (time_ns < s->from_ns) {
+    if (time_ns < s->from_ns)
         return s->first;
-    }
-    if (direction->step_ns == 0) {
+    if (direction->step_ns == 0)
         return end;
-    }
     uint64_t count = (time_ns - s->from_ns) / direction->step_ns;
     return count < end - s->first ? s->first + count : end;
 }
@@ -123,14 +117,12 @@ static void put(struct sim_direction *direction, const uint8_t *bytes,
     uint64_t now = now_ns(direction), room = direction->quality.bytes;
     uint64_t left = room - (direction->end - direction->begin);
     size = size < left ? size : (size_t)left;
-    if (size == 0) {
+    if (size == 0)
         return;
-    }
     uint64_t *medium = direction->medium_ns;
     bool others = medium != NULL && *medium != direction->free_ns;
-    if (others && *medium > direction->free_ns) {
+    if (others && *medium > direction->free_ns)
         direction->free_ns = *medium;
-    }
     if (direction->segments == 0 || direction->free_ns < now || others) {
         direction->free_ns =
             direction->free_ns < now ? now : direction->free_ns;
@@ -143,24 +135,21 @@ static void put(struct sim_direction *direction, const uint8_t *bytes,
     memcpy(direction->bytes, bytes + first, size - first);
     direction->end += size;
     direction->free_ns += size * direction->step_ns;
-    if (medium != NULL) {
+    if (medium != NULL)
         *medium = direction->free_ns;
-    }
 }
 
 /* Nothing for a while; then another segment. */
 static void stall(struct sim_direction *direction, uint64_t us) {
     uint64_t now = now_ns(direction);
-    if (direction->segments + 1 >= SIM_SEGMENTS) {
+    if (direction->segments + 1 >= SIM_SEGMENTS)
         return;
-    }
     direction->free_ns =
         (direction->free_ns < now ? now : direction->free_ns) + us * 1000;
     if (direction->segments > 0 &&
         segment_end(direction, direction->segments - 1) ==
-            segment_at(direction, direction->segments - 1)->first) {
+            segment_at(direction, direction->segments - 1)->first)
         direction->segments--; /* an empty one */
-    }
     struct sim_segment *s = segment_at(direction, direction->segments++);
     *s = (struct sim_segment){direction->end, direction->free_ns};
 }
@@ -169,9 +158,8 @@ static void stall(struct sim_direction *direction, uint64_t us) {
 static void put_again(struct sim_direction *direction) {
     uint64_t at = direction->frame, end = direction->end,
              room = direction->quality.bytes;
-    if (2 * (end - at) > room) {
+    if (2 * (end - at) > room)
         return;
-    }
     for (; at < end; at++) {
         uint8_t byte = direction->bytes[at % room];
         put(direction, &byte, 1);
@@ -183,42 +171,34 @@ static void put_again(struct sim_direction *direction) {
 /* Bytes that pass before the next strike. */
 static uint64_t untouched(const struct sim_direction *direction) {
     uint64_t least = direction->gap[SIM_FLIP] / 8;
-    for (int kind = SIM_DELETE; kind < SIM_CHANCES; kind++) {
+    for (int kind = SIM_DELETE; kind < SIM_CHANCES; kind++)
         least = direction->gap[kind] < least ? direction->gap[kind] : least;
-    }
     return direction->burst > 0 ? 0 : least;
 }
 
 static void count_down(struct sim_direction *direction, uint64_t bytes) {
-    for (int kind = SIM_FLIP; kind < SIM_CHANCES; kind++) {
-        if (direction->gap[kind] != UINT64_MAX) {
+    for (int kind = SIM_FLIP; kind < SIM_CHANCES; kind++)
+        if (direction->gap[kind] != UINT64_MAX)
             direction->gap[kind] -= kind == SIM_FLIP ? 8 * bytes : bytes;
-        }
-    }
 }
 
 /* A byte that something may happen to. */
 static void put_struck(struct sim_direction *direction, uint8_t byte) {
-    while (strikes(direction, SIM_FLIP, 8)) {
+    while (strikes(direction, SIM_FLIP, 8))
         byte ^= (uint8_t)(1u << (sim_draw(&direction->random) >> 32) % 8);
-    }
-    if (strikes(direction, SIM_BURST, 1)) {
+    if (strikes(direction, SIM_BURST, 1))
         direction->burst = direction->faults.burst_bytes;
-    }
     if (direction->burst > 0) {
         direction->burst--;
         byte = (uint8_t)(sim_draw(&direction->random) >> 32);
     }
-    if (strikes(direction, SIM_STALL, 1)) {
+    if (strikes(direction, SIM_STALL, 1))
         stall(direction, direction->faults.stall_us);
-    }
     bool gone = strikes(direction, SIM_DELETE, 1);
-    if (!gone) {
+    if (!gone)
         put(direction, &byte, 1);
-    }
-    if (strikes(direction, SIM_REPEAT, 1)) {
+    if (strikes(direction, SIM_REPEAT, 1))
         put(direction, &byte, 1);
-    }
     if (strikes(direction, SIM_INSERT, 1)) {
         byte = (uint8_t)(sim_draw(&direction->random) >> 32);
         put(direction, &byte, 1);
@@ -251,18 +231,16 @@ static void begin_frame(struct sim_direction *direction) {
                           : SIM_PASSES;
     direction->losing =
         direction->fate == SIM_DROPPED || strikes(direction, SIM_LOSS, 1);
-    if (direction->fate == SIM_LATE) {
+    if (direction->fate == SIM_LATE)
         stall(direction, LATE_STALLS * 100000);
-    }
 }
 
 /* A frame, or a part of one: its last byte is the only zero it may hold. */
 static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
                        size_t size, bool last) {
     bool first = !direction->inside;
-    if (first) {
+    if (first)
         begin_frame(direction);
-    }
     if (direction->deaf) {
         direction->struck[SIM_DEAF]++;
     } else if (!direction->losing && direction->fate == SIM_SPOILED && first) {
@@ -276,9 +254,8 @@ static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
     }
     if (last) {
         direction->inside = false;
-        if (direction->fate == SIM_TWICE && !direction->deaf) {
+        if (direction->fate == SIM_TWICE && !direction->deaf)
             put_again(direction);
-        }
     }
 }
 
@@ -287,18 +264,16 @@ static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
 static int sim_send(void *context, const uint8_t *bytes, size_t size) {
     struct sim_end *end = context;
     struct sim_direction *direction = end->out;
-    if (*end->cut) {
+    if (*end->cut)
         return LINK_PIPE_CLOSED;
-    }
     uint64_t held = direction->end - passed(direction, now_ns(direction));
     uint64_t most =
         held < direction->quality.room ? direction->quality.room - held : 0;
     uint64_t place =
         direction->quality.bytes - (direction->end - direction->begin);
     most = most < place ? most : place;
-    if (direction->segments == SIM_SEGMENTS) {
+    if (direction->segments == SIM_SEGMENTS)
         most = 0;
-    }
     direction->blocked = most < size;
     size = size < most ? size : (size_t)most;
     for (size_t at = 0; at < size;) {
@@ -315,9 +290,8 @@ static int sim_receive(void *context, uint8_t *bytes, size_t size) {
     struct sim_end *end = context;
     struct sim_direction *direction = end->in;
     uint64_t now = now_ns(direction), late = latency_ns(direction);
-    if (*end->cut) {
+    if (*end->cut)
         return LINK_PIPE_CLOSED;
-    }
     uint64_t there =
         now < late ? direction->begin : passed(direction, now - late);
     uint64_t room = direction->quality.bytes, got = there - direction->begin;
@@ -348,9 +322,8 @@ uint64_t sim_next_us(const struct sim_direction *direction,
         uint64_t end = segment_end(direction, i);
         uint64_t first =
             s->first > direction->begin ? s->first : direction->begin;
-        if (first >= end) {
+        if (first >= end)
             continue;
-        }
         uint64_t from = s->from_ns + latency_ns(direction);
         uint64_t head = from + (first - s->first + 1) * direction->step_ns;
         uint64_t tail = from + (end - s->first) * direction->step_ns;
@@ -363,9 +336,8 @@ uint64_t sim_next_us(const struct sim_direction *direction,
 uint64_t sim_room_us(const struct sim_direction *direction) {
     uint64_t half = direction->quality.room / 2 * direction->step_ns;
     if (!direction->blocked || direction->segments == SIM_SEGMENTS ||
-        direction->end - direction->begin == direction->quality.bytes) {
+        direction->end - direction->begin == direction->quality.bytes)
         return UINT64_MAX;
-    }
     return direction->free_ns > half ? (direction->free_ns - half + 999) / 1000
                                      : 0;
 }
@@ -375,11 +347,10 @@ uint64_t sim_room_us(const struct sim_direction *direction) {
 void sim_direction_faults(struct sim_direction *direction,
                           const struct sim_faults *faults) {
     direction->burst = 0;
-    if (faults == NULL) {
+    if (faults == NULL)
         memset(&direction->faults, 0, sizeof direction->faults);
-    } else {
+    else
         direction->faults = *faults;
-    }
     for (int kind = 0; kind < SIM_CHANCES; kind++) {
         direction->gap[kind] =
             draw_gap(&direction->random, direction->faults.chance[kind]);

@@ -46,14 +46,12 @@ static struct tcp_candidate *place(struct tcp_wire *wire) {
     unsigned count[2] = {0, 0};
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         struct tcp_candidate *c = &wire->candidate[i];
-        if (c->fd < 0) {
+        if (c->fd < 0)
             return c;
-        }
         bool has = begun(wire, c);
         count[has]++;
-        if (oldest[has] == NULL || c->since_us < oldest[has]->since_us) {
+        if (oldest[has] == NULL || c->since_us < oldest[has]->since_us)
             oldest[has] = c;
-        }
     }
     return oldest[count[true] > count[false]];
 }
@@ -82,9 +80,8 @@ static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake) {
         errno = EAGAIN;
         return false;
     }
-    if (c->ends != NULL) {
+    if (c->ends != NULL)
         self.ends = *c->ends;
-    }
     secure_shake_init(shake, &self, &seed);
     secure_wipe(&seed, sizeof seed);
     return true;
@@ -93,9 +90,8 @@ static bool begin_shake(struct tcp_wire *wire, struct secure_shake *shake) {
 static bool begin(struct tcp_wire *wire, struct tcp_candidate *c, int fd,
                   bool connected, uint64_t now_us) {
     memset(&c->heard, 0, sizeof c->heard);
-    if (wire->config.suite != NULL && !begin_shake(wire, &c->heard.shake)) {
+    if (wire->config.suite != NULL && !begin_shake(wire, &c->heard.shake))
         return false;
-    }
     /* A peer that answers no more is a broken connection, in the end. */
     unsigned silent_ms = TCP_SILENT_MS;
     if (!is_local(wire)) {
@@ -113,13 +109,11 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us) {
     bool some = false;
     for (unsigned i = 0; i < TCP_ACCEPTS_MAX; i++) {
         struct tcp_candidate *c = place(wire);
-        if (i >= TCP_TURNS_MAX && crowded(wire)) {
+        if (i >= TCP_TURNS_MAX && crowded(wire))
             break;
-        }
         int fd = accept4(wire->listener, NULL, NULL, SOCK_CLOEXEC);
-        if (fd < 0) {
+        if (fd < 0)
             break;
-        }
         some = true;
         if (tcp_prepare(fd) != 0) {
             close(fd);
@@ -127,9 +121,8 @@ static bool accept_some(struct tcp_wire *wire, uint64_t now_us) {
         }
         wire->strangers += c->fd >= 0;
         drop(c);
-        if (!begin(wire, c, fd, true, now_us)) {
+        if (!begin(wire, c, fd, true, now_us))
             close(fd);
-        }
     }
     return some;
 }
@@ -149,14 +142,12 @@ static void call(struct tcp_wire *wire, uint64_t now_us) {
     if (fd >= 0 && tcp_prepare(fd) == 0) {
         bool at_once = connect(fd, &to->to.any, to->size) == 0;
         if ((at_once || errno == EINPROGRESS) &&
-            begin(wire, &wire->candidate[0], fd, at_once, now_us)) {
+            begin(wire, &wire->candidate[0], fd, at_once, now_us))
             return;
-        }
     }
     wire->fault = errno;
-    if (fd >= 0) {
+    if (fd >= 0)
         close(fd);
-    }
     pause_calls(wire, now_us, TCP_PAUSE_MAX_US);
 }
 
@@ -170,12 +161,10 @@ static int answered(struct tcp_wire *wire, struct tcp_candidate *c,
     struct pollfd wait = {c->fd, POLLOUT, 0};
     int fault = 0;
     socklen_t size = sizeof fault;
-    if (c->connected) {
+    if (c->connected)
         return 1;
-    }
-    if (poll(&wait, 1, 0) == 0) {
+    if (poll(&wait, 1, 0) == 0)
         return 0;
-    }
     if (getsockopt(c->fd, SOL_SOCKET, SO_ERROR, &fault, &size) != 0 ||
         fault != 0) {
         wire->fault = fault;
@@ -198,15 +187,12 @@ static int hear_first(const struct tcp_wire *wire, struct tcp_candidate *c,
     int got = pipe.receive(pipe.context, first->bytes + first->end,
                            sizeof first->bytes - first->end);
     first->end += got > 0 ? (size_t)got : 0;
-    if (got > 0 && link_greets(first->bytes, first->end)) {
+    if (got > 0 && link_greets(first->bytes, first->end))
         return 1;
-    }
-    if (got < 0 || first->end == sizeof first->bytes) {
+    if (got < 0 || first->end == sizeof first->bytes)
         return -1;
-    }
-    if (first->end > 0) {
+    if (first->end > 0)
         return wire->tcp.fd < 0 && secure_greets(first->bytes, first->end);
-    }
     return !wire->proven && now_us - c->since_us > TCP_QUIET_US;
 }
 
@@ -224,12 +210,10 @@ static int prove(struct tcp_wire *wire, struct tcp_candidate *c,
                  uint64_t now_us) {
     struct link_pipe pipe = tcp_link_pipe(&c->pipe);
     wire->other_user = is_local(wire) && !unix_file_peer_is_ours(c->fd);
-    if (wire->other_user) {
+    if (wire->other_user)
         return -1;
-    }
-    if (wire->config.suite == NULL) {
+    if (wire->config.suite == NULL)
         return wire->config.listens ? hear_first(wire, c, now_us) : 1;
-    }
     int status = secure_shake(&c->heard.shake, &pipe);
     note_keys(wire, status, c->heard.shake.fault, now_us);
     bool elsewhere =
@@ -275,9 +259,8 @@ static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
     bool crowded_out = late ? !c->connected
                             : c->connected && tcp_wire_doubt(wire).what == NULL;
     uint64_t *again = c->connected ? &wire->prove_us : &wire->answer_us;
-    if (late) {
+    if (late)
         *again = within(0, 2 * *again);
-    }
     pause_calls(wire, now_us,
                 crowded_out ? TCP_PAUSE_AWAY_US : TCP_PAUSE_MAX_US);
 }
@@ -285,22 +268,19 @@ static void call_again(struct tcp_wire *wire, const struct tcp_candidate *c,
 static void look_at(struct tcp_wire *wire, struct tcp_candidate *c,
                     uint64_t now_us) {
     int status = answered(wire, c, now_us);
-    if (status > 0) {
+    if (status > 0)
         status = prove(wire, c, now_us);
-    }
     if (status > 0) {
         promote(wire, c, now_us);
         return;
     }
     bool late = now_us - c->since_us > patience(wire, c);
-    if (status == 0 && !late) {
+    if (status == 0 && !late)
         return;
-    }
-    if (wire->config.listens) {
+    if (wire->config.listens)
         wire->strangers++;
-    } else {
+    else
         call_again(wire, c, status == 0, now_us);
-    }
     drop(c);
 }
 
@@ -319,29 +299,25 @@ static void tick(struct tcp_wire *wire) {
     uint64_t now_us = clock_us();
     bool quiet = wire->quiet, met = false;
     wire->quiet = false;
-    if (holds_off(wire, now_us)) {
+    if (holds_off(wire, now_us))
         return;
-    }
-    if (admits(wire, now_us)) {
+    if (admits(wire, now_us))
         met = !quiet && accept_some(wire, now_us);
-    } else if (wire->listener < 0 && wire->tcp.fd < 0 &&
-               wire->candidate[0].fd < 0 && now_us >= wire->call_us) {
+    else if (wire->listener < 0 && wire->tcp.fd < 0 &&
+             wire->candidate[0].fd < 0 && now_us >= wire->call_us)
         call(wire, now_us);
-    }
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         if (wire->candidate[i].fd >= 0) {
             met = true;
             look_at(wire, &wire->candidate[i], now_us);
         }
     }
-    if (now_us - wire->other_key_us > TCP_OTHER_KEY_US) {
+    if (now_us - wire->other_key_us > TCP_OTHER_KEY_US)
         wire->other_key = wire->lone_key = false;
-    }
     bool in_use = wire->tcp.fd >= 0 && wire->proven;
     wire->look_us = met ? now_us + TCP_LOOK_US : 0;
-    if (admits(wire, now_us)) {
+    if (admits(wire, now_us))
         wire->admit_us = !in_use && crowded(wire) ? now_us + TCP_CROWD_US : 0;
-    }
 }
 
 /* --- the pipe ------------------------------------------------------------ */
@@ -372,9 +348,8 @@ static struct link_pipe inner(struct tcp_wire *wire) {
 
 static int wire_send(void *context, const uint8_t *bytes, size_t size) {
     struct tcp_wire *wire = context;
-    if (wire->tcp.fd < 0 || wire->replaced) {
+    if (wire->tcp.fd < 0 || wire->replaced)
         return LINK_PIPE_CLOSED;
-    }
     struct link_pipe pipe = inner(wire);
     int sent = pipe.send(pipe.context, bytes, size);
     return sent < 0 ? broken(wire) : sent;
@@ -412,9 +387,8 @@ static int wire_receive(void *context, uint8_t *bytes, size_t size) {
     int got = wire->first.begin < wire->first.end
                   ? receive_first(wire, bytes, size)
                   : pipe.receive(pipe.context, bytes, size);
-    if (got > 0 && !wire->proven) {
+    if (got > 0 && !wire->proven)
         hear_greeting(wire, bytes, (size_t)got);
-    }
     return got < 0 ? broken(wire) : got;
 }
 
@@ -444,9 +418,8 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire) {
 static int bind_there(const struct tcp_wire *wire, int fd) {
     const struct tcp_address *at = &wire->config.address;
     int on = 1;
-    if (is_local(wire)) {
+    if (is_local(wire))
         return unix_file_bind(fd, at);
-    }
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     return bind(fd, &at->to.any, at->size);
 }
@@ -454,9 +427,8 @@ static int bind_there(const struct tcp_wire *wire, int fd) {
 static int listen_there(struct tcp_wire *wire) {
     int fd = socket(wire->config.address.to.any.sa_family,
                     SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (fd < 0) {
+    if (fd < 0)
         return -1;
-    }
     if (tcp_prepare(fd) != 0 || bind_there(wire, fd) != 0 ||
         listen(fd, TCP_QUEUE_MAX) != 0) {
         int reason = errno;
@@ -476,9 +448,8 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config) {
     wire->answer_us = TCP_CALL_MIN_US;
     wire->prove_us = TCP_PROVE_MIN_US;
     tcp_pipe_init(&wire->tcp, -1);
-    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++)
         wire->candidate[i].fd = -1;
-    }
     if (is_local(wire)) {
         wire->config.suite = NULL;
     } else if (config->suite == NULL && !config->insecure) {
@@ -489,16 +460,14 @@ int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config) {
 }
 
 void tcp_wire_close(struct tcp_wire *wire) {
-    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++)
         drop(&wire->candidate[i]);
-    }
     leave(wire);
     if (wire->listener >= 0) {
         close(wire->listener);
         wire->listener = -1;
-        if (is_local(wire)) {
+        if (is_local(wire))
             unix_file_remove(&wire->config.address);
-        }
     }
 }
 
@@ -511,16 +480,13 @@ void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us) {
 unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds) {
     unsigned used = 0;
     short events = wire->tcp.fd < 0 ? 0 : tcp_events(&wire->tcp);
-    if (events != 0) {
+    if (events != 0)
         fds[used++] = (struct pollfd){wire->tcp.fd, events, 0};
-    }
     uint64_t now_us = clock_us();
-    if (holds_off(wire, now_us)) {
+    if (holds_off(wire, now_us))
         return used;
-    }
-    if (admits(wire, now_us)) {
+    if (admits(wire, now_us))
         fds[used++] = (struct pollfd){wire->listener, POLLIN, 0};
-    }
     for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
         const struct tcp_candidate *c = &wire->candidate[i];
         if (c->fd >= 0) {
@@ -540,11 +506,9 @@ uint64_t tcp_wire_wait_us(const struct tcp_wire *wire) {
 
 void tcp_wire_heard(struct tcp_wire *wire, const struct pollfd *fds,
                     unsigned count) {
-    for (unsigned i = 0; i < count; i++) {
-        if (fds[i].fd == wire->tcp.fd) {
+    for (unsigned i = 0; i < count; i++)
+        if (fds[i].fd == wire->tcp.fd)
             tcp_heard(&wire->tcp, fds[i].revents);
-        } else if (fds[i].fd == wire->listener) {
+        else if (fds[i].fd == wire->listener)
             wire->quiet = fds[i].revents == 0;
-        }
-    }
 }

@@ -10,16 +10,13 @@
 /* Whether the file is a socket without a listener: 0, or what it is instead. */
 static int left_over(const struct tcp_address *address) {
     struct stat about;
-    if (lstat(tcp_address_path(address), &about) != 0) {
+    if (lstat(tcp_address_path(address), &about) != 0)
         return errno;
-    }
-    if (!S_ISSOCK(about.st_mode)) {
+    if (!S_ISSOCK(about.st_mode))
         return EEXIST;
-    }
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (fd < 0) {
+    if (fd < 0)
         return errno;
-    }
     int reason = connect(fd, &address->to.any, address->size) == 0 ? 0 : errno;
     close(fd);
     return reason == ECONNREFUSED ? 0 : EADDRINUSE;
@@ -40,16 +37,13 @@ int unix_file_pair(int fds[2]) {
 }
 
 int unix_file_bind(int fd, const struct tcp_address *address) {
-    if (bind_for_owner(fd, address) == 0) {
+    if (bind_for_owner(fd, address) == 0)
         return 0;
-    }
-    if (errno != EADDRINUSE) {
+    if (errno != EADDRINUSE)
         return -1;
-    }
     int reason = left_over(address);
-    if (reason == 0 && unlink(tcp_address_path(address)) != 0) {
+    if (reason == 0 && unlink(tcp_address_path(address)) != 0)
         reason = errno;
-    }
     if (reason != 0) {
         errno = reason;
         return -1;
@@ -66,9 +60,8 @@ bool unix_file_peer_is_ours(int fd) {
 
 void unix_file_remove(const struct tcp_address *address) {
     int before = errno;
-    if (left_over(address) == 0) {
+    if (left_over(address) == 0)
         (void)unlink(tcp_address_path(address));
-    }
     errno = before;
 }
 
@@ -85,9 +78,8 @@ void wait_files(struct pollfd *fds, nfds_t count, uint64_t wait_us,
     uint64_t awake = awake_us < wait_us ? awake_us : wait_us;
     uint64_t start = awake > 0 ? clock_us() : 0;
     while (awake > 0 && clock_us() - start < awake) {
-        if (poll(fds, count, 0) != 0) {
+        if (poll(fds, count, 0) != 0)
             return;
-        }
         (void)sched_yield();
     }
     struct timespec wait = {(time_t)(wait_us / 1000000),

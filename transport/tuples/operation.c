@@ -25,9 +25,8 @@ static void tie(struct tuples_operation *op, unsigned place,
 
 /* Ready for another, where nobody looks at it and it owes nothing. */
 static void free_if_over(struct tuples_operation *op) {
-    if (op->phase == TUPLES_OVER && op->closed && op->owed == 0) {
+    if (op->phase == TUPLES_OVER && op->closed && op->owed == 0)
         op->phase = TUPLES_FREE;
-    }
 }
 
 /* --- the calls */
@@ -44,19 +43,16 @@ static void begin(struct tuples *space, struct tuples_operation *op,
 }
 
 static int find_free(const struct tuples *space) {
-    for (unsigned i = 0; i < space->config.operations; i++) {
-        if (space->operations[i].phase == TUPLES_FREE) {
+    for (unsigned i = 0; i < space->config.operations; i++)
+        if (space->operations[i].phase == TUPLES_FREE)
             return (int)i;
-        }
-    }
     return TUPLES_BUSY;
 }
 
 unsigned tuples_room(const struct tuples *space) {
     unsigned room = 0;
-    for (unsigned i = 0; i < space->config.operations; i++) {
+    for (unsigned i = 0; i < space->config.operations; i++)
         room += space->operations[i].phase == TUPLES_FREE;
-    }
     return room;
 }
 
@@ -90,9 +86,8 @@ static bool write_tuple(const struct tuples *space, struct tuples_operation *op,
 static bool tuples_operation_put(struct tuples *space, unsigned number,
                                  const struct tuple *tuple) {
     struct tuples_operation *op = &space->operations[number];
-    if (!write_tuple(space, op, tuple)) {
+    if (!write_tuple(space, op, tuple))
         return false;
-    }
     begin(space, op, TUPLES_VERB_OUT);
     op->number = ++space->clock;
     tie(op, home_of(space, op->tuple), TUPLES_OWES_PUT);
@@ -101,9 +96,8 @@ static bool tuples_operation_put(struct tuples *space, unsigned number,
 
 int tuples_out(struct tuples *space, const struct tuple *tuple) {
     int number = find_free(space);
-    if (number < 0) {
+    if (number < 0)
         return number;
-    }
     return tuples_operation_put(space, (unsigned)number, tuple) ? number
                                                                 : TUPLES_UNFIT;
 }
@@ -111,14 +105,12 @@ int tuples_out(struct tuples *space, const struct tuple *tuple) {
 int tuples_eval(struct tuples *space, uint32_t function,
                 const struct tuple *tuple) {
     int number = find_free(space);
-    if (number < 0) {
+    if (number < 0)
         return number;
-    }
     struct tuples_operation *op = &space->operations[number];
     if (function >= space->config.function_count ||
-        space->config.processes == 0 || !write_tuple(space, op, tuple)) {
+        space->config.processes == 0 || !write_tuple(space, op, tuple))
         return TUPLES_UNFIT;
-    }
     begin(space, op, TUPLES_VERB_EVAL);
     op->number = function;
     tie(op, place_of_eval(space), TUPLES_OWES_PUT);
@@ -129,9 +121,8 @@ int tuples_eval(struct tuples *space, uint32_t function,
 static void ask_all(const struct tuples *space, struct tuples_operation *op) {
     unsigned places = space->config.places;
     if (tuple_begins_formal(op->pattern)) {
-        for (unsigned p = 0; p < places; p++) {
+        for (unsigned p = 0; p < places; p++)
             tie(op, p, TUPLES_OWES_ASK);
-        }
     } else {
         tie(op, tuple_signature(op->pattern) % places, TUPLES_OWES_ASK);
         tie(op, tuple_key(op->pattern) % places, TUPLES_OWES_ASK);
@@ -143,15 +134,13 @@ static void ask_all(const struct tuples *space, struct tuples_operation *op) {
 static int ask(struct tuples *space, enum tuples_verb verb,
                const struct tuple *pattern) {
     int number = find_free(space);
-    if (number < 0) {
+    if (number < 0)
         return number;
-    }
     struct tuples_operation *op = &space->operations[number];
     op->pattern_size =
         (uint16_t)tuple_write(pattern, op->pattern, sizeof op->pattern);
-    if (op->pattern_size == 0) {
+    if (op->pattern_size == 0)
         return TUPLES_UNFIT;
-    }
     begin(space, op, verb);
     ask_all(space, op);
     return number;
@@ -199,9 +188,8 @@ static struct tuples_operation *open_operation(const struct tuples *space,
 enum tuples_status tuples_poll(const struct tuples *space, int operation,
                                struct tuple *tuple) {
     const struct tuples_operation *op = open_operation(space, operation);
-    if (op->status == TUPLES_DONE && op->has_tuple) {
+    if (op->status == TUPLES_DONE && op->has_tuple)
         LINK_ASSERT(tuple_read(tuple, op->tuple, op->size));
-    }
     return (enum tuples_status)op->status;
 }
 
@@ -213,13 +201,12 @@ static void finish(struct tuples *space, struct tuples_operation *op,
                    enum tuples_status status) {
     for (unsigned p = 0; p < space->config.places; p++) {
         uint8_t tied = op->ties[p];
-        if (tied == TUPLES_OWES_ASK) {
+        if (tied == TUPLES_OWES_ASK)
             tie(op, p, TUPLES_UNTIED);
-        } else if (tied == TUPLES_HOLDS && status == TUPLES_DONE) {
+        else if (tied == TUPLES_HOLDS && status == TUPLES_DONE)
             tie(op, p, TUPLES_OWES_TAKEN);
-        } else if (tied != TUPLES_UNTIED) {
+        else if (tied != TUPLES_UNTIED)
             tie(op, p, TUPLES_OWES_RELEASE);
-        }
     }
     op->phase = TUPLES_OVER;
     op->status = (uint8_t)status;
@@ -229,11 +216,10 @@ static void finish(struct tuples *space, struct tuples_operation *op,
 void tuples_close(struct tuples *space, int operation) {
     struct tuples_operation *op = open_operation(space, operation);
     op->closed = true;
-    if (op->status == TUPLES_PENDING && !puts_one(op)) {
+    if (op->status == TUPLES_PENDING && !puts_one(op))
         finish(space, op, TUPLES_NO);
-    } else {
+    else
         free_if_over(op);
-    }
 }
 
 void tuples_operations_end(struct tuples *space) {
@@ -272,17 +258,15 @@ static bool take_offer(const struct tuples *space, struct tuples_operation *op,
     if ((tied != TUPLES_ASKED && tied != TUPLES_WAITS &&
          tied != TUPLES_ASKED_LAST && tied != TUPLES_OWES_LAST) ||
         size > space->config.tuple_bytes || !tuple_read(&tuple, data, size) ||
-        tuple_has_formal(data) || !tuple_matches(op->pattern, data)) {
+        tuple_has_formal(data) || !tuple_matches(op->pattern, data))
         return false;
-    }
     op->due = (uint16_t)(op->due - (tied != TUPLES_WAITS));
     if (!is_better(op, header->number, source)) {
         give_back(op, source);
         return true;
     }
-    if (op->has_tuple) {
+    if (op->has_tuple)
         give_back(op, op->best);
-    }
     tie(op, source, takes(op) ? TUPLES_HOLDS : TUPLES_UNTIED);
     op->has_tuple = true;
     op->best = source;
@@ -296,13 +280,12 @@ static bool take_offer(const struct tuples *space, struct tuples_operation *op,
 static bool take_none(struct tuples_operation *op, uint16_t source,
                       enum tuples_kind kind) {
     uint8_t tied = op->ties[source];
-    if (tied == TUPLES_ASKED && (kind == TUPLES_NONE) == op->alone) {
+    if (tied == TUPLES_ASKED && (kind == TUPLES_NONE) == op->alone)
         tie(op, source, kind == TUPLES_NONE ? TUPLES_UNTIED : TUPLES_WAITS);
-    } else if (tied == TUPLES_ASKED_LAST && kind == TUPLES_NONE) {
+    else if (tied == TUPLES_ASKED_LAST && kind == TUPLES_NONE)
         tie(op, source, TUPLES_UNTIED);
-    } else {
+    else
         return false;
-    }
     op->due--;
     return true;
 }
@@ -319,26 +302,22 @@ static void ask_last(const struct tuples *space, struct tuples_operation *op) {
 
 /* Where the answers so far lead. */
 static void go_on(struct tuples *space, struct tuples_operation *op) {
-    if (op->phase == TUPLES_FIRST && op->due > 0) {
+    if (op->phase == TUPLES_FIRST && op->due > 0)
         return;
-    }
-    if (op->has_tuple) {
+    if (op->has_tuple)
         finish(space, op, TUPLES_DONE);
-    } else if (op->phase == TUPLES_FIRST && waits(op)) {
+    else if (op->phase == TUPLES_FIRST && waits(op))
         op->phase = TUPLES_WAITING;
-    } else if (op->phase == TUPLES_FIRST) {
+    else if (op->phase == TUPLES_FIRST)
         ask_last(space, op);
-    }
-    if (op->phase == TUPLES_FINAL && op->due == 0) {
+    if (op->phase == TUPLES_FINAL && op->due == 0)
         finish(space, op, TUPLES_NO);
-    }
 }
 
 static bool take_put_answer(struct tuples *space, struct tuples_operation *op,
                             uint16_t source, enum tuples_kind kind) {
-    if (op->ties[source] != TUPLES_PUT_SENT) {
+    if (op->ties[source] != TUPLES_PUT_SENT)
         return false;
-    }
     if (kind == TUPLES_ROOM) {
         tie(op, source, TUPLES_OWES_PROMISED);
     } else {
@@ -354,22 +333,18 @@ bool tuples_operation_take(struct tuples *space, uint16_t source,
     struct tuples_operation *op = &space->operations[header->operation];
     enum tuples_kind kind = (enum tuples_kind)header->kind;
     if (op->serial != header->serial || op->phase == TUPLES_FREE ||
-        op->phase == TUPLES_OVER) {
+        op->phase == TUPLES_OVER)
         return true; /* to an operation that is over, and has said so */
-    }
     if (puts_one(op) != (kind == TUPLES_ROOM || kind == TUPLES_STORED) ||
-        (kind != TUPLES_OFFER && size != 0)) {
+        (kind != TUPLES_OFFER && size != 0))
         return false;
-    }
-    if (puts_one(op)) {
+    if (puts_one(op))
         return take_put_answer(space, op, source, kind);
-    }
     bool sound = kind == TUPLES_OFFER
                      ? take_offer(space, op, source, header, data, size)
                      : take_none(op, source, kind);
-    if (sound) {
+    if (sound)
         go_on(space, op);
-    }
     return sound;
 }
 
@@ -412,9 +387,8 @@ static bool send_owed(struct tuples *space, struct tuples_operation *op,
         size = op->size;
         next = TUPLES_PUT_SENT;
     }
-    if (!tuples_send(space, place, &header, data, size)) {
+    if (!tuples_send(space, place, &header, data, size))
         return false;
-    }
     tie(op, place, next);
     return true;
 }
@@ -426,9 +400,8 @@ static bool is_preceded(const struct tuples *space,
     for (unsigned i = 0; i < space->each; i++) {
         const struct tuples_operation *other = &space->operations[i];
         if (other->owed > 0 && other->ties[place] >= TUPLES_OWES &&
-            (int32_t)(other->serial - op->serial) < 0) {
+            (int32_t)(other->serial - op->serial) < 0)
             return true;
-        }
     }
     return false;
 }
@@ -452,9 +425,8 @@ unsigned tuples_operation_send(struct tuples *space,
 
 unsigned tuples_processes_free(const struct tuples *space) {
     unsigned count = 0;
-    for (unsigned i = 0; i < space->config.processes; i++) {
+    for (unsigned i = 0; i < space->config.processes; i++)
         count += space->processes[i].state == TUPLES_IDLE;
-    }
     return count;
 }
 

@@ -23,30 +23,26 @@ static void join(struct tuples *space, uint32_t row) {
     r->waits = true;
     r->next = TUPLES_NOBODY;
     r->previous = space->last;
-    if (space->last == TUPLES_NOBODY) {
+    if (space->last == TUPLES_NOBODY)
         space->first = row;
-    } else {
+    else
         space->requests[space->last].next = row;
-    }
     space->last = row;
     space->waiting++;
-    if (space->waiting > space->statistics.longest_wait) {
+    if (space->waiting > space->statistics.longest_wait)
         space->statistics.longest_wait = space->waiting;
-    }
 }
 
 static void leave(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
-    if (r->previous == TUPLES_NOBODY) {
+    if (r->previous == TUPLES_NOBODY)
         space->first = r->next;
-    } else {
+    else
         space->requests[r->previous].next = r->next;
-    }
-    if (r->next == TUPLES_NOBODY) {
+    if (r->next == TUPLES_NOBODY)
         space->last = r->previous;
-    } else {
+    else
         space->requests[r->next].previous = r->previous;
-    }
     space->asking_last -= r->last;
     space->waiting--;
     r->waits = r->last = false;
@@ -76,9 +72,8 @@ static void set_free(struct tuples_request *r) {
  * until it is sent. */
 static void hold(struct tuples *space, uint32_t row, uint32_t at) {
     tuples_store_at(&space->store, at)->holder = row;
-    if (row_at(space, row)->waits) {
+    if (row_at(space, row)->waits)
         leave(space, row);
-    }
     reply(space, row, TUPLES_OFFER);
 }
 
@@ -110,9 +105,8 @@ static void tell_all_none(struct tuples *space) {
     uint32_t row = space->asking_last == 0 ? TUPLES_NOBODY : space->first;
     while (row != TUPLES_NOBODY) {
         uint32_t next = space->requests[row].next;
-        if (space->requests[row].last) {
+        if (space->requests[row].last)
             tell_none(space, row);
-        }
         row = next;
     }
 }
@@ -121,9 +115,8 @@ static void tell_all_none(struct tuples *space) {
 
 static bool may_promise(const struct tuples *space,
                         const struct tuples_request *r) {
-    if (r->wish == TUPLES_RUN) {
+    if (r->wish == TUPLES_RUN)
         return tuples_processes_free(space) > space->promised_processes;
-    }
     return tuples_store_needed(r->size) <=
            space->store.room - space->store.used - space->promised_bytes;
 }
@@ -139,11 +132,10 @@ void tuples_request_promise(struct tuples *space) {
             if (!full[r->wish]) {
                 leave(space, row);
                 r->promised = true;
-                if (r->wish == TUPLES_RUN) {
+                if (r->wish == TUPLES_RUN)
                     space->promised_processes++;
-                } else {
+                else
                     space->promised_bytes += tuples_store_needed(r->size);
-                }
                 reply(space, row, TUPLES_ROOM);
             }
         }
@@ -158,9 +150,8 @@ static void decide(struct tuples *space, uint32_t row, bool taken) {
 #ifdef INCODE_PLANT_TAKEN_BY_TWO /* a fault that the tests have to find */
     if (taken) {
         pass(space, at);
-        if (tuples_store_at(&space->store, at)->holder != TUPLES_UNHELD) {
+        if (tuples_store_at(&space->store, at)->holder != TUPLES_UNHELD)
             return;
-        }
     }
 #endif
     if (!taken) {
@@ -182,9 +173,8 @@ static bool take_ask(struct tuples *space, uint32_t row,
     struct tuples_request *r = row_at(space, row);
     struct tuple pattern;
     if (r->wish != TUPLES_NO_WISH || size > TUPLES_PATTERN_MAX ||
-        !tuple_read(&pattern, data, size)) {
+        !tuple_read(&pattern, data, size))
         return false;
-    }
     r->wish = header->flags & TUPLES_TAKES ? TUPLES_TAKE : TUPLES_READ;
     r->serial = header->serial;
     memcpy(r->pattern, data, size);
@@ -206,9 +196,8 @@ static bool take_ask(struct tuples *space, uint32_t row,
 
 static bool take_last(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
-    if (r->last) {
+    if (r->last)
         return false;
-    }
     if (r->waits) { /* and else an offer is on its way */
         r->last = true;
         space->asking_last++;
@@ -221,16 +210,13 @@ static bool take_release(struct tuples *space, uint32_t row, bool accepted) {
     struct tuples_request *r = row_at(space, row);
     bool offered = !r->waits && r->reply == 0;
     bool holds = !r->waits && (r->reply == 0 || r->reply == TUPLES_OFFER);
-    if (accepted && !(offered && r->wish == TUPLES_TAKE)) {
+    if (accepted && !(offered && r->wish == TUPLES_TAKE))
         return false;
-    }
-    if (r->waits) {
+    if (r->waits)
         leave(space, row);
-    }
     set_free(r);
-    if (holds) {
+    if (holds)
         decide(space, row, accepted);
-    }
     return true;
 }
 
@@ -251,9 +237,8 @@ static void keep_promise(struct tuples *space, uint32_t row,
         tuples_store_add(&space->store, header->number, data, r->size);
     space->statistics.stored++;
     space->accounts[row / space->each].put++;
-    if (space->store.used > space->statistics.store_high_water) {
+    if (space->store.used > space->statistics.store_high_water)
         space->statistics.store_high_water = space->store.used;
-    }
     pass(space, at);
 }
 
@@ -265,31 +250,26 @@ static bool take_put(struct tuples *space, uint32_t row,
     struct tuple tuple;
     if (size > space->config.tuple_bytes || !tuple_read(&tuple, data, size) ||
         tuple_has_formal(data) ||
-        (wish == TUPLES_RUN &&
-         header->number >= space->config.function_count)) {
+        (wish == TUPLES_RUN && header->number >= space->config.function_count))
         return false;
-    }
     if (header->flags & TUPLES_PROMISED) {
         if (r->wish != wish || r->serial != header->serial || !r->promised ||
-            r->reply != 0 || r->size != size) {
+            r->reply != 0 || r->size != size)
             return false;
-        }
         keep_promise(space, row, header, data);
         return true;
     }
-    if (r->wish != TUPLES_NO_WISH) {
+    if (r->wish != TUPLES_NO_WISH)
         return false;
-    }
     r->wish = wish;
     r->serial = header->serial;
     r->size = (uint16_t)size;
     join(space, row);
     tuples_request_promise(space);
-    if (r->promised) {
+    if (r->promised)
         keep_promise(space, row, header, data);
-    } else {
+    else
         space->statistics.held_up++;
-    }
     return true;
 }
 
@@ -298,21 +278,16 @@ bool tuples_request_take(struct tuples *space, uint16_t source,
                          const uint8_t *data, size_t size) {
     uint32_t row = source * space->each + header->operation;
     struct tuples_request *r = row_at(space, row);
-    if (header->kind == TUPLES_ASK) {
+    if (header->kind == TUPLES_ASK)
         return take_ask(space, row, header, data, size);
-    }
-    if (header->kind == TUPLES_PUT || header->kind == TUPLES_START) {
+    if (header->kind == TUPLES_PUT || header->kind == TUPLES_START)
         return take_put(space, row, header, data, size);
-    }
-    if (size != 0) {
+    if (size != 0)
         return false;
-    }
-    if (!asks(r) || r->serial != header->serial) {
+    if (!asks(r) || r->serial != header->serial)
         return true; /* it has had its answer, which was on its way */
-    }
-    if (header->kind == TUPLES_LAST) {
+    if (header->kind == TUPLES_LAST)
         return take_last(space, row);
-    }
     return take_release(space, row, header->flags & TUPLES_ACCEPTED);
 }
 
@@ -324,9 +299,8 @@ static void has_sent(struct tuples *space, uint32_t row) {
     uint8_t kind = r->reply;
     bool copy = kind == TUPLES_OFFER && r->wish == TUPLES_READ;
     r->reply = 0;
-    if (copy || kind == TUPLES_NONE || kind == TUPLES_STORED) {
+    if (copy || kind == TUPLES_NONE || kind == TUPLES_STORED)
         set_free(r);
-    }
     if (copy) {
         space->statistics.read++;
         pass(space, tuples_store_held_by(&space->store, row));
@@ -360,9 +334,8 @@ unsigned tuples_request_send(struct tuples *space, unsigned tries) {
         space->reply_first = (space->reply_first + 1) % space->rows;
         space->reply_count--;
         r->queued = false;
-        if (r->reply == 0) {
+        if (r->reply == 0)
             continue;
-        }
         if (send_reply(space, row)) {
             has_sent(space, row);
             sent++;

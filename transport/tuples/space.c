@@ -44,32 +44,26 @@ uint32_t tuples_store_add(struct tuples_store *store, uint32_t age,
 
 uint32_t tuples_store_find(const struct tuples_store *store,
                            const uint8_t *pattern) {
-    for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
+    for (uint32_t at = 0; at < store->used; at = behind(store, at))
         if (tuples_store_at(store, at)->holder == TUPLES_UNHELD &&
-            tuple_matches(pattern, tuples_store_tuple(store, at))) {
+            tuple_matches(pattern, tuples_store_tuple(store, at)))
             return at;
-        }
-    }
     return TUPLES_NOWHERE;
 }
 
 bool tuples_store_is_held(const struct tuples_store *store,
                           const uint8_t *pattern) {
-    for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
+    for (uint32_t at = 0; at < store->used; at = behind(store, at))
         if (tuples_store_at(store, at)->holder != TUPLES_UNHELD &&
-            tuple_matches(pattern, tuples_store_tuple(store, at))) {
+            tuple_matches(pattern, tuples_store_tuple(store, at)))
             return true;
-        }
-    }
     return false;
 }
 
 uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row) {
-    for (uint32_t at = 0; at < store->used; at = behind(store, at)) {
-        if (tuples_store_at(store, at)->holder == row) {
+    for (uint32_t at = 0; at < store->used; at = behind(store, at))
+        if (tuples_store_at(store, at)->holder == row)
             return at;
-        }
-    }
     return TUPLES_NOWHERE;
 }
 
@@ -137,9 +131,8 @@ static void lay(struct tuples *space, struct cut *cut) {
     }
     for (unsigned i = 0; i < c->processes; i++) {
         uint8_t *bytes = piece(cut, c->tuple_bytes);
-        if (cut->memory != NULL) {
+        if (cut->memory != NULL)
             space->processes[i].bytes = bytes;
-        }
     }
 }
 
@@ -154,9 +147,8 @@ static void set_config(struct tuples *space,
 size_t tuples_arena_bytes(const struct tuples_config *config) {
     struct tuples space;
     struct cut cut = {NULL, aligned(sizeof space)};
-    if (!is_sound(config)) {
+    if (!is_sound(config))
         return 0;
-    }
     set_config(&space, config);
     lay(&space, &cut);
     return cut.bytes;
@@ -169,9 +161,8 @@ static void empty(struct tuples *space, uint32_t generation) {
     space->store.used = space->store.count = 0;
     memset(space->accounts, 0, space->config.places * sizeof *space->accounts);
     memset(space->requests, 0, space->rows * sizeof *space->requests);
-    for (unsigned i = 0; i < space->config.processes; i++) {
+    for (unsigned i = 0; i < space->config.processes; i++)
         space->processes[i].state = TUPLES_IDLE;
-    }
     space->first = space->last = TUPLES_NOBODY;
     space->waiting = space->asking_last = 0;
     space->reply_first = space->reply_count = 0;
@@ -184,9 +175,8 @@ struct tuples *tuples_init(void *arena, size_t bytes,
     size_t needed = tuples_arena_bytes(config);
     struct tuples *space = arena;
     struct cut cut = {arena, aligned(sizeof *space)};
-    if (needed == 0 || bytes < needed) {
+    if (needed == 0 || bytes < needed)
         return NULL;
-    }
     LINK_ASSERT((uintptr_t)arena % ALIGNMENT == 0);
     set_config(space, config);
     lay(space, &cut);
@@ -241,13 +231,11 @@ bool tuples_send(struct tuples *space, uint16_t place,
     whole.generation = space->generation;
     whole.clock = space->clock;
     put_header(space->message, &whole);
-    if (size > 0) {
+    if (size > 0)
         memcpy(space->message + TUPLES_HEADER_BYTES, data, size);
-    }
     if (config->write(config->context, place, space->message,
-                      TUPLES_HEADER_BYTES + size) != 0) {
+                      TUPLES_HEADER_BYTES + size) != 0)
         return false;
-    }
     space->statistics.messages++;
     return true;
 }
@@ -256,21 +244,18 @@ bool tuples_take(struct tuples *space, uint16_t source, const uint8_t *data,
                  size_t size) {
     struct tuples_header header;
     if (size < TUPLES_HEADER_BYTES || source >= space->config.places ||
-        source == space->config.self) {
+        source == space->config.self)
         return false;
-    }
     get_header(data, &header);
     if (header.generation != space->generation) {
         space->statistics.outdated++;
         return true;
     }
     if (header.kind == 0 || header.kind > TUPLES_KIND_LAST ||
-        header.operation >= space->each) {
+        header.operation >= space->each)
         return false;
-    }
-    if (header.clock > space->clock) {
+    if (header.clock > space->clock)
         space->clock = header.clock;
-    }
     return deliver(space, source, &header, data + TUPLES_HEADER_BYTES,
                    size - TUPLES_HEADER_BYTES);
 }
@@ -291,12 +276,10 @@ uint32_t tuples_held(const struct tuples *space) {
     uint32_t held = space->store.count + space->promised_bytes +
                     space->promised_processes + space->config.processes -
                     tuples_processes_free(space);
-    for (unsigned i = 0; i < space->each; i++) {
+    for (unsigned i = 0; i < space->each; i++)
         held += space->operations[i].phase != TUPLES_FREE;
-    }
-    for (uint32_t row = 0; row < space->rows; row++) {
+    for (uint32_t row = 0; row < space->rows; row++)
         held += space->requests[row].wish != TUPLES_NO_WISH;
-    }
     return held;
 }
 

@@ -27,9 +27,8 @@ static uint64_t get64(const uint8_t *p) {
 }
 
 static size_t value_size(const struct tuple_field *field) {
-    if (field->formal) {
+    if (field->formal)
         return 0;
-    }
     return field->type == TUPLE_TYPE_BYTES ? 2u + field->size
                                            : fixed_size(field->type);
 }
@@ -52,30 +51,26 @@ static void write_value(const struct tuple_field *field, uint8_t *p) {
         break;
     default:
         bytes_put16(p, field->size);
-        if (field->size > 0) {
+        if (field->size > 0)
             memcpy(p + 2, field->as.bytes, field->size);
-        }
     }
 }
 
 size_t tuple_write(const struct tuple *tuple, uint8_t *bytes, size_t room) {
     unsigned count = tuple->count;
     size_t size = TYPES_AT + (size_t)count;
-    if (count == 0 || count > TUPLE_FIELDS_MAX || size > room) {
+    if (count == 0 || count > TUPLE_FIELDS_MAX || size > room)
         return 0;
-    }
     bytes[0] = (uint8_t)count;
     bytes[1] = tuple->keyed;
     for (unsigned i = 0; i < count; i++) {
         const struct tuple_field *field = &tuple->field[i];
         if (field->type == 0 || field->type > TUPLE_TYPE_LAST ||
-            value_size(field) > room - size) {
+            value_size(field) > room - size)
             return 0;
-        }
         bytes[TYPES_AT + i] = field->type | (field->formal ? FORMAL : 0);
-        if (!field->formal) {
+        if (!field->formal)
             write_value(field, bytes + size);
-        }
         size += value_size(field);
     }
     return size;
@@ -88,9 +83,8 @@ static bool read_value(struct tuple_field *field, const uint8_t *p, size_t left,
     uint64_t bits;
     size_t least =
         field->type == TUPLE_TYPE_BYTES ? 2 : fixed_size(field->type);
-    if (left < least) {
+    if (left < least)
         return false;
-    }
     switch (field->type) {
     case TUPLE_TYPE_INT32:
         field->as.int32 = (int32_t)bytes_get32(p);
@@ -116,9 +110,8 @@ static bool read_value(struct tuple_field *field, const uint8_t *p, size_t left,
 bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size) {
     memset(tuple, 0, sizeof *tuple);
     if (size < TYPES_AT || bytes[0] == 0 || bytes[0] > TUPLE_FIELDS_MAX ||
-        bytes[1] > 1 || size < TYPES_AT + (size_t)bytes[0]) {
+        bytes[1] > 1 || size < TYPES_AT + (size_t)bytes[0])
         return false;
-    }
     size_t at = TYPES_AT + (size_t)bytes[0];
     tuple->count = bytes[0];
     tuple->keyed = bytes[1];
@@ -129,9 +122,8 @@ bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size) {
         field->formal = (bytes[TYPES_AT + i] & FORMAL) != 0;
         if (field->type == 0 || field->type > TUPLE_TYPE_LAST ||
             (!field->formal &&
-             !read_value(field, bytes + at, size - at, &used))) {
+             !read_value(field, bytes + at, size - at, &used)))
             return false;
-        }
         at += used;
     }
     return at == size;
@@ -139,9 +131,8 @@ bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size) {
 
 bool tuple_has_formal(const uint8_t *bytes) {
     unsigned any = 0;
-    for (unsigned i = 0; i < bytes[0]; i++) {
+    for (unsigned i = 0; i < bytes[0]; i++)
         any |= bytes[TYPES_AT + i];
-    }
     return (any & FORMAL) != 0;
 }
 
@@ -160,20 +151,17 @@ static size_t written_size(unsigned type, const uint8_t *p) {
 bool tuple_matches(const uint8_t *pattern, const uint8_t *tuple) {
     unsigned count = tuple[0];
     size_t p = TYPES_AT + (size_t)count, t = p;
-    if (pattern[0] != count) {
+    if (pattern[0] != count)
         return false;
-    }
     for (unsigned i = 0; i < count; i++) {
         unsigned type = tuple[TYPES_AT + i], asked = pattern[TYPES_AT + i];
         size_t size = written_size(type, tuple + t);
-        if ((asked & (FORMAL - 1)) != type) {
+        if ((asked & (FORMAL - 1)) != type)
             return false;
-        }
         if ((asked & FORMAL) == 0) {
             if (written_size(type, pattern + p) != size ||
-                memcmp(pattern + p, tuple + t, size) != 0) {
+                memcmp(pattern + p, tuple + t, size) != 0)
                 return false;
-            }
             p += size;
         }
         t += size;
@@ -184,9 +172,8 @@ bool tuple_matches(const uint8_t *pattern, const uint8_t *tuple) {
 /* Fowler, Noll and Vo's hash 1a, and the last steps of Appleby's murmur3, so
  * that the low bits depend on all. */
 static uint32_t add(uint32_t hash, const uint8_t *p, size_t size) {
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         hash = (hash ^ p[i]) * UINT32_C(16777619);
-    }
     return hash;
 }
 

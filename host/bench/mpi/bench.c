@@ -19,9 +19,8 @@ int host_mpi_bench(void) {
     struct host_bench_end end;
     memset(&row, 0, sizeof row);
     memset(&end, 0, sizeof end);
-    if (mpi_place_open(&place) != 0 || place.ranks != 2) {
+    if (mpi_place_open(&place) != 0 || place.ranks != 2)
         return 1;
-    }
     mpi_pipe_open(&wire, &place, 1 - place.rank, MPI_TAG_PIPES);
     end.pipe = mpi_link_pipe(&wire);
     end.idle = idle;

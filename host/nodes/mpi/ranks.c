@@ -73,15 +73,13 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
     }
     memset(order, 0, sizeof *order);
     order->nodes = nodes;
-    while (1u << order->dimension < nodes) {
+    while (1u << order->dimension < nodes)
         order->dimension++;
-    }
     order->memory = memory;
     order->window = window;
     if (getrandom(&order->epoch, sizeof order->epoch, 0) < 0 ||
-        order->epoch < 2) {
+        order->epoch < 2)
         order->epoch = 2;
-    }
     order->tag = MPI_TAG_PIPES + ranks->cubes++ % TAGS;
     ranks->ended = 0;
     ranks->wires = nodes < CUBE_HOST_PORTS_MAX ? nodes : CUBE_HOST_PORTS_MAX;
@@ -101,9 +99,8 @@ int host_ranks_begin(struct host_ranks *ranks, unsigned nodes, uint64_t memory,
 static int find_lost(const struct host_ranks *r) {
     for (int i = 1; i < r->place.ranks; i++) {
         pid_t process = (pid_t)r->place.process[i];
-        if (process != 0 && kill(process, 0) != 0 && errno == ESRCH) {
+        if (process != 0 && kill(process, 0) != 0 && errno == ESRCH)
             return i;
-        }
     }
     return 0;
 }
@@ -111,9 +108,8 @@ static int find_lost(const struct host_ranks *r) {
 static int check(void *context, struct host_error *error) {
     struct host_ranks *r = context;
     uint64_t end = clock_us() + LOOKS_US;
-    if (!r->running) {
+    if (!r->running)
         return 0;
-    }
     r->lost = find_lost(r);
     while (r->lost == 0 && terminated && clock_us() < end) {
         struct timespec wait = {0, LOOK_EVERY_US * 1000L};
@@ -144,9 +140,8 @@ static uint64_t machine_now_us(void *context) {
 
 static void machine_idle(void *context, uint64_t wait_us) {
     struct host_ranks *r = context;
-    if (!r->running) {
+    if (!r->running)
         return; /* nothing more will come */
-    }
     mpi_sleep(&r->place, r->pipe, r->wires, NULL, wait_us);
 }
 
@@ -181,21 +176,18 @@ static void leave(struct host_ranks *r) {
 
 static void machine_stop(void *context) {
     struct host_ranks *r = context;
-    if (!r->running) {
+    if (!r->running)
         return;
-    }
     r->running = false;
     if (r->lost != 0 || r->terminated) {
-        for (unsigned i = 0; i < r->wires; i++) {
+        for (unsigned i = 0; i < r->wires; i++)
             r->pipe[i].closed = true; /* nobody is there to part from */
-        }
         return;
     }
     tell_all(r, MPI_WORD_END);
     r->stuck = !mpi_place_part(&r->place, r->pipe, r->wires, PART_US_MAX);
-    if (!r->stuck && r->cubes == r->cubes_due) {
+    if (!r->stuck && r->cubes == r->cubes_due)
         leave(r);
-    }
 }
 
 struct host_machine host_ranks_machine(struct host_ranks *ranks) {
@@ -207,9 +199,8 @@ struct host_machine host_ranks_machine(struct host_ranks *ranks) {
     machine.epoch = ranks->order.epoch - 1;
     machine.pipe = mpi_link_pipe(&ranks->pipe[0]);
     machine.host_ports = (uint8_t)ranks->wires;
-    for (unsigned i = 0; i < ranks->wires; i++) {
+    for (unsigned i = 0; i < ranks->wires; i++)
         machine.wires[i] = mpi_link_pipe(&ranks->pipe[i]);
-    }
     machine.now_us = machine_now_us;
     machine.idle = machine_idle;
     machine.check = check;

@@ -9,9 +9,8 @@ enum { JOBS_PER_WORKER = 2 };
 static unsigned place(const struct host_work *work,
                       const struct host_builders *group, unsigned node) {
     unsigned before = 0;
-    for (unsigned i = group->first; i < node; i++) {
+    for (unsigned i = group->first; i < node; i++)
         before += !host_is_lost(work, i);
-    }
     return before;
 }
 
@@ -21,9 +20,8 @@ static void appoint(const struct host_work *work,
     unsigned left = group->builders, kept = group->holders;
     setup->role = NODE_MANAGER;
     for (unsigned i = manager + 1; i < group->last && left > 0; i++) {
-        if (host_is_lost(work, i)) {
+        if (host_is_lost(work, i))
             continue;
-        }
         if (kept > 0) {
             kept--;
         } else {
@@ -55,9 +53,8 @@ void host_builders_set_up(const struct host_work *work,
     setup->holders = (uint16_t)group->holders;
     setup->role = NODE_WORKER;
     if (work->living == 1 || there < 2 ||
-        at > group->holders + group->builders || host_is_lost(work, node)) {
+        at > group->holders + group->builders || host_is_lost(work, node))
         return;
-    }
     if (at > 0 && at <= group->holders) {
         setup->role = NODE_HOLDER;
         return;

@@ -56,13 +56,11 @@ static void set_up(const struct host_work *work, unsigned node,
 static uint32_t first_to_all(const struct host_work *work) {
     const struct incode_tree *tree = &work->order->tree;
     uint32_t level = 1;
-    if (tree->pages <= work->frames) {
+    if (tree->pages <= work->frames)
         return 0;
-    }
     while (level < tree->levels &&
-           tree->pages - tree->base[level] > work->frames / 2) {
+           tree->pages - tree->base[level] > work->frames / 2)
         level++;
-    }
     return level < tree->levels ? tree->base[level] : tree->pages;
 }
 
@@ -83,9 +81,8 @@ static bool send_regions(struct host_work *work, struct exchange *state) {
         uint32_t first[NODE_REGIONS_A_MESSAGE];
     } message;
     uint32_t count = work->nodes + 1u - state->told;
-    if (count > NODE_REGIONS_A_MESSAGE) {
+    if (count > NODE_REGIONS_A_MESSAGE)
         count = NODE_REGIONS_A_MESSAGE;
-    }
     message.head = (struct node_regions_message){
         .first = state->told, .count = count, .to_all = state->to_all};
     for (uint32_t i = 0; i < count; i++) {
@@ -96,9 +93,8 @@ static bool send_regions(struct host_work *work, struct exchange *state) {
     }
     if (!work->write_to_all(work->context, NODE_REGIONS, &message,
                             sizeof message.head +
-                                count * sizeof message.first[0])) {
+                                count * sizeof message.first[0]))
         return false;
-    }
     state->told += count;
     return true;
 }
@@ -109,9 +105,8 @@ static bool send_page(struct host_work *work, struct exchange *state) {
     body.head.page = state->next - 1;
     size_t size = host_page(work->order, body.head.page, body.data);
     if (!work->write_to_all(work->context, NODE_PAGE_TO_ALL, &body,
-                            node_page_seal(&body, work->page_key, size))) {
+                            node_page_seal(&body, work->page_key, size)))
         return false;
-    }
     state->next--;
     return true;
 }
@@ -120,12 +115,10 @@ static bool send_page(struct host_work *work, struct exchange *state) {
 static bool send(struct host_work *work, unsigned node) {
     struct exchange *state = work->state;
     (void)node;
-    if (!state->dealt) {
+    if (!state->dealt)
         return false;
-    }
-    if (state->told <= work->nodes) {
+    if (state->told <= work->nodes)
         return send_regions(work, state);
-    }
     return state->next > state->to_all && send_page(work, state);
 }
 

@@ -66,13 +66,11 @@ static bool first(struct host_work *work, unsigned node,
                   struct incode_job *job) {
     unsigned cluster = cluster_of(work->nodes, &work->sharing);
     struct incode_job more = {0};
-    if (node % cluster != 0 || !host_regions_first(work, node, job)) {
+    if (node % cluster != 0 || !host_regions_first(work, node, job))
         return false;
-    }
     for (unsigned i = node + 1; i < node + cluster; i++) {
-        if (!host_regions_first(work, i, &more)) {
+        if (!host_regions_first(work, i, &more))
             return false;
-        }
         for (int k = 0; k < 3; k++) {
             job->lo[k] = more.lo[k] < job->lo[k] ? more.lo[k] : job->lo[k];
             job->hi[k] = more.hi[k] > job->hi[k] ? more.hi[k] : job->hi[k];
@@ -90,9 +88,8 @@ static bool next(struct host_work *work, unsigned node,
 
 static void lose(struct host_work *work) {
     unsigned takers = 0;
-    for (unsigned i = 0; i < work->nodes; i++) {
+    for (unsigned i = 0; i < work->nodes; i++)
         takers += !work->lost[i] && is_taker(work, i);
-    }
     host_regions_lose_among(work, takers);
 }
 

@@ -44,9 +44,8 @@ static void set_up(const struct host_work *work, unsigned node,
     host_builders_set_up(work, &group, manager, setup);
     setup->role = builds ? NODE_LINDA_BUILDER : NODE_LINDA_MANAGER;
     setup->manager = (uint16_t)manager;
-    if (sharing->jobs_per_worker == 0) {
+    if (sharing->jobs_per_worker == 0)
         setup->jobs_per_worker = JOBS_PER_WORKER;
-    }
 }
 
 const struct host_strategy host_linda = {

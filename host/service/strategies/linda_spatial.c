@@ -31,17 +31,14 @@ static void set_up(const struct host_work *work, unsigned node,
     (void)node;
     setup->holders = 0;
     setup->role = NODE_WORKER;
-    if (work->living == 1) {
+    if (work->living == 1)
         return;
-    }
     setup->role = NODE_LINDA_WORKER;
     setup->manager = (uint16_t)host_first_left(work, 0);
     setup->faces_per_job = setup->jobs_per_worker = 1;
-    for (unsigned i = setup->manager + 1u; i < work->nodes; i++) {
-        if (!host_is_lost(work, i)) {
+    for (unsigned i = setup->manager + 1u; i < work->nodes; i++)
+        if (!host_is_lost(work, i))
             node_add_builder(setup, i);
-        }
-    }
 }
 
 static bool first(struct host_work *work, unsigned node,
@@ -54,9 +51,8 @@ static bool first(struct host_work *work, unsigned node,
 static bool next(struct host_work *work, unsigned node,
                  struct incode_job *job) {
     struct state *s = work->state;
-    if (work->living == 1) {
+    if (work->living == 1)
         return host_regions_next(work, node, job);
-    }
     bool due = s->node[node].due;
     if (due) {
         *job = s->node[node].job;
@@ -79,9 +75,8 @@ static bool send(struct host_work *work, unsigned node) {
     struct state *s = work->state;
     if (!s->dealt || work->living == 1 || node != host_first_left(work, 0) ||
         s->out_count == NODE_OUT_MAX || !find_next(work, s) ||
-        !work->write(work->context, node, NODE_OUT, &s->next, sizeof s->next)) {
+        !work->write(work->context, node, NODE_OUT, &s->next, sizeof s->next))
         return false;
-    }
     s->out[s->out_count++] = s->next;
     s->waits = false;
     return true;
@@ -91,16 +86,14 @@ static int take(struct host_work *work, const struct cube_message *message,
                 struct host_error *error) {
     struct state *s = work->state;
     struct node_taken_message m;
-    if (message->type != NODE_TAKEN) {
+    if (message->type != NODE_TAKEN)
         return -1;
-    }
     unsigned i = 0;
     if (message->size == sizeof m) {
         memcpy(&m, message->data, sizeof m);
         while (i < s->out_count && (s->out[i].first != m.taken.first ||
-                                    s->out[i].last != m.taken.last)) {
+                                    s->out[i].last != m.taken.last))
             i++;
-        }
     }
     if (message->size != sizeof m ||
         message->source != host_first_left(work, 0) ||

@@ -9,9 +9,8 @@ static void set_up(const struct host_work *work, unsigned node,
     (void)node;
     setup->holders = 0;
     setup->role = NODE_WORKER;
-    if (work->ledger->owner_rule == INCODE_OWNER_LOWEST) {
+    if (work->ledger->owner_rule == INCODE_OWNER_LOWEST)
         setup->setup.build = INCODE_BUILD_FACES;
-    }
 }
 
 /* The part of the next range that this node may do. */
@@ -19,18 +18,15 @@ static bool next(struct host_work *work, unsigned node,
                  struct incode_job *job) {
     struct host_ledger *ledger = work->ledger;
     uint32_t first, last, end;
-    if (!host_ledger_next(ledger, work->order, &first, &last)) {
+    if (!host_ledger_next(ledger, work->order, &first, &last))
         return false;
-    }
     end = first;
     while (end < last &&
-           (work->living == 1 || host_ledger_by(ledger, end) != node)) {
+           (work->living == 1 || host_ledger_by(ledger, end) != node))
         end++;
-    }
     ledger->cursor = end;
-    if (end > first) {
+    if (end > first)
         *job = host_regions_job(work->order, first, end);
-    }
     return end > first;
 }
 

@@ -18,12 +18,10 @@ static double regions_total(const struct host_task *task) {
     enum { POINT_BYTES = 32 };
     double open = 8 * 38 * pow((double)task->points, 2.0 / 3);
     bool holds_all = task->points <= task->memory / POINT_BYTES;
-    if (!task->by_points) {
+    if (!task->by_points)
         return !task->uneven ? 1.05 : holds_all ? 1.2 : 1.7;
-    }
-    if (task->uneven) {
+    if (task->uneven)
         return 3.0;
-    }
     return open <= (double)task->memory / 5 ? 1.5 : 1.05;
 }
 
@@ -53,9 +51,8 @@ unsigned host_regions_one(unsigned nodes) {
 bool host_regions_first(struct host_work *work, unsigned node,
                         struct incode_job *job) {
     if (work->ledger->committed > 0 || work->living < work->nodes ||
-        node >= work->order->regions) {
+        node >= work->order->regions)
         return false;
-    }
     const struct host_region *region = &work->order->region[node];
     *job = (struct incode_job){.first = region->first, .last = region->last};
     memcpy(job->lo, region->lo, sizeof region->lo);
@@ -87,9 +84,8 @@ bool host_regions_next(struct host_work *work, unsigned node,
                        struct incode_job *job) {
     uint32_t first, last;
     (void)node;
-    if (!host_ledger_next(work->ledger, work->order, &first, &last)) {
+    if (!host_ledger_next(work->ledger, work->order, &first, &last))
         return false;
-    }
     *job = host_regions_job(work->order, first, last);
     return true;
 }

@@ -15,9 +15,8 @@ const struct host_strategy *host_strategy_row(unsigned i) {
 
 const struct host_strategy *host_strategy_linda(unsigned i) {
     unsigned row = 0;
-    while (row < ROWS && (rows[row]->linda == NULL || i-- > 0)) {
+    while (row < ROWS && (rows[row]->linda == NULL || i-- > 0))
         row++;
-    }
     return host_strategy_row(row);
 }
 
@@ -27,11 +26,9 @@ const char *host_linda_name(unsigned i) {
 }
 
 const struct host_strategy *host_strategy_named(const char *name) {
-    for (unsigned i = 0; i < ROWS; i++) {
-        if (strcmp(rows[i]->name, name) == 0) {
+    for (unsigned i = 0; i < ROWS; i++)
+        if (strcmp(rows[i]->name, name) == 0)
             return rows[i];
-        }
-    }
     return NULL;
 }
 
@@ -64,9 +61,8 @@ double host_strategy_time(const struct host_strategy *strategy,
     struct host_error refused = {0};
     if (host_strategy_check(strategy, task->nodes, &task->sharing,
                             task->face_rule, task->build, &refused) != 0 ||
-        (task->fits != NULL && !task->fits(task->context, strategy))) {
+        (task->fits != NULL && !task->fits(task->context, strategy)))
         return INFINITY;
-    }
     struct host_cost cost = strategy->cost(task);
     double host = task->with_host ? HOST_SHARE : 0.0;
     double all = (cost.total + host) / task->processors;

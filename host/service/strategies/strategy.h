@@ -67,9 +67,8 @@ static inline bool host_is_lost(const struct host_work *work, unsigned node) {
 /* The first one from `node` on that is not lost; there must be one. */
 static inline unsigned host_first_left(const struct host_work *work,
                                        unsigned node) {
-    while (host_is_lost(work, node)) {
+    while (host_is_lost(work, node))
         node++;
-    }
     return node;
 }
 

@@ -41,9 +41,8 @@ static int open_beside(const char *extension, int flags) {
     char path[4096];
     ssize_t size =
         readlink("/proc/self/exe", path, sizeof path - strlen(extension) - 1);
-    if (size <= 0) {
+    if (size <= 0)
         give_up("incode-node-liar: no /proc/self/exe\n");
-    }
     strcpy(path + size, extension);
     return open(path, flags | O_CLOEXEC, 0600);
 }
@@ -53,22 +52,19 @@ static unsigned long read_orders(void) {
     char text[256], *at = text, *way;
     int file = open_beside(".lie", O_RDONLY);
     ssize_t size = file < 0 ? -1 : read(file, text, sizeof text - 1);
-    if (size <= 0) {
+    if (size <= 0)
         give_up("incode-node-liar: no orders beside it\n");
-    }
     close(file);
     text[size > 0 ? size : 0] = '\0';
     unsigned long node = strtoul(at, &at, 10);
     way = strtok_r(at, " \n", &at);
     while (liar.way < HOST_LIES &&
-           (way == NULL || strcmp(way, host_lies[liar.way]) != 0)) {
+           (way == NULL || strcmp(way, host_lies[liar.way]) != 0))
         liar.way++;
-    }
     liar.one_in = (uint32_t)strtoul(at, &at, 10);
     liar.random = sim_seed(strtoul(at, &at, 10), node);
-    if (liar.way == HOST_LIES || liar.one_in == 0) {
+    if (liar.way == HOST_LIES || liar.one_in == 0)
         give_up("incode-node-liar: orders are NODE WAY ONE-IN SEED\n");
-    }
     return node;
 }
 

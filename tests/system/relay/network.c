@@ -54,16 +54,14 @@ static struct sockaddr_in loopback(uint16_t port) {
 bool network_add(const char *text) {
     unsigned from, to;
     int on = 1;
-    if (relay.wires == WIRES_MAX || sscanf(text, "%u:%u", &from, &to) != 2) {
+    if (relay.wires == WIRES_MAX || sscanf(text, "%u:%u", &from, &to) != 2)
         return false;
-    }
     struct sockaddr_in here = loopback((uint16_t)from);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
     (void)setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
     if (bind(fd, (struct sockaddr *)&here, sizeof here) != 0 ||
-        listen(fd, 16) != 0) {
+        listen(fd, 16) != 0)
         return false;
-    }
     relay.listener[relay.wires] = fd;
     relay.to[relay.wires++] = (uint16_t)to;
     return true;
@@ -81,9 +79,8 @@ static void take_connection(unsigned wire) {
     int on = 1;
     int fd = accept4(relay.listener[wire], NULL, NULL, SOCK_NONBLOCK);
     struct sockaddr_in there = loopback(relay.to[wire]);
-    if (fd < 0) {
+    if (fd < 0)
         return;
-    }
     int other = socket(AF_INET, SOCK_STREAM, 0);
     for (unsigned i = 0; i < PAIRS_MAX; i++) {
         struct pair *p = &relay.pair[i];
@@ -106,9 +103,8 @@ static void take_connection(unsigned wire) {
 static void damage(struct chunk *c) {
     size_t size = c->end;
     if (relay.bytes_a_fault == 0 ||
-        chance_draw(&relay.random) % relay.bytes_a_fault >= size) {
+        chance_draw(&relay.random) % relay.bytes_a_fault >= size)
         return;
-    }
     if (chance_draw(&relay.random) % 2 == 0) {
         c->bytes[chance_draw(&relay.random) % size] ^=
             (uint8_t)(1u << chance_draw(&relay.random) % 8);
@@ -124,16 +120,14 @@ static bool take(struct pair *p, unsigned from) {
     struct lane *lane = &p->lane[from];
     struct chunk *c = &lane->chunk[(lane->first + lane->count) % CHUNKS];
     ssize_t got = read(p->fd[from], c->bytes, CHUNK_BYTES);
-    if (got <= 0) {
+    if (got <= 0)
         return got < 0 && errno == EAGAIN;
-    }
     c->begin = 0;
     c->end = (size_t)got;
     damage(c);
     c->due_us = chance_now_us();
-    if (relay.delay_us > 0) {
+    if (relay.delay_us > 0)
         c->due_us += chance_draw(&relay.random) % relay.delay_us;
-    }
     lane->count++;
     return true;
 }
@@ -147,9 +141,8 @@ static bool give(struct pair *p, unsigned from) {
         if (c->begin < c->end) {
             ssize_t put = send(p->fd[1 - from], c->bytes + c->begin,
                                c->end - c->begin, MSG_NOSIGNAL);
-            if (put < 0) {
+            if (put < 0)
                 return errno == EAGAIN;
-            }
             c->begin += (size_t)put;
         }
         if (c->begin == c->end) {
@@ -163,12 +156,10 @@ static bool give(struct pair *p, unsigned from) {
 static void serve(struct pair *p) {
     for (unsigned from = 0; from < 2 && p->fd[0] >= 0; from++) {
         bool open = give(p, from);
-        if (open && p->lane[from].count < CHUNKS) {
+        if (open && p->lane[from].count < CHUNKS)
             open = take(p, from) && give(p, from);
-        }
-        if (!open) {
+        if (!open)
             close_pair(p);
-        }
     }
 }
 
@@ -189,28 +180,22 @@ void network_run(const volatile sig_atomic_t *ended) {
     while (!*ended) {
         nfds_t used = 0;
         int wait_ms = 50;
-        for (unsigned i = 0; i < relay.wires; i++) {
+        for (unsigned i = 0; i < relay.wires; i++)
             fds[used++] = (struct pollfd){relay.listener[i], POLLIN, 0};
-        }
         for (unsigned i = 0; i < 2 * PAIRS_MAX; i++) {
             const struct pair *p = &relay.pair[i / 2];
             const struct lane *lane = &p->lane[i % 2];
-            if (p->fd[0] >= 0 && lane->count > 0) {
+            if (p->fd[0] >= 0 && lane->count > 0)
                 wait_ms = 1;
-            }
-            if (p->fd[0] >= 0 && lane->count < CHUNKS) {
+            if (p->fd[0] >= 0 && lane->count < CHUNKS)
                 fds[used++] = (struct pollfd){p->fd[i % 2], POLLIN, 0};
-            }
         }
         (void)poll(fds, used, wait_ms);
-        for (unsigned i = 0; i < relay.wires; i++) {
-            if (fds[i].revents != 0) {
+        for (unsigned i = 0; i < relay.wires; i++)
+            if (fds[i].revents != 0)
                 take_connection(i);
-            }
-        }
-        for (unsigned i = 0; i < PAIRS_MAX; i++) {
+        for (unsigned i = 0; i < PAIRS_MAX; i++)
             serve(&relay.pair[i]);
-        }
         if (relay.close_us > 0 && chance_now_us() >= relay.next_close_us) {
             close_one();
             relay.next_close_us = chance_now_us() + chance_draw(&relay.random) %
@@ -229,9 +214,8 @@ bool network_open(const struct network_settings *settings) {
         p->fd[0] = p->fd[1] = -1;
         for (unsigned k = 0; k < 2; k++) {
             p->lane[k].chunk = calloc(CHUNKS, sizeof *p->lane[k].chunk);
-            if (p->lane[k].chunk == NULL) {
+            if (p->lane[k].chunk == NULL)
                 return false;
-            }
         }
     }
     return true;

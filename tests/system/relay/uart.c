@@ -24,9 +24,8 @@ static uint64_t until(struct uart_lane *lane, uint32_t mean) {
 static void init_lane(struct uart_lane *lane, const struct uart_settings *s,
                       unsigned place) {
     lane->random = chance_of_seed(s->seed * 2 * UART_WIRES_MAX + place);
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         (void)chance_draw(&lane->random);
-    }
     lane->until_flip = until(lane, s->flip_bytes);
     lane->until_drop = until(lane, s->drop_bytes);
     lane->until_burst = until(lane, s->burst_bytes);
@@ -34,9 +33,8 @@ static void init_lane(struct uart_lane *lane, const struct uart_settings *s,
 
 /* Counts down to a fault. */
 static bool strikes(struct uart_lane *lane, uint64_t *left, uint32_t mean) {
-    if (mean == 0 || --*left > 0) {
+    if (mean == 0 || --*left > 0)
         return false;
-    }
     *left = until(lane, mean);
     return true;
 }
@@ -63,11 +61,10 @@ static size_t damage(struct uart_wires *wires, struct uart_lane *lane,
             byte ^= (uint8_t)(1u << chance_draw(&lane->random) % 8);
             wires->counts.flips++;
         }
-        if (strikes(lane, &lane->until_drop, s->drop_bytes)) {
+        if (strikes(lane, &lane->until_drop, s->drop_bytes))
             wires->counts.drops++;
-        } else {
+        else
             bytes[left++] = byte;
-        }
     }
     return left;
 }
@@ -78,13 +75,10 @@ static size_t damage(struct uart_wires *wires, struct uart_lane *lane,
  * 0: it does not say. */
 static uint64_t unread_unit(void) {
     int pair[2], unread = 0;
-    if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0) {
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0)
         return 0;
-    }
-    if (send(pair[0], "", 1, 0) != 1 ||
-        ioctl(pair[0], SIOCOUTQ, &unread) != 0) {
+    if (send(pair[0], "", 1, 0) != 1 || ioctl(pair[0], SIOCOUTQ, &unread) != 0)
         unread = 0;
-    }
     close(pair[0]);
     close(pair[1]);
     return unread > 0 ? (uint64_t)unread : 0;
@@ -120,9 +114,8 @@ static bool call(struct uart_wires *wires, struct uart_wire *wire, unsigned i) {
     struct uart_end *end = &wire->end[i];
     struct sockaddr_un there = {.sun_family = AF_UNIX};
     int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd < 0) {
+    if (fd < 0)
         return false;
-    }
     memcpy(there.sun_path, end->path, sizeof end->path);
     if (connect(fd, (struct sockaddr *)&there, sizeof there) != 0) {
         close(fd);
@@ -137,12 +130,10 @@ static void answer(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
                    uint64_t now_us) {
     int fd = accept4(wire->end[i].listener, NULL, NULL,
                      SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (fd < 0) {
+    if (fd < 0)
         return;
-    }
-    if (wire->end[i].fd >= 0) {
+    if (wire->end[i].fd >= 0)
         leave(wires, wire, i, now_us);
-    }
     take(wires, wire, i, fd);
 }
 
@@ -216,9 +207,8 @@ static void carry(struct uart_wires *wires, struct uart_wire *wire, unsigned i,
         return;
     }
     size_t most = due(wires, lane, now_ns);
-    if (most == 0) {
+    if (most == 0)
         return;
-    }
     ssize_t got = read(wire->end[i].fd, lane->bytes, most);
     if (got == 0 || (got < 0 && errno != EAGAIN)) {
         leave(wires, wire, i, now_us);
@@ -243,9 +233,8 @@ bool uart_wires_init(struct uart_wires *wires,
     wires->settings = *settings;
     wires->byte_ns = BITS_A_BYTE * UINT64_C(1000000000) / settings->baud;
     wires->tick_us = BYTES_A_LOOK * wires->byte_ns / 1000;
-    if (wires->tick_us < UART_TICK_US) {
+    if (wires->tick_us < UART_TICK_US)
         wires->tick_us = UART_TICK_US;
-    }
     wires->unread_unit = unread_unit();
     return wires->unread_unit > 0;
 }
@@ -287,9 +276,8 @@ bool uart_wires_add(struct uart_wires *wires, const char *text) {
             return false;
         }
         memcpy(end->path, text, size);
-        if (listens && !listen_at(end)) {
+        if (listens && !listen_at(end))
             return false;
-        }
         text += size + 1 - i;
     }
     return wire != NULL;
@@ -300,13 +288,11 @@ bool uart_wires_add(struct uart_wires *wires, const char *text) {
 static uint64_t reach(struct uart_wires *wires, struct uart_wire *wire,
                       unsigned i, uint64_t now_us) {
     struct uart_end *end = &wire->end[i];
-    if (end->fd >= 0 || end->path[0] == '\0' || end->listener >= 0) {
+    if (end->fd >= 0 || end->path[0] == '\0' || end->listener >= 0)
         return UINT64_MAX;
-    }
     if (now_us >= end->call_us) {
-        if (call(wires, wire, i)) {
+        if (call(wires, wire, i))
             return UINT64_MAX;
-        }
         end->call_us = now_us + UART_CALL_US;
     }
     return end->call_us;
@@ -327,18 +313,16 @@ static nfds_t events(const struct uart_wires *wires, struct pollfd *fds) {
 
 static void look(struct uart_wires *wires, uint64_t now_us) {
     struct pollfd fds[4 * UART_WIRES_MAX];
-    if (poll(fds, events(wires, fds), 0) <= 0) {
+    if (poll(fds, events(wires, fds), 0) <= 0)
         return;
-    }
     for (unsigned k = 0; k < 2 * wires->count; k++) {
         struct uart_wire *wire = &wires->wire[k / 2];
         if (fds[2 * k].revents != 0) {
             wire->lane[k % 2].busy = true;
             wire->lane[k % 2].free_ns = now_us * 1000;
         }
-        if (fds[2 * k + 1].revents != 0) {
+        if (fds[2 * k + 1].revents != 0)
             answer(wires, wire, k % 2, now_us);
-        }
     }
 }
 
@@ -348,9 +332,8 @@ uint64_t uart_wires_carry(struct uart_wires *wires, uint64_t now_us) {
     for (unsigned k = 0; k < 2 * wires->count; k++) {
         struct uart_wire *wire = &wires->wire[k / 2];
         struct uart_lane *lane = &wire->lane[k % 2];
-        if (lane->busy || lane->held > 0) {
+        if (lane->busy || lane->held > 0)
             carry(wires, wire, k % 2, now_us);
-        }
         uint64_t at_us = lane->busy || lane->held > 0
                              ? now_us + wires->tick_us
                              : reach(wires, wire, k % 2, now_us);
@@ -368,9 +351,8 @@ static struct timespec time_of(uint64_t us) {
 void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us) {
     struct pollfd fds[4 * UART_WIRES_MAX];
     uint64_t now_us = chance_now_us();
-    if (until_us <= now_us) {
+    if (until_us <= now_us)
         return;
-    }
     if (until_us <= now_us + wires->tick_us) {
         struct timespec until = time_of(until_us); /* clock: a wire's rate */
         (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
@@ -384,9 +366,8 @@ void uart_wires_wait(const struct uart_wires *wires, uint64_t until_us) {
 void uart_wires_close(struct uart_wires *wires) {
     for (unsigned k = 0; k < 2 * wires->count; k++) {
         struct uart_end *end = &wires->wire[k / 2].end[k % 2];
-        if (end->fd >= 0) {
+        if (end->fd >= 0)
             close(end->fd);
-        }
         if (end->listener >= 0) {
             close(end->listener);
             (void)unlink(end->path);

@@ -51,9 +51,8 @@ static bool program(void *context, uint32_t at, const void *bytes,
 
 static bool erase(void *context, uint32_t sector) {
     (void)context;
-    for (size_t i = 0; i < LOADER_RAM_SECTOR; i++) {
+    for (size_t i = 0; i < LOADER_RAM_SECTOR; i++)
         change(sector * LOADER_RAM_SECTOR + i, 0xff);
-    }
     return true;
 }
 
@@ -81,9 +80,8 @@ static void test_boots_count(void **state) {
     (void)state;
     for (int blank = 0; blank < 256; blank += 0x55) {
         memset(chip.bytes, blank, BYTES);
-        for (uint32_t i = 1; i < 3000; i++) { /* five sectors */
+        for (uint32_t i = 1; i < 3000; i++) /* five sectors */
             assert_int_equal(start(-1), i);
-        }
     }
 }
 
@@ -98,9 +96,8 @@ static void test_boots_outlive_every_loss(void **state) {
     for (size_t s = 0; s < sizeof starts / sizeof starts[0]; s++) {
         memset(chip.bytes, 0xff, BYTES);
         uint32_t told = 0;
-        while (told < starts[s]) {
+        while (told < starts[s])
             told = start(-1);
-        }
         memcpy(before, chip.bytes, BYTES);
         chip.changed = 0;
         (void)start(-1);

@@ -22,9 +22,8 @@ const struct board_facts board_facts = {.name = "none", .ports = 4};
 uint32_t bare_node_stack[BARE_STACK_BYTES / sizeof(uint32_t)];
 
 bool board_console_put(uint8_t byte) {
-    if (said_size >= said_max) {
+    if (said_size >= said_max)
         return false;
-    }
     said[said_size++] = byte;
     return true;
 }
@@ -122,9 +121,8 @@ static void test_reason_is_kept(void **state) {
     assert_int_equal(reason.kind, BARE_OUTSIDE);
     assert_int_equal(reason.starts, 5);
     assert_string_equal(reason.text, "at home");
-    for (int kind = BARE_POWER_ON; kind <= BARE_HUNG; kind++) {
+    for (int kind = BARE_POWER_ON; kind <= BARE_HUNG; kind++)
         assert_true(strlen(bare_reason_name((enum bare_reason_kind)kind)) > 4);
-    }
 }
 
 static void test_fault_is_told_and_kept(void **state) {
@@ -132,9 +130,8 @@ static void test_fault_is_told_and_kept(void **state) {
     (void)state;
     (void)bare_reason_take();
     locked = false;
-    if (setjmp(restarted) == 0) {
+    if (setjmp(restarted) == 0)
         bare_fault("a thing", &pc, 1, 0);
-    }
     assert_true(locked);
     assert_non_null(
         strstr((char *)said + 2, "incode: none: a thing; restarting"));
@@ -149,9 +146,8 @@ static void test_stack_s_paint(void **state) {
     uint32_t words[16];
     (void)state;
     for (size_t used = 0; used <= 16; used++) {
-        for (size_t i = 0; i < 16; i++) {
+        for (size_t i = 0; i < 16; i++)
             words[i] = i < 16 - used ? BARE_PAINT : (uint32_t)i;
-        }
         words[15] = used > 3 ? BARE_PAINT : words[15]; /* above: no matter */
         assert_int_equal(bare_stack_used(words, sizeof words), 4 * used);
     }

@@ -33,11 +33,10 @@ static uint64_t bits_of(double x) {
 
 static void check_root(double x) {
     double own = own_sqrt(x), theirs = sqrt(x);
-    if (isnan(theirs)) {
+    if (isnan(theirs))
         assert_true(isnan(own));
-    } else {
+    else
         assert_int_equal(bits_of(own), bits_of(theirs));
-    }
 }
 
 static void test_own_sqrt_of_what_is_special(void **state) {
@@ -82,9 +81,8 @@ static void test_own_sqrt_of_anything(void **state) {
 enum { ROOM = 96 };
 
 static void fill(uint8_t bytes[ROOM]) {
-    for (int i = 0; i < ROOM; i++) {
+    for (int i = 0; i < ROOM; i++)
         bytes[i] = (uint8_t)random_bits();
-    }
 }
 
 static void test_own_memory_moves(void **state) {

@@ -68,9 +68,8 @@ static void test_ring_takes_pieces(void **state) {
     for (int i = 0; i < 20000; i++) {
         size_t size = (size_t)rand() % sizeof piece;
         if (rand() % 2 == 0) {
-            for (size_t k = 0; k < size; k++) {
+            for (size_t k = 0; k < size; k++)
                 piece[k] = (uint8_t)(next + k);
-            }
             size_t written = bare_ring_write(&ring, piece, size);
             assert_int_equal(written, size < 16 - held ? size : 16 - held);
             memcpy(queue + held, piece, written);
@@ -93,18 +92,16 @@ static void test_uart_counts_what_is_lost(void **state) {
     bare_uarts_init();
     struct link_pipe pipe = bare_uart_pipe(1);
     assert_false(bare_uart_ready(&bare_uart[1]));
-    for (unsigned i = 0; i < BARE_RECEIVE_BYTES + 3; i++) {
+    for (unsigned i = 0; i < BARE_RECEIVE_BYTES + 3; i++)
         bare_uart_put(&bare_uart[1], (uint8_t)i);
-    }
     bare_uart_put(&bare_uart[4], 1);
     bare_uart[4].overruns++;
     assert_true(bare_uart_ready(&bare_uart[1]));
     assert_int_equal(bare_uarts_overruns(), 4);
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes),
                      sizeof bytes);
-    for (unsigned i = 0; i < sizeof bytes; i++) {
+    for (unsigned i = 0; i < sizeof bytes; i++)
         assert_int_equal(bytes[i], i % 256);
-    }
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 0);
 }
 

@@ -80,9 +80,8 @@ static size_t make_frame(uint8_t *out) {
                                   .acknowledge = (uint16_t)rand(),
                                   .size = (uint16_t)(rand() % PAYLOAD_MAX)};
     bool text = rand() % 3 == 0; /* which is not to be mistaken */
-    for (unsigned i = 0; i < header.size; i++) {
+    for (unsigned i = 0; i < header.size; i++)
         payload[i] = (uint8_t)(text ? "who\r\nhelp"[rand() % 9] : rand());
-    }
     return frame_encode(out, &header, payload);
 }
 
@@ -125,9 +124,8 @@ static void test_frames_pass_and_lines_are_taken(void **state) {
         clock_us += 10;
         read += read_all(&shell, got + read);
         assert_int_equal(bare_shell_line(&shell, line, clock_us), typed);
-        if (typed) {
+        if (typed)
             assert_string_equal(line, word);
-        }
     }
     assert_int_equal(read, size);
     assert_memory_equal(got, frames, size);
@@ -213,9 +211,8 @@ static void test_text_goes_between_frames(void **state) {
             (void)bare_shell_line(&shell, line, clock_us);
             sent += (size_t)pipe.send(pipe.context, frame + sent, size - sent);
         }
-        if (at != SIZE_MAX) {
+        if (at != SIZE_MAX)
             bare_shell_say(&shell, "incode: here");
-        }
         wire.room = 40;
         (void)bare_shell_line(&shell, line, clock_us);
         (void)bare_shell_line(&shell, line, clock_us);
@@ -298,13 +295,11 @@ static void test_lines_wait_for_each_other(void **state) {
         wire.room = WIRE_BYTES;
     }
     assert_false(bare_shell_line(&shell, line, clock_us));
-    for (unsigned i = 0; i < 100; i++) {
+    for (unsigned i = 0; i < 100; i++)
         type("who\n");
-    }
     assert_int_equal(read_all(&shell, bytes), 0);
-    for (unsigned i = 0; i < BARE_SHELL_LINES; i++) {
+    for (unsigned i = 0; i < BARE_SHELL_LINES; i++)
         assert_true(bare_shell_line(&shell, line, clock_us));
-    }
     assert_false(bare_shell_line(&shell, line, clock_us));
 }
 

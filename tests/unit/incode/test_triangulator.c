@@ -234,9 +234,8 @@ static void mixed_scales(void **unused) {
             bool coplanar = draw(&seed) < 0.5;
             for (int i = 0; i < 30; i++) {
                 double p[3];
-                for (int d = 0; d < 3; d++) {
+                for (int d = 0; d < 3; d++)
                     p[d] = ldexp(draw(&seed), size);
-                }
                 p[2] = coplanar ? p[0] + p[1] : p[2];
                 (void)host_points_append(&points, p, 1, &error);
             }

@@ -43,9 +43,8 @@ static bool echo_start(void *self, size_t bytes,
     memset(self, 0, bytes);
     e->counted = counted;
     e->fault = fault;
-    if (setup->credits == 0) {
+    if (setup->credits == 0)
         node_fault_set(fault, "nothing to echo", 0, 0);
-    }
     return setup->credits > 0;
 }
 
@@ -83,9 +82,8 @@ static unsigned echo_work(void *self, struct node_pace *pace) {
 static unsigned echo_send(void *self) {
     struct echo *e = self;
     if (e->size == 0 || node_counted_write(e->counted, CUBE_HOST, ECHO_ANSWERS,
-                                           e->text, e->size) != 0) {
+                                           e->text, e->size) != 0)
         return 0;
-    }
     e->size = 0;
     return 1;
 }

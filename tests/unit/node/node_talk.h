@@ -53,9 +53,8 @@ static inline uint8_t talk_byte(void) {
 }
 
 static inline void talk_demand(bool condition) {
-    if (!condition) {
+    if (!condition)
         abort();
-    }
 }
 
 static inline uint64_t talk_now_us(void *context) {
@@ -126,9 +125,8 @@ static inline struct talk_end talk_open(uint16_t self, unsigned place) {
     config.window = 8;
     config.epoch = 50 + place;
     config.pipes[0] = host_sim_cube_pipe(&talk.wires, place, 0);
-    if (self == 0) {
+    if (self == 0)
         config.pipes[1] = host_sim_cube_pipe(&talk.wires, 0, 1);
-    }
     size_t bytes = (cube_arena_bytes(&config) + 63) / 64 * 64;
     end.memory = aligned_alloc(64, bytes);
     talk_demand(end.memory != NULL);
@@ -202,9 +200,8 @@ static inline void talk_hear(const struct cube_message *m) {
     switch (m->type) {
     case NODE_PAGE_REQUEST:
         for (uint32_t at = 0; at + 4 <= m->size && talk.wanted_count < 64;
-             at += 4) {
+             at += 4)
             memcpy(&talk.wanted[talk.wanted_count++], m->data + at, 4);
-        }
         break;
     case NODE_RESULT:
         talk_take_result(m);
@@ -238,12 +235,10 @@ static inline bool talk_step(void) {
 static inline bool talk_say(unsigned who, uint8_t type, const void *data,
                             size_t size) {
     for (unsigned i = 0; i < 20000; i++) {
-        if (cube_write(talk.end[who].cube, TALK_SELF, type, data, size) == 0) {
+        if (cube_write(talk.end[who].cube, TALK_SELF, type, data, size) == 0)
             return true;
-        }
-        if (!talk_step()) {
+        if (!talk_step())
             return false;
-        }
     }
     abort(); /* it no longer reads */
 }
@@ -318,9 +313,8 @@ static inline size_t talk_compose(uint8_t type, uint8_t *data) {
         setup.holders =
             number >> 4 == 0 ? talk_byte() % 4 : setup.role == NODE_HOLDER;
         setup.setup.bricks = number >> 5 == 1 ? talk_byte() : TALK_BRICKS;
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             setup.setup.cells[d] = number % 3 == INCODE_GRID ? 3 : 0;
-        }
         memcpy(data, &setup, sizeof setup);
         return sizeof setup;
     case NODE_JOB:
@@ -362,15 +356,14 @@ static inline size_t talk_mutate(uint8_t *data, size_t size) {
         size_t at = (size_t)(talk_byte() | talk_byte() << 8) % size;
         uint8_t how = talk_byte(), value = talk_byte();
         double number = odd[value % 10];
-        if (how % 4 == 0) {
+        if (how % 4 == 0)
             data[at] = value;
-        } else if (how % 4 == 1 && at / 8 * 8 + 8 <= size) {
+        else if (how % 4 == 1 && at / 8 * 8 + 8 <= size)
             memcpy(data + at / 8 * 8, &number, 8);
-        } else if (how % 4 == 2 && at / 8 * 8 + 12 <= size) {
+        else if (how % 4 == 2 && at / 8 * 8 + 12 <= size)
             memcpy(data + at / 8 * 8 + 4, &number, 8);
-        } else if (how % 4 == 3) {
+        else if (how % 4 == 3)
             size = at;
-        }
     }
     return size;
 }
@@ -385,9 +378,8 @@ static inline void talk_expect_right(void) {
     uint8_t data[CUBE_PAYLOAD_MAX];
     /* A new generation, as a host begins after a fault. */
     cube_renew(talk.end[1].cube, &next);
-    for (unsigned i = 0; i < 3 * TALK_STEPS; i++) {
+    for (unsigned i = 0; i < 3 * TALK_STEPS; i++)
         talk_demand(talk_step());
-    }
     talk.wanted_count = talk.committed = 0;
     talk.hash = 0;
     talk.finished = talk.ready = talk.faulted = false;
@@ -419,9 +411,8 @@ static inline void talk_learn_expected(void) {
 
 /* Until the node has taken what was said, and answered, if it does. */
 static inline void talk_listen(void) {
-    for (unsigned k = 0; k < TALK_STEPS; k++) {
+    for (unsigned k = 0; k < TALK_STEPS; k++)
         talk_demand(talk_step());
-    }
 }
 
 static inline void talk_run(const uint8_t *bytes, size_t size) {
@@ -449,14 +440,12 @@ static inline void talk_run(const uint8_t *bytes, size_t size) {
         }
         memset(data, 0, sizeof data);
         size_t length = talk_compose(type, data);
-        if (what >= 0xc0) {
+        if (what >= 0xc0)
             length = talk_mutate(data, length);
-        }
         /* What a page says, and not only that it was altered. */
         if (type == NODE_PAGE && length >= sizeof(struct node_page_head) &&
-            talk_byte() % 2 == 0) {
+            talk_byte() % 2 == 0)
             talk_seal(data, length);
-        }
         /* The neighbour brings pages and asks for them, and tries the rest. */
         bool by_neighbour = type == NODE_PAGE || type == NODE_PAGE_REQUEST ||
                                     type == NODE_LIST || type == NODE_ANSWERS

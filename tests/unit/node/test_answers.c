@@ -25,9 +25,8 @@ static bool steps(unsigned end, unsigned count) {
     heard_count = 0;
     for (unsigned i = 0; i < count; i++) {
         talk.now_us += 1000;
-        if (node_step(talk.node) == NODE_STOPPED) {
+        if (node_step(talk.node) == NODE_STOPPED)
             return false;
-        }
         for (unsigned e = 0; e < 2; e++) {
             (void)cube_poll(talk.end[e].cube, talk.now_us);
             while (cube_read(talk.end[e].cube, &message)) {
@@ -100,9 +99,8 @@ static void answers_are_counted(void **state) {
 static void questions_without_end(void **state) {
     (void)state;
     begin();
-    for (uint32_t i = 0; i < 100; i++) {
+    for (uint32_t i = 0; i < 100; i++)
         ask(i, NODE_TOTALS);
-    }
     assert_true(steps(1, 500));
     ask(500, NODE_TOP);
     assert_true(steps(1, 500));
@@ -136,9 +134,8 @@ static void what_is_for_loaders_is_passed_over(void **state) {
     static const uint8_t nothing[300];
     (void)state;
     begin();
-    for (unsigned type = NODE_IMAGE_BEGIN; type <= NODE_IMAGE_DO; type++) {
+    for (unsigned type = NODE_IMAGE_BEGIN; type <= NODE_IMAGE_DO; type++)
         say(1, (uint8_t)type, nothing, sizeof nothing);
-    }
     assert_true(steps(1, 300));
     assert_int_equal(heard_count, 0);
     talk_end_all();

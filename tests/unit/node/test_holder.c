@@ -27,16 +27,14 @@ struct cube {
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size) {
-    if (cube->room == 0) {
+    if (cube->room == 0)
         return CUBE_AGAIN;
-    }
     assert_true(cube->count < SENT_MAX);
     struct sent *sent = &cube->sent[cube->count];
     *sent = (struct sent){.dest = dest, .type = type};
     memcpy(&sent->first, data, size < 8 ? size : 8);
-    if (type == NODE_PAGE) {
+    if (type == NODE_PAGE)
         memcpy(&sent->data, (const uint8_t *)data + 12, 4);
-    }
     cube->room--;
     cube->count++;
     return 0;
@@ -111,9 +109,8 @@ static void expect(unsigned i, uint16_t dest, uint8_t type, uint32_t page) {
     assert_int_equal(world.cube.sent[i].dest, dest);
     assert_int_equal(world.cube.sent[i].type, type);
     assert_int_equal(world.cube.sent[i].first, page);
-    if (type == NODE_PAGE) {
+    if (type == NODE_PAGE)
         assert_int_equal(world.cube.sent[i].data, ~page);
-    }
 }
 
 static struct node_finished_message totals(void) {
@@ -174,9 +171,8 @@ static void no_room_for_a_request(void **unused) {
     asks(0, 1);
     assert_int_equal(sends(1), 1);
     expect(0, 0, NODE_PAGE, 1);
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++)
         assert_int_equal(sends(0), 0);
-    }
     assert_int_equal(totals().pages_forwarded, frames);
     asks(0, 0);
     assert_int_equal(sends(1), 1);

@@ -33,9 +33,8 @@ struct cube {
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size) {
-    if (cube->room == 0) {
+    if (cube->room == 0)
         return CUBE_AGAIN;
-    }
     assert_true(cube->count < SENT_MAX);
     struct sent *sent = &cube->sent[cube->count++];
     *sent = (struct sent){.dest = dest, .type = type, .size = (uint16_t)size};
@@ -135,9 +134,8 @@ static void begin(void) {
                      &world.counted);
     node_lending_init(&world.lending, world.memory, &setup, &world.shares,
                       &world.counted, &world.fault);
-    for (size_t i = node_lending_bytes(NODES); i < sizeof world.memory; i++) {
+    for (size_t i = node_lending_bytes(NODES); i < sizeof world.memory; i++)
         assert_int_equal(world.memory[i], 0xa5);
-    }
     node_requests_init(&world.requests, &setup, &world.lending, &world.counted,
                        &world.fault);
     world.source = node_requests_source(&world.requests);
@@ -305,9 +303,8 @@ static void comes(uint16_t source, uint32_t page) {
 static void asked_for(void **unused) {
     (void)unused;
     begin();
-    for (uint32_t page = 0; page < 10; page++) {
+    for (uint32_t page = 0; page < 10; page++)
         assert_true(world.source.request(world.source.context, page));
-    }
     assert_true(world.source.request(world.source.context, 25));
     assert_true(world.source.request(world.source.context, 11));
     assert_int_equal(sends_requests(8), 3);
@@ -323,11 +320,9 @@ static void asked_for(void **unused) {
     assert_int_equal(sends_requests(8), 1);
     expect(0, 0, NODE_PAGE_REQUEST, 8, 0);
     assert_int_equal(world.cube.sent[0].size, 4);
-    for (uint32_t page = 0; page < 9; page++) {
-        if (page != 3) {
+    for (uint32_t page = 0; page < 9; page++)
+        if (page != 3)
             comes(CUBE_HOST, page); /* that keeper has left them to it */
-        }
-    }
     assert_int_equal(sends_requests(8), 1);
     expect(0, 0, NODE_PAGE_REQUEST, 9, 0);
     comes(0, 9);
@@ -347,9 +342,8 @@ static void altered(void **unused) {
     struct node_page p;
     (void)unused;
     begin();
-    for (uint32_t page = 0; page < 9; page++) {
+    for (uint32_t page = 0; page < 9; page++)
         assert_true(world.source.request(world.source.context, page));
-    }
     assert_int_equal(sends_requests(8), 1); /* eight of them */
     assert_false(sent_by(0, 5, true, &p));
     assert_int_equal(p.number, 5);

@@ -27,15 +27,13 @@ struct cube {
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size) {
-    if (cube->room == 0) {
+    if (cube->room == 0)
         return CUBE_AGAIN;
-    }
     assert_true(cube->count < SENT_MAX);
     struct sent *sent = &cube->sent[cube->count++];
     *sent = (struct sent){.dest = dest, .type = type, .size = (uint16_t)size};
-    if (size > 0) {
+    if (size > 0)
         memcpy(sent->data, data, size);
-    }
     cube->room--;
     return 0;
 }

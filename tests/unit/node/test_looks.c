@@ -60,9 +60,8 @@ static void set_up(void) {
         config.dimension = 1;
         config.window = 4;
         config.epoch = 7 + i;
-        for (unsigned d = 0; d < 2 - i; d++) {
+        for (unsigned d = 0; d < 2 - i; d++)
             config.pipes[d] = host_sim_cube_pipe(&world.wires, i, d);
-        }
         size_t bytes = (cube_arena_bytes(&config) + 63) / 64 * 64;
         world.memory[i] = aligned_alloc(64, bytes);
         assert_non_null(world.memory[i]);

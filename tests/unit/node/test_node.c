@@ -177,16 +177,14 @@ static void serve(uint16_t to) {
     struct node_page_message body;
     uint32_t credit = w->results + world.setup.credits;
     if (credit != w->credit &&
-        write_to(to, NODE_CREDIT, &credit, sizeof credit) == 0) {
+        write_to(to, NODE_CREDIT, &credit, sizeof credit) == 0)
         w->credit = credit;
-    }
     while (w->count > 0) {
         body.head.page = w->pages[w->first];
         size_t size = host_page(&world.order, body.head.page, body.data);
         if (write_to(to, NODE_PAGE, &body,
-                     node_page_seal(&body, world.setup.page_key, size)) != 0) {
+                     node_page_seal(&body, world.setup.page_key, size)) != 0)
             break;
-        }
         w->first = (w->first + 1) % QUEUE;
         w->count--;
     }
@@ -222,9 +220,8 @@ static void step(void) {
             cube_release(world.cube);
         }
         uint16_t to = (uint16_t)draw(world.nodes);
-        if (world.ready == world.nodes) {
+        if (world.ready == world.nodes)
             serve(to);
-        }
     }
 }
 
@@ -238,16 +235,14 @@ static void give_jobs(void) {
         memcpy(job.job.hi, region->hi, sizeof region->hi);
         job.epoch =
             host_ledger_open(&world.ledger, i, region->first, region->last);
-        while (write_to((uint16_t)i, NODE_JOB, &job, sizeof job) != 0) {
+        while (write_to((uint16_t)i, NODE_JOB, &job, sizeof job) != 0)
             step();
-        }
     }
 }
 
 static void stop(void) {
-    while (cube_write(world.cube, CUBE_ALL, NODE_STOP, NULL, 0) != 0) {
+    while (cube_write(world.cube, CUBE_ALL, NODE_STOP, NULL, 0) != 0)
         step();
-    }
     bool closing = false;
     for (unsigned steps = 0; world.sim.ended < world.nodes; steps++) {
         assert_true(steps < 1000000);
@@ -296,21 +291,18 @@ static void run(const struct host_points *points, struct shape shape,
     for (unsigned i = 0; i < world.nodes; i++) {
         world.setup.role = i < world.workers ? NODE_WORKER : NODE_HOLDER;
         while (cube_write(world.cube, (uint16_t)i, NODE_SETUP, &world.setup,
-                          sizeof world.setup) != 0) {
+                          sizeof world.setup) != 0)
             step();
-        }
     }
-    while (world.ready < world.nodes) {
+    while (world.ready < world.nodes)
         step();
-    }
     for (unsigned i = 0; i < world.nodes; i++) {
         world.waiting[i].credit = world.setup.credits;
         world.waiting[i].sent = 1; /* the setup */
     }
     give_jobs();
-    while (world.finished < world.workers) {
+    while (world.finished < world.workers)
         step();
-    }
     assert_int_equal(world.ledger.committed, world.order.bricks);
     assert_int_equal(world.spill.faces, 0);
     stop();

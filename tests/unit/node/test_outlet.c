@@ -28,9 +28,8 @@ static void begin(struct node_outlet *outlet) {
 static void emit(struct node_outlet *outlet, uint32_t batches) {
     static const uint32_t apexes[2][3] = {{1, 2, 3}, {2, 3, 4}};
     struct incode_front_outside outside = node_outlet_outside(outlet);
-    for (uint32_t v = 0; outlet->results.used < batches; v += 100000) {
+    for (uint32_t v = 0; outlet->results.used < batches; v += 100000)
         outside.emit(outside.context, v, apexes, 2);
-    }
 }
 
 static void test_few_wait(void **unused) {

@@ -97,9 +97,8 @@ static void open_worker(enum incode_index index, enum incode_build build,
     setup.setup.build = (uint8_t)build;
     memcpy(setup.setup.lo, order->lo, sizeof order->lo);
     memcpy(setup.setup.hi, order->hi, sizeof order->hi);
-    if (grid) {
+    if (grid)
         memcpy(setup.setup.cells, order->cells, sizeof setup.setup.cells);
-    }
     assert_true(
         role->start(world.arena, MEMORY, &setup, &world.counted, &world.fault));
     job.job.last = order->bricks;

@@ -21,9 +21,8 @@ struct cube {
 
 int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size) {
-    if (cube->room == 0) {
+    if (cube->room == 0)
         return CUBE_AGAIN;
-    }
     cube->room--;
     cube->count++;
     cube->dest = dest;
@@ -52,9 +51,8 @@ static void test_vectors(void **unused) {
     const uint64_t key = 0x0706050403020100;
     uint8_t bytes[64];
     uint32_t words[16];
-    for (unsigned i = 0; i < sizeof bytes; i++) {
+    for (unsigned i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)i;
-    }
     memcpy(words, bytes, sizeof words);
     for (size_t i = 0; i < sizeof vectors / sizeof vectors[0]; i++) {
         size_t size = vectors[i].size, split = size / 8 * 2;

@@ -59,9 +59,8 @@ static void compare(const struct expected *e, struct seen *seen,
         assert_int_not_equal(event, NODE_RESULT_GARBAGE);
         assert_true(count <= rows_max);
         assert_memory_equal(rows, e->rows[seen->rows], count * sizeof rows[0]);
-        for (size_t i = 0; i < count; i++) {
+        for (size_t i = 0; i < count; i++)
             assert_int_equal(reader.finder, e->finder[seen->rows + i]);
-        }
         seen->rows += count;
         if (event == NODE_RESULT_COMMIT) {
             assert_int_equal(reader.brick, e->bricks[seen->bricks]);
@@ -89,9 +88,8 @@ static void round_trip(uint32_t vertices, size_t rows_max) {
             e.finder[e.rows_count] = finder;
             uint32_t *row = e.rows[e.rows_count++];
             row[0] = vertex;
-            for (size_t k = 0; k < 3; k++) {
+            for (size_t k = 0; k < 3; k++)
                 row[k + 1] = apexes[i][k] = draw_near(vertex, vertices);
-            }
         }
         while (done < count) {
             if (node_result_finder(&writer, finder)) {
@@ -109,9 +107,8 @@ static void round_trip(uint32_t vertices, size_t rows_max) {
         e.bricks[e.bricks_count] = draw_near(vertex, vertices) / 64;
         e.bricks_at[e.bricks_count] = e.rows_count;
         e.bricks_count++;
-        if (!node_result_commit(&writer, e.bricks[e.bricks_count - 1])) {
+        if (!node_result_commit(&writer, e.bricks[e.bricks_count - 1]))
             e.bricks_count--;
-        }
     }
     compare(&e, &seen, buffer, writer.size, vertices, rows_max);
     assert_int_equal(seen.rows, e.rows_count);
@@ -142,23 +139,19 @@ static void test_garbage(void **unused) {
         assert_non_null(data);
         for (size_t i = 0; i < size; i++) {
             data[i] = (uint8_t)draw();
-            if (draw() % 2 == 0) {
+            if (draw() % 2 == 0)
                 data[i] &= 0xd5; /* small numbers and valid kinds */
-            }
         }
         node_result_open(&reader, data, size, 5000, 0, 9);
         do {
             event = node_result_read(&reader, rows, 16, &count);
             assert_true(++events <= size + 1);
             assert_true(event == NODE_RESULT_GARBAGE || reader.finder < 9);
-            for (size_t i = 0; event != NODE_RESULT_GARBAGE && i < count; i++) {
-                for (size_t k = 0; k < 4; k++) {
+            for (size_t i = 0; event != NODE_RESULT_GARBAGE && i < count; i++)
+                for (size_t k = 0; k < 4; k++)
                     assert_true(rows[i][k] < 5000);
-                }
-            }
-            if (event == NODE_RESULT_COMMIT) {
+            if (event == NODE_RESULT_COMMIT)
                 assert_true(reader.brick < 79);
-            }
         } while (event == NODE_RESULT_ROWS || event == NODE_RESULT_COMMIT);
         free(data);
     }

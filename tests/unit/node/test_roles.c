@@ -59,9 +59,8 @@ static void start_node(unsigned self) {
     board->identity.epoch = 100 + self;
     board->identity.window = 4;
     board->pipes[0] = host_sim_cube_pipe(&world.wires, self, 0);
-    if (self == 0) {
+    if (self == 0)
         board->pipes[1] = host_sim_cube_pipe(&world.wires, 0, 1);
-    }
     board->now_us = now_us;
     board->busy_us = now_us;
     board->arena = world.memory[self];
@@ -102,9 +101,8 @@ static int set_up(void **unused) {
 static int tear_down(void **unused) {
     (void)unused;
     host_sim_cube_close(&world.wires);
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++)
         free(world.memory[i]);
-    }
     return 0;
 }
 

@@ -45,9 +45,8 @@ static void begin(struct scene *s, uint32_t nodes) {
     s->peers = node_shares_peers(&s->shares);
     regions.count = (uint16_t)(nodes + 1);
     memcpy(message, &regions, sizeof regions);
-    for (uint32_t i = 0; i <= nodes; i++) {
+    for (uint32_t i = 0; i <= nodes; i++)
         memcpy(message + sizeof regions + i * sizeof i, &i, sizeof i);
-    }
     assert_true(node_shares_regions(&s->shares, message,
                                     sizeof regions + (nodes + 1) * 4));
     assert_true(node_shares_ready(&s->shares));
@@ -102,9 +101,8 @@ static void test_enough(void **state) {
     free(s.memory);
     begin(&s, 2);
     assert_true(room_of(&s) >= 256);
-    for (int i = 0; i < 40 * NODE_SHARES_A_BATCH; i++) {
+    for (int i = 0; i < 40 * NODE_SHARES_A_BATCH; i++)
         share(&s, 0, 0);
-    }
     assert_true(room_of(&s) >= 7 * NODE_SHARES_A_BATCH);
     free(s.memory);
     begin(&s, 8);

@@ -30,9 +30,8 @@ static void random_talks(void **unused) {
         bytes[1] = bytes[2] = 0;
         bytes[3] = 20;
         bytes[4] = 1; /* and a right job first, as a rule */
-        for (size_t i = talks % 4 == 0 ? 0 : 7; i < sizeof bytes; i++) {
+        for (size_t i = talks % 4 == 0 ? 0 : 7; i < sizeof bytes; i++)
             bytes[i] = draw();
-        }
         talk_run(bytes, sizeof bytes);
     }
 }

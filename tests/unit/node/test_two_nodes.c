@@ -125,26 +125,23 @@ static void alter(struct mail *m) {
         m->data[at] ^= (uint8_t)(1 << world.altered % 8);
         world.altered++;
     }
-    if (world.lies && m->type == NODE_ANSWERS) {
+    if (world.lies && m->type == NODE_ANSWERS)
         memset(m->data + offsetof(struct incode_answers, builder), 0, 2);
-    }
 }
 
 static bool post(uint16_t source, uint16_t dest, uint8_t type, const void *data,
                  size_t size) {
     struct box *box = box_of(dest);
-    if (box->count == MAIL) {
+    if (box->count == MAIL)
         return false;
-    }
     struct mail *m = &box->mail[(box->first + box->count++) % MAIL];
     *m = (struct mail){.source = source, .type = type, .size = (uint16_t)size};
     if (size > 0) {
         memcpy(m->data, data, size);
         alter(m);
     }
-    if (type == NODE_LOAN_FOUND) {
+    if (type == NODE_LOAN_FOUND)
         note_found(m);
-    }
     return true;
 }
 
@@ -208,11 +205,9 @@ static void take_results(const struct mail *m) {
         event = node_result_read(&reader, rows, 500, &count);
         assert_int_not_equal(event, NODE_RESULT_GARBAGE);
         world.found_by[reader.finder] += (unsigned)count;
-        for (size_t i = 0; i < count; i++) {
-            if (world.role[0] == NODE_EXCHANGE && reader.finder != m->source) {
+        for (size_t i = 0; i < count; i++)
+            if (world.role[0] == NODE_EXCHANGE && reader.finder != m->source)
                 assert_true(was_found(rows[i], (uint16_t)reader.finder));
-            }
-        }
         host_tetrahedra_keep(&world.tets, count);
     } while (event != NODE_RESULT_END);
 }
@@ -249,9 +244,8 @@ static void host_takes(const struct mail *m) {
 
 static void host_step(void) {
     struct box *box = &world.box[HOST];
-    for (; box->count > 0; drop(box)) {
+    for (; box->count > 0; drop(box))
         host_takes(&box->mail[box->first]);
-    }
     while (world.wanted_count > 0 &&
            box_of(world.wanted[world.wanted_count - 1].to)->count < MAIL) {
         world.wanted_count--;
@@ -268,17 +262,14 @@ static void node_step(unsigned i, bool works) {
         const struct mail *m = &box->mail[box->first];
         const struct cube_message message = {m->source, m->size, m->type,
                                              m->data};
-        if (n->role->may_take != NULL &&
-            !n->role->may_take(n->arena, &message)) {
+        if (n->role->may_take != NULL && !n->role->may_take(n->arena, &message))
             break;
-        }
         n->role->message(n->arena, &message, world.now_us);
         n->counted.received += m->source == CUBE_HOST;
     }
     node_pace_begin(&n->pace, world.now_us);
-    if (works) {
+    if (works)
         (void)n->role->work(n->arena, &n->pace);
-    }
     (void)n->role->send(n->arena);
     n->fault.text[n->fault.size] = '\0';
     assert_string_equal(n->fault.text, "");
@@ -303,9 +294,8 @@ static struct node_setup_message setup_of(unsigned i) {
                   .owner_rule = INCODE_OWNER_LOWEST}};
     bool has_builders =
         world.role[0] == NODE_MANAGER || world.role[0] == NODE_LINDA_MANAGER;
-    if (has_builders) {
+    if (has_builders)
         node_add_builder(&setup, 1);
-    }
     memcpy(setup.setup.lo, order.lo, sizeof order.lo);
     memcpy(setup.setup.hi, order.hi, sizeof order.hi);
     return setup;
@@ -326,12 +316,10 @@ static void give_regions(void) {
         struct node_regions_message head;
         uint32_t first[NODES + 1];
     } message = {.head = {.count = NODES + 1, .to_all = order.tree.pages}};
-    if (world.to_all) {
+    if (world.to_all)
         message.head.to_all = order.tree.base[1];
-    }
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         message.first[i] = order.region[i].first;
-    }
     message.first[NODES] = order.bricks;
     for (unsigned k = 0; k < NODES; k++) {
         const uint16_t i = (uint16_t)k;
@@ -351,17 +339,15 @@ static void start(void) {
         n->arena = aligned_alloc(NODE_ALIGNMENT, ARENA);
         assert_non_null(n->arena);
         node_pace_init(&n->pace, now_us, NULL);
-        if (!n->role->start(n->arena, ARENA, &setup, &n->counted, &n->fault)) {
+        if (!n->role->start(n->arena, ARENA, &setup, &n->counted, &n->fault))
             fail_msg("%.*s", (int)n->fault.size, n->fault.text);
-        }
         /* What has no job is done when the other one is. */
         n->done = i > 0 && world.role[0] != NODE_EXCHANGE;
     }
-    if (world.role[0] == NODE_EXCHANGE) {
+    if (world.role[0] == NODE_EXCHANGE)
         give_regions();
-    } else {
+    else
         give_job(0, 0, order.bricks, order.lo, order.hi);
-    }
 }
 
 static void run(void) {
@@ -413,9 +399,8 @@ static int set_up(void **unused) {
     (void)unused;
     if (host_gen("uniform", POINTS, 5, &points, &error) != 0 ||
         host_order_make(&order, "test", points.xyz, POINTS, HOST_ADAPTIVE,
-                        NODES, false, &error) != 0) {
+                        NODES, false, &error) != 0)
         return -1;
-    }
     host_points_free(&points);
     begin(NODE_WORKER, NODE_WORKER);
     run();

@@ -67,9 +67,8 @@ static void slow_messages(void **unused) {
     (void)waves(NODE_WAVES_UNCHANGED - 1, NODE_WAVES_UNCHANGED_US);
     assert_false(node_fault_is_set(&world.fault));
     begin(1000, 1);
-    for (unsigned i = 0; i < 500; i++, world.state.received++) {
+    for (unsigned i = 0; i < 500; i++, world.state.received++)
         (void)waves(NODE_WAVES_UNCHANGED - 1, NODE_WAVES_UNCHANGED_US / 100);
-    }
     assert_false(node_fault_is_set(&world.fault));
     world.state.quiet = false; /* a node that stands still answers none */
     (void)waves(10 * NODE_WAVES_UNCHANGED, NODE_WAVES_UNCHANGED_US);

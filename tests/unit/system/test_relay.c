@@ -50,9 +50,8 @@ static void send_on(size_t most) {
         size_t left = most - sent_bytes;
         ssize_t put = send(sender, sent + sent_bytes,
                            left < CHUNK ? left : CHUNK, MSG_NOSIGNAL);
-        if (put <= 0) {
+        if (put <= 0)
             return;
-        }
         sent_bytes += (size_t)put;
     }
 }
@@ -60,9 +59,8 @@ static void send_on(size_t most) {
 static void hear(void) {
     ssize_t got;
     while ((got = read(receiver, heard + heard_bytes, SENT_MAX - heard_bytes)) >
-           0) {
+           0)
         heard_bytes += (size_t)got;
-    }
 }
 
 /* As long as there is something to carry, or for so long. */
@@ -70,17 +68,15 @@ static void carry(uint64_t for_us, bool reads) {
     uint64_t until = now + for_us;
     while (now < until) {
         uint64_t next = uart_wires_carry(&wires, now);
-        if (reads) {
+        if (reads)
             hear();
-        }
         now = next < until ? next : until;
     }
 }
 
 static void fill(void) {
-    for (size_t i = 0; i < SENT_MAX; i++) {
+    for (size_t i = 0; i < SENT_MAX; i++)
         sent[i] = (uint8_t)(i * 7 + i / 251);
-    }
 }
 
 static void rates(void **unused) {
@@ -151,9 +147,8 @@ static size_t differing(size_t size) {
         carry(10000, true);
     }
     carry(5000000, true);
-    for (size_t i = 0; i < heard_bytes; i++) {
+    for (size_t i = 0; i < heard_bytes; i++)
         different += heard[i] != sent[i];
-    }
     assert_int_equal(wires.counts.bytes, size);
     return different;
 }
@@ -202,11 +197,10 @@ static void the_same_seed_does_the_same(void **unused) {
                                      .flip_bytes = 50,
                                      .burst_bytes = 900});
         (void)differing(sizeof first);
-        if (i == 0) {
+        if (i == 0)
             memcpy(first, heard, sizeof first);
-        } else {
+        else
             assert_int_equal(memcmp(first, heard, sizeof first) == 0, i == 1);
-        }
         part();
     }
 }

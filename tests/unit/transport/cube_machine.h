@@ -105,20 +105,17 @@ static inline struct machine *build(unsigned dimension,
         p->config.epoch = draw(m) | 1;
         p->next = i;
         p->config.host_port = i > 0 && i == config->spare_node;
-        for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++) {
+        for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++)
             p->config.pipes[d] = host_sim_cube_pipe(&m->cube, i, d);
-        }
     }
-    for (unsigned i = 0; i < m->count; i++) {
+    for (unsigned i = 0; i < m->count; i++)
         open_place(m, i);
-    }
     return m;
 }
 
 static inline void destroy(struct machine *m) {
-    for (unsigned i = 0; i < m->count; i++) {
+    for (unsigned i = 0; i < m->count; i++)
         free(m->places[i].arena);
-    }
     host_sim_cube_close(&m->cube);
     free(m);
 }
@@ -129,15 +126,12 @@ static inline unsigned content(const struct machine *m, uint8_t *bytes,
                                unsigned from, uint32_t number, bool broadcast) {
     uint32_t h = (number + 1) * 2654435761u ^ from * 40503u;
     unsigned size = h >> 8 & 1 ? m->size_max : 5 + h % (m->size_max - 4);
-    for (unsigned i = 0; i < size && i < 25; i++) {
+    for (unsigned i = 0; i < size && i < 25; i++)
         bytes[i] = (uint8_t)(h >> i);
-    }
-    for (unsigned i = 25; i < size; i += 25) {
+    for (unsigned i = 25; i < size; i += 25)
         memcpy(bytes + i, bytes, size - i < 25 ? size - i : 25);
-    }
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         bytes[i] = (uint8_t)(number >> 8 * i);
-    }
     bytes[4] = broadcast;
     return size;
 }
@@ -166,17 +160,15 @@ static inline unsigned give(struct machine *m, unsigned i) {
     while (p->broadcasts_sent < m->broadcasts) {
         unsigned size = content(m, bytes, i, p->broadcasts_sent, true);
         if (cube_write(p->cube, CUBE_ALL, p->broadcasts_sent % TYPES, bytes,
-                       size) != 0) {
+                       size) != 0)
             break;
-        }
         p->broadcasts_sent++;
         written++;
     }
     for (unsigned tried = 0; tried < m->count; tried++) {
         unsigned to = p->next = (p->next + 1) % m->count;
-        if (to == i || p->sent[to] == m->each || m->places[to].gone) {
+        if (to == i || p->sent[to] == m->each || m->places[to].gone)
             continue;
-        }
         unsigned size = content(m, bytes, i, p->sent[to], false);
         unsigned room = cube_room(p->cube, m->places[to].self);
         int status = cube_write(p->cube, m->places[to].self,
@@ -193,9 +185,8 @@ static inline unsigned give(struct machine *m, unsigned i) {
 static inline void step(struct machine *m, unsigned i) {
     struct place *p = &m->places[i];
     struct cube_message message;
-    if (m->now_us < p->stopped_until_us || p->gone) {
+    if (m->now_us < p->stopped_until_us || p->gone)
         return;
-    }
     cube_poll(p->cube, m->now_us);
     while (m->now_us >= p->deaf_until_us && cube_read(p->cube, &message)) {
         take(m, i, &message);
@@ -209,17 +200,14 @@ static inline bool finished(const struct machine *m) {
         const struct place *p = &m->places[i];
         for (unsigned j = 0; j < m->count; j++) {
             bool reached = j != i && i != m->nodes;
-            if (p->gone || m->places[j].gone) {
+            if (p->gone || m->places[j].gone)
                 continue;
-            }
             if ((i != j && p->read[j] != m->each) ||
-                p->broadcasts_read[j] != (reached ? m->broadcasts : 0)) {
+                p->broadcasts_read[j] != (reached ? m->broadcasts : 0))
                 return false;
-            }
         }
-        if (!p->gone && !cube_idle(p->cube)) {
+        if (!p->gone && !cube_idle(p->cube))
             return false;
-        }
     }
     return true;
 }
@@ -257,12 +245,10 @@ static inline void run(struct machine *m, uint32_t each, uint64_t most_us) {
     m->each = each;
     while (!finished(m)) {
         m->now_us += 20 + draw(m) % 80;
-        for (unsigned k = 0; k < m->count; k++) {
+        for (unsigned k = 0; k < m->count; k++)
             step(m, draw(m) % m->count);
-        }
-        if (m->now_us > deadline) {
+        if (m->now_us > deadline)
             fail_msg("dimension %u: not all arrived", m->dimension);
-        }
     }
 }
 
@@ -276,21 +262,17 @@ static inline const struct cube_wiring *wiring_of(const struct machine *m,
 }
 
 static inline bool all_in(const struct machine *m, uint32_t generation) {
-    for (unsigned i = 0; i < m->count; i++) {
-        if (!m->places[i].gone && wiring_of(m, i)->generation != generation) {
+    for (unsigned i = 0; i < m->count; i++)
+        if (!m->places[i].gone && wiring_of(m, i)->generation != generation)
             return false;
-        }
-    }
     return true;
 }
 
 static inline void poll_all(struct machine *m, uint32_t us) {
     m->now_us += us;
-    for (unsigned i = 0; i < m->count; i++) {
-        if (!m->places[i].gone) {
+    for (unsigned i = 0; i < m->count; i++)
+        if (!m->places[i].gone)
             cube_poll(m->places[i].cube, m->now_us);
-        }
-    }
 }
 
 static inline void settle(struct machine *m, uint32_t generation) {
@@ -330,9 +312,8 @@ static inline void chatter(struct machine *m, unsigned i, bool reads,
     struct cube_message message;
     uint32_t generation = cube_wiring(cube)->generation, words[WORDS];
     unsigned to = draw(m) % m->count, count = 1 + draw(m) % WORDS;
-    for (unsigned k = 0; k < count; k++) {
+    for (unsigned k = 0; k < count; k++)
         words[k] = generation;
-    }
     if (to != i &&
         cube_write(cube, m->places[to].self, 1, words, 4u * count) == 0) {
         assert_true(generation > 0);
@@ -340,9 +321,8 @@ static inline void chatter(struct machine *m, unsigned i, bool reads,
     }
     while (reads && cube_read(cube, &message)) {
         memcpy(words, message.data, message.size);
-        for (unsigned k = 0; k < message.size / 4u; k++) {
+        for (unsigned k = 0; k < message.size / 4u; k++)
             assert_int_equal(words[k], generation);
-        }
         cube_release(cube);
         counts[READ]++;
     }

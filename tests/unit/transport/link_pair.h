@@ -48,9 +48,8 @@ static inline uint32_t mix(uint32_t x) {
 static inline size_t size_of(const struct end *end, unsigned who,
                              uint32_t number) {
     uint32_t m = mix(number * 2 + who);
-    if (end->size_max == 0) {
+    if (end->size_max == 0)
         return end->config.message_max;
-    }
     size_t most = end->size_max;
     return m % 7 == 0 ? most : m % 5 == 0 ? m / 64 % 9 : m / 64 % (most + 1);
 }
@@ -62,12 +61,10 @@ static inline void fill(uint8_t *bytes, size_t size, unsigned who,
         bytes[i] = (uint8_t)((m >> shift) + i * (m & 7));
         shift = shift < 23 ? shift + 1 : 0;
     }
-    for (size_t i = 0; m % 3 == 0 && i < size; i += 1 + m % 9) {
+    for (size_t i = 0; m % 3 == 0 && i < size; i += 1 + m % 9)
         bytes[i] = 0;
-    }
-    for (size_t i = 0; i < 4 && i < size; i++) {
+    for (size_t i = 0; i < 4 && i < size; i++)
         bytes[i] = (uint8_t)(number >> 8 * i);
-    }
 }
 
 static inline void start(struct pair *p, unsigned who, uint32_t epoch) {
@@ -127,15 +124,13 @@ static inline void write_some(struct end *end, unsigned who) {
     while (end->written < end->most) {
         size_t size = size_of(end, who, end->written), head = size % 9;
         unsigned room = link_room(end->link, size);
-        if (room > 0) {
+        if (room > 0)
             fill(bytes, size, who, end->written);
-        }
         int status =
             link_write(end->link, bytes, head, bytes + head, size - head);
         assert_int_equal(status, room > 0 ? 0 : LINK_AGAIN);
-        if (status != 0) {
+        if (status != 0)
             return;
-        }
         end->written++;
     }
 }

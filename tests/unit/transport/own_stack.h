@@ -36,11 +36,9 @@ static inline bool holds(const void *memory, size_t size, const uint8_t *secret,
     enum { RUN = 8 };
     const uint8_t *bytes = memory;
     for (size_t i = 0; i + RUN <= size; i++) {
-        for (size_t k = 0; k + RUN <= secret_bytes; k += RUN) {
-            if (memcmp(bytes + i, secret + k, RUN) == 0) {
+        for (size_t k = 0; k + RUN <= secret_bytes; k += RUN)
+            if (memcmp(bytes + i, secret + k, RUN) == 0)
                 return true;
-            }
-        }
     }
     return false;
 }

@@ -28,9 +28,8 @@ struct ends {
 
 static inline int lane_send(void *context, const uint8_t *bytes, size_t size) {
     struct lane *lane = ((struct ends *)context)->out;
-    if (lane->most != 0 && size > lane->most) {
+    if (lane->most != 0 && size > lane->most)
         size = lane->most;
-    }
     assert_true(lane->end + size <= ROOM);
     memcpy(lane->bytes + lane->end, bytes, size);
     lane->end += size;
@@ -74,9 +73,8 @@ static inline struct world *new_world(uint8_t salt, size_t most) {
     struct world *w = calloc(1, sizeof *w);
     assert_non_null(w);
     for (unsigned who = 0; who < 2; who++) {
-        for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
+        for (unsigned i = 0; i < SECURE_KEY_BYTES; i++)
             w->key[who][i] = (uint8_t)i;
-        }
         w->lanes[who].most = most;
         w->ends[who] = (struct ends){&w->lanes[1 - who], &w->lanes[who]};
         w->pipes[who] =
@@ -89,11 +87,9 @@ static inline struct world *new_world(uint8_t salt, size_t most) {
 static inline void shake_hands(struct world *w, int want[2]) {
     want[0] = want[1] = 0;
     for (unsigned i = 0; i < 1000; i++) {
-        for (unsigned who = 0; who < 2; who++) {
-            if (want[who] == 0) {
+        for (unsigned who = 0; who < 2; who++)
+            if (want[who] == 0)
                 want[who] = secure_shake(&w->shake[who], &w->pipes[who]);
-            }
-        }
     }
     for (unsigned who = 0; who < 2; who++) {
         if (want[who] > 0) {

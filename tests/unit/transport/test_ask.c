@@ -21,9 +21,8 @@ static void stays(struct pair *p, enum link_state state) {
     struct link_peer peer = *link_peer(link);
     assert_int_equal(link_state(link), state);
     for (unsigned ms = 0; ms < 2000; ms++) {
-        if (ms >= 1000 || ms % 100 == 0) {
+        if (ms >= 1000 || ms % 100 == 0)
             ask(p);
-        }
         p->now_us += 1000;
         link_poll(link, p->now_us);
         sim_direction_flush(host_sim_cube_port(&p->cube, 1, 0)->end->in);
@@ -46,9 +45,8 @@ static struct pair *talking(const struct link_config *config) {
     struct pair *p = new_pair(config, &perfect, 5);
     p->ends[0].size_max = p->ends[1].size_max = 300;
     p->ends[0].most = p->ends[1].most = 20;
-    for (unsigned i = 0; i < 300; i++) {
+    for (unsigned i = 0; i < 300; i++)
         step(p, 1000);
-    }
     assert_true(finished(p));
     return p;
 }
@@ -101,9 +99,8 @@ static void a_link_that_is_closed(void **unused) {
     (void)unused;
     struct pair *p = talking(&small);
     link_close(p->ends[1].link, p->now_us + 1000000);
-    for (unsigned i = 0; i < 50; i++) {
+    for (unsigned i = 0; i < 50; i++)
         step(p, 1000);
-    }
     stays(p, LINK_CLOSED);
     /* The new start is welcome. */
     start(p, 1, 31);

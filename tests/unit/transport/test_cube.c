@@ -91,9 +91,8 @@ static void a_host_wired_to_all_needs_nobody_between(void **unused) {
     struct machine *m = build(3, &c, &perfect, 1);
     for (unsigned turn = 0; turn < 2000; turn++) { /* all come up */
         m->now_us += 50;
-        for (unsigned i = 0; i < 9; i++) {
+        for (unsigned i = 0; i < 9; i++)
             cube_poll(m->places[i].cube, m->now_us);
-        }
     }
     struct cube *host = m->places[8].cube;
     for (uint16_t i = 0; i < 8; i++) {
@@ -134,15 +133,12 @@ static void places_that_stall(void **unused) {
             m->now_us += 50;
             assert_true(m->now_us < 4000000000);
             unsigned who = draw(m) % m->count;
-            if (draw(m) % 50 == 0) {
+            if (draw(m) % 50 == 0)
                 m->places[m->nodes].deaf_until_us = m->now_us + draw(m) % 30000;
-            }
-            if (draw(m) % 1500 == 0) {
+            if (draw(m) % 1500 == 0)
                 m->places[who].stopped_until_us = m->now_us + draw(m) % 100000;
-            }
-            for (unsigned i = 0; i < m->count; i++) {
+            for (unsigned i = 0; i < m->count; i++)
                 step(m, i);
-            }
         }
         check_statistics(m, false);
         destroy(m);
@@ -160,9 +156,8 @@ static void a_host_that_is_slow(void **unused) {
     for (uint64_t i = 0; !finished(m); i++) {
         assert_true(i < 2000000);
         m->now_us += 100;
-        for (unsigned k = 0; k < m->nodes; k++) {
+        for (unsigned k = 0; k < m->nodes; k++)
             step(m, k);
-        }
         cube_poll(host->cube, m->now_us);
         if (i % 1000 == 0 && cube_read(host->cube, &message)) {
             take(m, m->nodes, &message);
@@ -184,14 +179,12 @@ static void an_unread_message_holds_its_own_link_alone(void **unused) {
     struct machine *m = build(2, &c, &perfect, 1);
     for (unsigned i = 0; i < 1000; i++) {
         m->now_us += 100;
-        for (unsigned k = 0; k < m->count; k++) {
+        for (unsigned k = 0; k < m->count; k++)
             cube_poll(m->places[k].cube, m->now_us);
-        }
         cube_write(m->places[0].cube, 1, 1, "unread", 6);
         cube_write(m->places[2].cube, 1, 2, "by another way", 14);
-        if (cube_read(m->places[2].cube, &message)) {
+        if (cube_read(m->places[2].cube, &message))
             fail();
-        }
         while (cube_read(m->places[0].cube, &message)) {
             assert_int_equal(message.source, 3);
             cube_release(m->places[0].cube);
@@ -274,9 +267,8 @@ static void a_wrong_wire_is_named(void **unused) {
     open_place(m, 7);
     for (unsigned i = 0; i < 1000; i++) {
         m->now_us += 100;
-        for (unsigned k = 0; k < m->count; k++) {
+        for (unsigned k = 0; k < m->count; k++)
             cube_poll(m->places[k].cube, m->now_us);
-        }
     }
     assert_true(cube_link_state(five->cube, 2) == LINK_REFUSED);
     const struct link_peer *peer = cube_link_peer(five->cube, 2);
@@ -355,9 +347,8 @@ static bool starts(const struct cube_config *config) {
     struct cube *cube = cube_init(arena, room, config);
     assert_true(bytes <= room && (cube != NULL) == (bytes > 0));
     assert_true((cube != NULL) == (cube_config_fault(config) == NULL));
-    if (cube != NULL) {
+    if (cube != NULL)
         assert_null(cube_init(arena, bytes - 1, config));
-    }
     free(arena);
     return cube != NULL;
 }
@@ -378,9 +369,8 @@ static void limits_of_a_config(void **unused) {
     struct cube_config node = {
         .self = 3, .dimension = 2, .window = 4, .epoch = 1};
     (void)unused;
-    for (unsigned d = 0; d < CUBE_LINKS_MAX; d++) {
+    for (unsigned d = 0; d < CUBE_LINKS_MAX; d++)
         node.pipes[d] = pipe;
-    }
     struct cube_config host = node;
     host.self = CUBE_HOST;
     limit(node, self, 3, 4);
@@ -426,20 +416,16 @@ static void all_say_farewell(void **unused) {
     struct machine *m = build(3, &c, &perfect, 1);
     run(m, 3, 100000000);
     uint64_t deadline = m->now_us + 1000000;
-    for (unsigned i = 0; i < m->count; i++) {
+    for (unsigned i = 0; i < m->count; i++)
         cube_close(m->places[i].cube, deadline);
-    }
     for (unsigned i = 0; i < 100; i++) {
         m->now_us += 1000;
-        for (unsigned k = 0; k < m->count; k++) {
+        for (unsigned k = 0; k < m->count; k++)
             cube_poll(m->places[k].cube, m->now_us);
-        }
     }
-    for (unsigned i = 0; i < m->count; i++) {
-        for (unsigned d = 0; d < cube_links(m->places[i].cube); d++) {
+    for (unsigned i = 0; i < m->count; i++)
+        for (unsigned d = 0; d < cube_links(m->places[i].cube); d++)
             assert_true(cube_link_state(m->places[i].cube, d) == LINK_CLOSED);
-        }
-    }
     destroy(m);
 }
 

@@ -30,9 +30,8 @@ static void until_reported(struct machine *m, unsigned dead) {
          * is quiet is down for another 3 s. */
         assert_true(m->now_us - start_us < 4 * DEAD_US + 3500000);
     }
-    for (unsigned i = 0; i < 40; i++) {
+    for (unsigned i = 0; i < 40; i++)
         poll_all(m, 5000);
-    }
     assert_int_equal(w->dead_count, w->settled + dead);
 }
 
@@ -59,9 +58,8 @@ static void all_pairs_after_each_single_dead_link(void **unused) {
     for (unsigned d = 2; d <= 4; d++) {
         for (unsigned i = 0; i < 1u << d; i++) {
             for (unsigned link = 0; link < d; link++) {
-                if ((i >> link & 1) != 0) {
+                if ((i >> link & 1) != 0)
                     continue;
-                }
                 struct machine *m = build(d, &smallest, &perfect, i * 16 + d);
                 settle(m, 1);
                 chatter_for(m, 60);
@@ -103,9 +101,8 @@ static void a_link_that_falls_silent(void **unused) {
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
     chatter_for(m, 100);
-    for (unsigned side = 0; side < 2; side++) {
+    for (unsigned side = 0; side < 2; side++)
         host_sim_cube_deaf(&m->cube, wire_of(m, 5, 1), side, true);
-    }
     until_reported(m, 1);
     renew(m);
     traffic(m, 5);
@@ -127,9 +124,8 @@ static void a_node_that_dies(void **unused) {
         assert_int_equal(w->settled, 1);
         assert_int_equal(w->dead[0].node, node);
         assert_int_equal(w->dead[0].dimension, CUBE_WHOLE_NODE);
-        for (unsigned i = 0; i < 8; i++) {
+        for (unsigned i = 0; i < 8; i++)
             assert_int_equal(cube_reaches(host, (uint16_t)i), i != node);
-        }
         traffic(m, 5);
         /* What is written to it goes nowhere, and holds nobody up. */
         for (unsigned i = 0; i < 10; i++) {
@@ -154,11 +150,10 @@ static void the_gateway_is_moved(void **unused) {
         assert_int_equal(cube_links(host), 2);
         settle(m, 1);
         chatter_for(m, 100);
-        if (node_dies) {
+        if (node_dies)
             m->places[0].gone = true;
-        } else {
+        else
             cut_wire(m, m->nodes, 0);
-        }
         until_reported(m, node_dies ? 4 : 1);
         struct cube_wiring next = *cube_wiring(host);
         next.gateway = c.spare_node;
@@ -177,9 +172,8 @@ static void who_sleeps_does_not_call_others_dead(void **unused) {
     chatter_for(m, 100);
     for (unsigned i = 0; i < 20; i++) {
         m->now_us += 20 * DEAD_US + 4000000; /* all sleep */
-        for (unsigned k = 0; k < 50; k++) {
+        for (unsigned k = 0; k < 50; k++)
             poll_all(m, 100);
-        }
     }
     assert_int_equal(wiring_of(m, m->nodes)->dead_count, 0);
     destroy(m);
@@ -214,16 +208,14 @@ static void nodes_start_late(void **unused) {
     (void)unused;
     for (unsigned seed = 0; seed < 5; seed++) {
         struct machine *m = build(4, &smallest, &perfect, seed);
-        for (unsigned i = 0; i < m->count; i++) {
+        for (unsigned i = 0; i < m->count; i++)
             m->places[i].gone = true;
-        }
         for (unsigned here = 0; here < m->count;) {
             unsigned who = draw(m) % m->count;
             here += m->places[who].gone;
             m->places[who].gone = false;
-            for (unsigned i = draw(m) % 200; i > 0; i--) {
+            for (unsigned i = draw(m) % 200; i > 0; i--)
                 poll_all(m, 5000);
-            }
         }
         m->broadcasts = 1;
         run(m, 3, 1000000000);

@@ -32,9 +32,8 @@ static bool leads_over(const struct machine *m, unsigned from, unsigned to,
     while (at != end) {
         const struct routes *routes = &m->places[at].cube->routes;
         unsigned way = routes_way(routes, at, end);
-        if (way == ROUTES_NONE || (at == by && way == link)) {
+        if (way == ROUTES_NONE || (at == by && way == link))
             return way != ROUTES_NONE;
-        }
         at ^= 1u << way;
     }
     return to == m->nodes && at == by && link == m->dimension;
@@ -79,11 +78,9 @@ static void forge(struct machine *m, unsigned by, unsigned link, unsigned from,
 static void speak_by(struct machine *m, unsigned by, unsigned link) {
     memset(seen, 0, sizeof seen);
     for (unsigned from = 0; from < m->count; from++) {
-        for (unsigned to = 0; to <= m->count; to++) {
-            if (from != to) {
+        for (unsigned to = 0; to <= m->count; to++)
+            if (from != to)
                 forge(m, by, link, from, to);
-            }
-        }
     }
     for (unsigned i = 0; i < 100; i++) {
         poll_all(m, 100);
@@ -91,16 +88,14 @@ static void speak_by(struct machine *m, unsigned by, unsigned link) {
     }
     for (unsigned i = 0; i < m->count; i++) {
         for (unsigned from = 0; from < m->count; from++) {
-            if (m->places[from].gone) {
+            if (m->places[from].gone)
                 continue; /* at the gateway nothing is known against it */
-            }
             bool due = i != from && i != by && leads_over(m, from, i, by, link);
             assert_int_equal(seen[i][from][i], due);
             assert_int_equal(seen[i][from][m->count],
                              due && i != m->nodes && from != i);
-            for (unsigned to = 0; to < m->count; to++) {
+            for (unsigned to = 0; to < m->count; to++)
                 assert_true(to == i || !seen[i][from][to]);
-            }
         }
     }
 }
@@ -108,11 +103,9 @@ static void speak_by(struct machine *m, unsigned by, unsigned link) {
 static void speak(struct machine *m) {
     for (unsigned by = 0; by < m->nodes; by++) {
         for (unsigned d = 0;
-             !m->places[by].gone && d < cube_links(m->places[by].cube); d++) {
-            if (!cube_link_is_dead(m->places[by].cube, d)) {
+             !m->places[by].gone && d < cube_links(m->places[by].cube); d++)
+            if (!cube_link_is_dead(m->places[by].cube, d))
                 speak_by(m, by, d);
-            }
-        }
     }
 }
 
@@ -161,9 +154,8 @@ static void nor_off_the_e_cube_path(void **unused) {
                 (struct cube_dead){(uint16_t)(round % 7 + 1), CUBE_WHOLE_NODE};
         }
         next.dead_count = 1;
-        if (c.spare_node != 0 && !m->places[c.spare_node].gone) {
+        if (c.spare_node != 0 && !m->places[c.spare_node].gone)
             next.gateway = c.spare_node;
-        }
         cube_renew(host, &next);
         settle(m, 2);
         assert_true(host->routes.tree);

@@ -37,9 +37,8 @@ static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
     uint32_t crc = start;
     for (size_t i = 0; i < size; i++) {
         crc ^= p[i];
-        for (int bit = 0; bit < 8; bit++) {
+        for (int bit = 0; bit < 8; bit++)
             crc = (crc & 1) != 0 ? crc >> 1 ^ polynomial : crc >> 1;
-        }
     }
     return crc;
 }
@@ -56,9 +55,8 @@ static void checks_have_their_published_values(void **unused) {
     assert_int_equal(frame_crc32c(0, bytes, 32), 0x8a9136aa);
     memset(bytes, 0xff, 32);
     assert_int_equal(frame_crc32c(0, bytes, 32), 0x62a8ab43);
-    for (unsigned i = 0; i < 32; i++) {
+    for (unsigned i = 0; i < 32; i++)
         bytes[i] = (uint8_t)i;
-    }
     assert_int_equal(frame_crc32c(0, bytes, 32), 0x46dd794e);
     assert_int_equal(frame_crc32c_table(0, bytes, 32), 0x46dd794e);
 }
@@ -68,9 +66,8 @@ static void checks_follow_their_definition(void **unused) {
     (void)unused;
     for (unsigned round = 0; round < 2000; round++) {
         size_t from = draw() % 9, size = draw() % 280, part = draw() % 280;
-        for (size_t i = 0; i < sizeof bytes; i++) {
+        for (size_t i = 0; i < sizeof bytes; i++)
             bytes[i] = (uint8_t)draw();
-        }
         part = part < size ? part : size;
         uint32_t want = ~slow_crc(bytes + from, size, 0x82f63b78, 0xffffffff);
         uint32_t whole = frame_crc32c(0, bytes + from, size);
@@ -151,9 +148,8 @@ static void expect_bytes(const struct sample *s) {
     size_t size = h->size;
     plain[0] = (uint8_t)(h->kind | h->flags << 4);
     plain[1] = h->credit;
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         plain[2 + i] = (uint8_t)(h->session >> 8 * i);
-    }
     for (int i = 0; i < 2; i++) {
         plain[6 + i] = (uint8_t)(h->sequence >> 8 * i);
         plain[8 + i] = (uint8_t)(h->acknowledge >> 8 * i);
@@ -164,9 +160,8 @@ static void expect_bytes(const struct sample *s) {
     plain[13] = (uint8_t)(check >> 8);
     memcpy(plain + 14, s->payload, size);
     uint32_t crc = ~slow_crc(plain, 14 + size, 0x82f63b78, 0xffffffff);
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         plain[14 + size + (size_t)i] = (uint8_t)(crc >> 8 * i);
-    }
     size_t length = slow_cobs(want, plain, 18 + size);
     assert_int_equal(s->size, length);
     assert_memory_equal(s->encoded, want, length);
@@ -292,9 +287,8 @@ static void each_wrong_bit_is_found(void **unused) {
     const size_t sizes[] = {0, 1, 24, 240, 500};
     (void)unused;
     for (unsigned k = 0; k < 5; k++) {
-        for (size_t i = 0; i < sizes[k]; i++) {
+        for (size_t i = 0; i < sizes[k]; i++)
             s.payload[i] = (uint8_t)(draw_sparse());
-        }
         encode(&s, sizes[k]);
         for (size_t bit = 0; bit < 8 * (s.size - 1); bit++) {
             struct frame_header header;
@@ -313,9 +307,8 @@ static void lost_and_inserted_bytes_are_found(void **unused) {
     uint8_t damaged[FRAME_ENCODED(PAYLOAD_MAX) + 1];
     struct frame_header header;
     (void)unused;
-    for (size_t i = 0; i < 300; i++) {
+    for (size_t i = 0; i < 300; i++)
         s.payload[i] = (uint8_t)draw();
-    }
     encode(&s, 300);
     size_t size = s.size - 1;
     for (size_t at = 0; at < size; at++) {
@@ -341,9 +334,8 @@ static void garbage_is_no_frame(void **unused) {
     (void)unused;
     for (unsigned round = 0; round < 300000; round++) {
         size_t size = draw() % (round % 16 == 0 ? sizeof garbage : 64);
-        for (size_t i = 0; i < size; i++) {
+        for (size_t i = 0; i < size; i++)
             garbage[i] = (uint8_t)(1 + draw() % (round % 2 ? 255 : 20));
-        }
         enum frame_result result = decode(garbage, size, &header, NULL);
         assert_int_not_equal(result, FRAME_GOOD);
         opened += result == FRAME_BAD_CRC;

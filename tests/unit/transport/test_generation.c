@@ -104,9 +104,8 @@ static void all_is_quiet_when_all_agree(void **unused) {
     struct machine *m = build(3, &c, &perfect, 3);
     settle(m, 1);
     for (unsigned round = 0; round < 2; round++) {
-        for (unsigned i = 0; i < 1000; i++) {
+        for (unsigned i = 0; i < 1000; i++)
             poll_all(m, 1000);
-        }
         for (unsigned i = 0; i < m->count; i++) {
             for (unsigned d = 0; d < cube_links(m->places[i].cube); d++) {
                 datagrams[round] +=
@@ -163,16 +162,14 @@ static void a_host_that_restarts_is_in_charge(void **unused) {
             poll_all(m, 1000);
             assert_false(all_in(m, after));
         }
-        for (unsigned i = 0; i < 300; i++) {
+        for (unsigned i = 0; i < 300; i++)
             poll_all(m, 1000);
-        }
         assert_true(all_in(m, after));
         /* From just opposite it takes a step of its own before. */
         uint64_t outdone = cube_statistics(host->cube)->outdone;
         assert_true(after == 1 ? outdone == 0 : outdone >= 1 && outdone <= 2);
-        for (unsigned i = 0; i < m->count; i++) {
+        for (unsigned i = 0; i < m->count; i++)
             assert_int_equal(wiring_of(m, i)->host_epoch, host->config.epoch);
-        }
         m->broadcasts = 2;
         run(m, 5, 1000000000);
         destroy(m);
@@ -216,9 +213,8 @@ static void a_message_being_read_outlives_its_generation(void **unused) {
     struct cube *host = m->places[m->nodes].cube;
     settle(m, 1);
     assert_int_equal(cube_write(m->places[1].cube, CUBE_HOST, 7, "held", 4), 0);
-    while (!cube_read(host, &message)) {
+    while (!cube_read(host, &message))
         poll_all(m, 100);
-    }
     struct cube_wiring next = *cube_wiring(host);
     cube_renew(host, &next);
     poll_all(m, 100);

@@ -24,9 +24,8 @@ static void learn_all(struct machine *m, struct learner *learners,
         assert_true(round < 100000);
         for (unsigned i = 0; i < m->nodes; i++) {
             struct place *p = &m->places[i];
-            if (!p->gone || !learner_poll(&learners[i], &learned)) {
+            if (!p->gone || !learner_poll(&learners[i], &learned))
                 continue;
-            }
             assert_int_equal(learned.self, i);
             assert_int_equal(learned.dimension, m->dimension);
             *heard_host += learned.host_port;
@@ -158,9 +157,8 @@ struct nowhere {
 
 static int lose(void *context, const uint8_t *bytes, size_t size) {
     struct nowhere *n = context;
-    if (n->is_shut) {
+    if (n->is_shut)
         return LINK_PIPE_CLOSED;
-    }
     size = n->most > 0 && n->most < size ? n->most : size;
     size = size < sizeof n->bytes - n->size ? size : 0;
     memcpy(n->bytes + n->size, bytes, size);
@@ -181,19 +179,16 @@ static void sit_down(struct machine *m, unsigned i, struct learner *learner) {
     struct link_pipe pipes[SOCKETS + 1];
     struct place *p = &m->places[i];
     unused_socket.size = 0;
-    for (unsigned d = 0; d <= SOCKETS; d++) {
+    for (unsigned d = 0; d <= SOCKETS; d++)
         pipes[d] = (struct link_pipe){&unused_socket, lose, bring_none};
-    }
     memcpy(pipes, p->config.pipes, m->dimension * sizeof *pipes);
-    if (i == 0 || p->config.host_port) {
+    if (i == 0 || p->config.host_port)
         pipes[SOCKETS] = p->config.pipes[m->dimension];
-    }
     learner_init_ports(learner, pipes, SOCKETS, true);
     p->gone = true;
     /* What lay in its UARTs is gone as well. */
-    for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++) {
+    for (unsigned d = 0; d < host_sim_cube_links(&m->cube, i); d++)
         sim_direction_flush(host_sim_cube_port(&m->cube, i, d)->end->in);
-    }
 }
 
 /* One who knows starts, as that one, with that epoch. */
@@ -237,16 +232,14 @@ static void boards_of_four_sockets_learn(void **unused) {
         struct cube_config c = {.window = 2};
         c.spare_node = k == 2 ? 3 : 0;
         struct machine *m = build(dimension, &c, &bad, k);
-        for (unsigned i = 0; i < m->nodes; i++) {
+        for (unsigned i = 0; i < m->nodes; i++)
             sit_down(m, i, &learners[i]);
-        }
         while (known < m->nodes) {
             assert_true(m->now_us < 10000000);
             for (unsigned i = 0; i < m->nodes; i++) {
                 struct place *p = &m->places[i];
-                if (p->gone) {
+                if (p->gone)
                     learner_ask(&learners[i], m->now_us);
-                }
                 if (p->gone && learner_poll(&learners[i], &learned)) {
                     assert_int_equal(learned.self, i);
                     assert_int_equal(learned.dimension, dimension);
@@ -339,9 +332,8 @@ static void the_largest_epoch_counts(void **unused) {
     host_sim_cube_deaf(&m->cube, wire, 0, true);
     host_sim_cube_deaf(&m->cube, wire, 1, true);
     stand_up(m, 3, first + 5);
-    for (unsigned i = 0; i < 200; i++) {
+    for (unsigned i = 0; i < 200; i++)
         poll_all(m, TICK_US);
-    }
     m->places[3].gone = true;
     host_sim_cube_deaf(&m->cube, wire, 0, false);
     host_sim_cube_deaf(&m->cube, wire, 1, false);
@@ -373,9 +365,8 @@ static unsigned count_questions(const struct nowhere *n) {
     for (size_t i = 0; i < n->size; i++) {
         struct frame_reader reader;
         struct frame_header header;
-        if (n->bytes[i] != 0) {
+        if (n->bytes[i] != 0)
             continue;
-        }
         if (i > begin) {
             assert_int_equal(
                 frame_open(&reader, n->bytes + begin, i - begin, &header),
@@ -396,9 +387,8 @@ static void questions_are_few_and_whole(void **unused) {
     struct learner learner;
     (void)unused;
     memset(wires, 0, sizeof wires);
-    for (unsigned d = 0; d < 4; d++) {
+    for (unsigned d = 0; d < 4; d++)
         pipes[d] = (struct link_pipe){&wires[d], lose, bring_none};
-    }
     wires[1].most = 3;       /* a slow one */
     pipes[2].send = NULL;    /* not to be asked */
     wires[3].is_shut = true; /* until it opens */
@@ -416,9 +406,8 @@ static void questions_are_few_and_whole(void **unused) {
     memset(wires, 0, sizeof wires);
     wires[0].most = 1;
     learner_init(&learner, pipes, 1);
-    for (unsigned ms = 0; ms < 4300; ms += 20) {
+    for (unsigned ms = 0; ms < 4300; ms += 20)
         learner_ask(&learner, 1000 * ms);
-    }
     assert_in_range(count_questions(&wires[0]), 8, 10);
 }
 
@@ -436,9 +425,8 @@ static void questions_do_no_harm(void **unused) {
     for (unsigned round = 0; !finished(m); round++) {
         assert_true(round < 100000);
         m->now_us += 20 + draw(m) % 80;
-        for (unsigned k = 0; k < m->count; k++) {
+        for (unsigned k = 0; k < m->count; k++)
             step(m, draw(m) % m->count);
-        }
         unsigned i = draw(m) % m->count;
         learner_init(&learner, m->places[i].config.pipes,
                      host_sim_cube_links(&m->cube, i));
@@ -489,9 +477,8 @@ static void strangers_are_not_believed(void **unused) {
     destroy(other);
     /* Node 0 with the host in the socket of dimension 2, which is the number
      * that a host greets there. */
-    for (unsigned d = 0; d <= SOCKETS; d++) {
+    for (unsigned d = 0; d <= SOCKETS; d++)
         pipes[d] = (struct link_pipe){&unused_socket, lose, bring_none};
-    }
     pipes[2] = m->places[0].config.pipes[2];
     m->places[0].gone = true;
     learner_init_ports(&learner, pipes, SOCKETS, true);

@@ -35,9 +35,8 @@ static void messages_of_many_frames(void **unused) {
                                 .frame_payload = (uint16_t)payload,
                                 .message_max = 1608};
         c.window = (uint16_t)(c.window + payload / 8 % 3);
-        if (c.window > LINK_WINDOW_MAX) {
+        if (c.window > LINK_WINDOW_MAX)
             continue;
-        }
         struct pair *p = new_pair(&c, &perfect, payload);
         p->ends[0].size_max = 1608;
         p->ends[1].size_max = 200;
@@ -71,18 +70,16 @@ static void a_reader_that_does_not_read_holds_the_writer(void **unused) {
     struct pair *p = new_pair(&small, &perfect, 5);
     p->ends[1].lazy = true;
     p->ends[1].most = 0;
-    for (unsigned i = 0; i < 50000; i++) {
+    for (unsigned i = 0; i < 50000; i++)
         step(p, 200);
-    }
     const struct link_statistics *s = link_statistics(p->ends[0].link);
     assert_true(s->frames_sent < 100);
     assert_true(s->probes_sent > 3); /* asks, but ever more rarely */
     assert_int_equal(s->retransmitted, 0);
     assert_true(link_state(p->ends[0].link) == LINK_UP);
     p->ends[1].lazy = false;
-    for (unsigned i = 0; i < 1000; i++) {
+    for (unsigned i = 0; i < 1000; i++)
         step(p, 200);
-    }
     assert_true(p->ends[1].read > 50);
     free_pair(p);
 }
@@ -93,18 +90,16 @@ static void lost_credits_are_asked_for(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&c, &perfect, 6);
     p->ends[1].lazy = true;
-    for (unsigned i = 0; i < 100; i++) {
+    for (unsigned i = 0; i < 100; i++)
         step(p, 200);
-    }
     p->ends[1].lazy = false;
     sim_direction_deaf(host_sim_cube_direction(&p->cube, 0, 1), true);
     step(p, 200);
     step(p, 200);
     sim_direction_deaf(host_sim_cube_direction(&p->cube, 0, 1), false);
     uint32_t before = p->ends[1].read;
-    for (unsigned i = 0; i < 10000 && p->ends[1].read == before; i++) {
+    for (unsigned i = 0; i < 10000 && p->ends[1].read == before; i++)
         step(p, 200);
-    }
     assert_true(p->ends[1].read > before);
     free_pair(p);
 }
@@ -136,9 +131,8 @@ static void every_kind_of_damage(void **unused) {
         p->ends[0].size_max = 1608;
         p->ends[1].size_max = 700;
         run(p, 150, 100 + 50 * (uint32_t)(seed % 9), 600000000);
-        for (int k = 0; k < SIM_CHANCES; k++) {
+        for (int k = 0; k < SIM_CHANCES; k++)
             damaged += host_sim_cube_struck(&p->cube, (enum sim_fault)k);
-        }
         again += link_statistics(p->ends[0].link)->retransmitted;
         duplicates += link_statistics(p->ends[1].link)->duplicates;
         free_pair(p);

@@ -98,9 +98,8 @@ static size_t content(uint8_t *bytes, uint32_t life, uint32_t number) {
     size_t size = HEAD + (number * 2654435761u >> 8) % (MESSAGE_MAX - HEAD + 1);
     memcpy(bytes, &life, 4);
     memcpy(bytes + 4, &number, 4);
-    for (size_t i = HEAD; i < size; i++) {
+    for (size_t i = HEAD; i < size; i++)
         bytes[i] = (uint8_t)(number * 7 + i * life);
-    }
     return size;
 }
 
@@ -140,9 +139,8 @@ static void step(struct world *w, uint32_t us, bool writing) {
         while (writing) {
             size_t size = content(bytes, end->life, end->number);
             if (link_write(end->link, bytes, HEAD, bytes + HEAD, size - HEAD) !=
-                0) {
+                0)
                 break;
-            }
             end->number++;
         }
         link_poll_send(end->link, w->now_us);
@@ -172,9 +170,8 @@ static void spoil(struct world *w) {
 static void strike(struct world *w) {
     unsigned kind = draw(w) % 400;
     struct sim_direction *direction = &w->wire.direction[draw(w) % 2];
-    if (kind < KINDS) {
+    if (kind < KINDS)
         w->struck[kind]++;
-    }
     switch (kind) {
     case 0:
         start(w, draw(w) % 2);
@@ -202,9 +199,8 @@ static void strike(struct world *w) {
         sim_direction_deaf(&w->wire.direction[1], true);
         break;
     default:
-        if (kind < 20) {
+        if (kind < 20)
             sim_wire_cut(&w->wire, false);
-        }
     }
 }
 
@@ -238,15 +234,13 @@ static void everything_at_once_then_quiet(void **unused) {
             step(&w, step_us, true);
         }
         recover(&w, step_us);
-        for (unsigned k = 0; k < KINDS; k++) {
+        for (unsigned k = 0; k < KINDS; k++)
             struck[k] += w.struck[k];
-        }
         free(w.ends[0].memory);
         free(w.ends[1].memory);
     }
-    for (unsigned k = 0; k < KINDS; k++) {
+    for (unsigned k = 0; k < KINDS; k++)
         assert_true(struck[k] > 1000);
-    }
 }
 
 int main(void) {

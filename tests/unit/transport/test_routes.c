@@ -115,9 +115,8 @@ static void check_to_all(struct cut_cube *c, unsigned root) {
             }
         }
     }
-    for (unsigned i = 0; i < c->nodes; i++) {
+    for (unsigned i = 0; i < c->nodes; i++)
         assert_int_equal(copies[i], c->linked[i] && i != root);
-    }
 }
 
 /* All pairs, or as many as `pairs` drawn. */
@@ -125,19 +124,16 @@ static void check(struct cut_cube *c, unsigned pairs) {
     unsigned all = c->nodes * c->nodes;
     routes_find(&c->routes, &c->wiring);
     search(c);
-    if (c->routes.altered_count > c->altered_max) {
+    if (c->routes.altered_count > c->altered_max)
         c->altered_max = c->routes.altered_count;
-    }
-    for (unsigned i = 0; i < c->nodes; i++) {
+    for (unsigned i = 0; i < c->nodes; i++)
         assert_int_equal(routes_reach(&c->routes, i), c->linked[i]);
-    }
     for (unsigned i = 0; i < all && i < pairs; i++) {
         unsigned pair = all <= pairs ? i : draw(c) % all;
         unsigned from = pair & (c->nodes - 1);
         unsigned to = pair >> c->dimension;
-        if (from == to) {
+        if (from == to)
             continue;
-        }
         if (c->linked[from] && c->linked[to]) {
             unsigned steps = walk(c, from, to);
             c->path_max = steps > c->path_max ? steps : c->path_max;
@@ -146,9 +142,8 @@ static void check(struct cut_cube *c, unsigned pairs) {
         }
     }
     unsigned root = draw(c) & (c->nodes - 1);
-    if (c->linked[root]) {
+    if (c->linked[root])
         check_to_all(c, root);
-    }
     check_to_all(c, c->wiring.gateway);
 }
 
@@ -184,15 +179,13 @@ static void each_single_dead_link_and_node(void **unused) {
             for (unsigned node = 0; node < c.nodes; node++) {
                 for (unsigned d = 0; d <= dimension; d++) {
                     bool whole = d == dimension;
-                    if (whole && node == gateway) {
+                    if (whole && node == gateway)
                         continue;
-                    }
                     cut(&c, node, whole ? CUBE_WHOLE_NODE : d);
                     check(&c, UINT32_MAX);
                     assert_true(dimension == 1 || c.routes.tree);
-                    for (unsigned i = 0; i < c.nodes && dimension > 1; i++) {
+                    for (unsigned i = 0; i < c.nodes && dimension > 1; i++)
                         assert_true(c.linked[i] || (whole && i == node));
-                    }
                     mend(&c);
                 }
             }
@@ -234,12 +227,10 @@ static void the_table_holds_the_worst(void **unused) {
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
         unsigned left = CUBE_DEAD_MAX;
         open_cube(&c, dimension, 0);
-        for (unsigned size = c.nodes / 2; size > 0; size /= 2) {
+        for (unsigned size = c.nodes / 2; size > 0; size /= 2)
             for (unsigned node = size; node < c.nodes && left > 0;
-                 node += 2 * size, left--) {
+                 node += 2 * size, left--)
                 cut(&c, node, CUBE_WHOLE_NODE);
-            }
-        }
         check(&c, 2000);
         assert_true(c.altered_max * sizeof *c.memory <=
                     routes_bytes(dimension));

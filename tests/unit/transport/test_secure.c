@@ -8,16 +8,13 @@ static int send_all(struct world *w, unsigned who, const uint8_t *bytes,
     size_t done = 0;
     for (unsigned i = 0; i < 100000 && done < size; i++) {
         int n = p.send(p.context, bytes + done, size - done);
-        if (n < 0) {
+        if (n < 0)
             return n;
-        }
         done += (size_t)n;
     }
-    for (unsigned i = 0; i < 4000; i++) { /* what is sealed */
-        if (p.send(p.context, bytes, 0) < 0) {
+    for (unsigned i = 0; i < 4000; i++) /* what is sealed */
+        if (p.send(p.context, bytes, 0) < 0)
             return LINK_PIPE_CLOSED;
-        }
-    }
     return (int)done;
 }
 
@@ -28,9 +25,8 @@ static int receive_all(struct world *w, unsigned who, uint8_t *bytes,
     size_t done = 0;
     for (unsigned idle = 0; idle < 4000;) {
         int n = p.receive(p.context, bytes + done, size - done);
-        if (n < 0) {
+        if (n < 0)
             return n;
-        }
         idle = n == 0 ? idle + 1 : 0;
         done += (size_t)n;
     }
@@ -41,9 +37,8 @@ static void what_is_said_arrives(void **unused) {
     static uint8_t said[20000], heard[20001];
     static const size_t mosts[] = {0, 1, 7, 100};
     (void)unused;
-    for (size_t i = 0; i < sizeof said; i++) {
+    for (size_t i = 0; i < sizeof said; i++)
         said[i] = (uint8_t)(i * 31 >> 3);
-    }
     for (size_t k = 0; k < 4; k++) {
         struct world *w = connected(9, mosts[k]);
         for (unsigned who = 0; who < 2; who++) {
@@ -53,9 +48,8 @@ static void what_is_said_arrives(void **unused) {
             assert_memory_equal(said, heard, sizeof said);
         }
         /* Nothing of it is legible on the way. */
-        for (size_t i = 0; i + 16 <= w->lanes[0].end; i++) {
+        for (size_t i = 0; i + 16 <= w->lanes[0].end; i++)
             assert_memory_not_equal(w->lanes[0].bytes + i, said + 1000, 16);
-        }
         free(w);
     }
 }
@@ -109,9 +103,8 @@ static void a_changed_byte_loses_a_record(void **unused) {
         assert_int_equal(send_all(w, 0, said, sizeof said), sizeof said);
         assert_int_equal(send_all(w, 0, said, sizeof said), sizeof said);
         /* Its first byte before it, or its last behind it: it is whole. */
-        if (at != 2 * RECORD && at != 3 * RECORD - 1) {
+        if (at != 2 * RECORD && at != 3 * RECORD - 1)
             expect_two(w, said, sizeof said);
-        }
         free(w);
     }
 }
@@ -177,17 +170,15 @@ static void a_repeated_record_is_not_heard(void **unused) {
     struct world *w = new_world(60, 0);
     memcpy(w->lanes[0].bytes, kept, size);
     w->lanes[0].end = size;
-    for (unsigned i = 0; i < 10 && status == 0; i++) {
+    for (unsigned i = 0; i < 10 && status == 0; i++)
         status = secure_shake(&w->shake[1], &w->pipes[1]);
-    }
     assert_int_equal(status, -1);
     free(w);
     /* An echo of what the end itself says. */
     w = new_world(61, 0);
     w->ends[1].in = w->ends[1].out;
-    for (unsigned i = 0; i < 10 && status == 0; i++) {
+    for (unsigned i = 0; i < 10 && status == 0; i++)
         status = secure_shake(&w->shake[1], &w->pipes[1]);
-    }
     assert_int_equal(status, -1);
     free(w);
 }
@@ -204,12 +195,10 @@ static void noise_is_passed_over(void **unused) {
     for (unsigned round = 0; round < 300; round++) {
         int status = 0;
         struct world *w = round % 2 == 0 ? new_world(8, 0) : connected(8, 0);
-        for (unsigned i = 0; i < 4000; i++) {
+        for (unsigned i = 0; i < 4000; i++)
             w->lanes[0].bytes[w->lanes[0].end++] = draw(&random);
-        }
-        for (unsigned i = 0; i < 10 && status == 0 && round % 2 == 0; i++) {
+        for (unsigned i = 0; i < 10 && status == 0 && round % 2 == 0; i++)
             status = secure_shake(&w->shake[1], &w->pipes[1]);
-        }
         if (round % 2 != 0) {
             assert_int_equal(send_all(w, 0, said, sizeof said), sizeof said);
             assert_int_equal(receive_all(w, 1, heard, sizeof heard),
@@ -242,9 +231,8 @@ static void noise_without_end_ends_it(void **unused) {
                                              ? heads[lane->end % sizeof heads]
                                              : draw(&random);
             }
-            for (unsigned i = 0; i < 100 && status == 0; i++) {
+            for (unsigned i = 0; i < 100 && status == 0; i++)
                 status = p.receive(p.context, &byte, 1);
-            }
             come += ROOM;
         }
         assert_int_equal(status, LINK_PIPE_CLOSED);
@@ -260,9 +248,8 @@ static void noise_without_end_ends_it(void **unused) {
 /* A record of some number, free of zeros: how long it is. */
 static size_t make_record(uint8_t *bytes, unsigned number) {
     size_t size = 4 + number * 37 % 900;
-    for (size_t i = 0; i < size; i++) {
+    for (size_t i = 0; i < size; i++)
         bytes[i] = (uint8_t)(1 + (number * 7 + i) % 255);
-    }
     bytes[0] = (uint8_t)(1 + number % 255);
     return size;
 }
@@ -314,9 +301,8 @@ static void damage_costs_what_it_touches(void **unused) {
             at += gap;
             size_t size = make_record(said, n);
             while (gap && n + 1 < RECORDS &&
-                   (end - at < size || memcmp(heard + at, said, size) != 0)) {
+                   (end - at < size || memcmp(heard + at, said, size) != 0))
                 size = make_record(said, ++n);
-            }
             assert_true(end - at >= size);
             assert_memory_equal(heard + at, said, size);
             at += size;

@@ -32,9 +32,8 @@ static void no_seed_comes_twice(void **unused) {
     }
     assert_int_equal(count, 2 * SEEDS);
     qsort(parts, count, sizeof parts[0], by_bytes);
-    for (size_t i = 1; i < count; i++) {
+    for (size_t i = 1; i < count; i++)
         assert_memory_not_equal(parts[i - 1], parts[i], sizeof parts[0]);
-    }
 }
 
 /* Every part of what a seed is made of makes another, to the last byte. */
@@ -98,9 +97,8 @@ static void the_vector(void **unused) {
     struct secure_seed seed;
     uint8_t counted[SECURE_KEY_BYTES];
     (void)unused;
-    for (size_t i = 0; i < sizeof counted; i++) {
+    for (size_t i = 0; i < sizeof counted; i++)
         counted[i] = (uint8_t)i;
-    }
     assert_true(secure_seed_draw(&source, &secure_sodium, counted, &seed));
     expect_bytes(seed.nonce,
                  "0de4c590b11f45092d9a9d145be683ca585e75bb31deb2d3");

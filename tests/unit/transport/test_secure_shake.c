@@ -73,9 +73,8 @@ static void a_wire_that_leads_elsewhere_is_told(void **unused) {
         struct world *w = new_world(3, 0);
         int status[2] = {0, 0};
         open_shake(w, 0, 3, &cases[i].caller);
-        for (unsigned k = 0; k < 6; k++) {
+        for (unsigned k = 0; k < 6; k++)
             status[k % 2] = secure_shake(&w->shake[k % 2], &w->pipes[k % 2]);
-        }
         assert_int_equal(status[0] + status[1], 2);
         struct secure_ends heard = secure_shake_peer(&w->shake[1]);
         assert_int_equal(heard.self.node, cases[i].caller.self.node);
@@ -150,18 +149,16 @@ static void keys_need_the_key_and_the_exchange(void **unused) {
             memset(seed.nonce, 3, sizeof seed.nonce);
             secure_shake_init(&w->shake[0], &self, &seed);
         }
-        for (unsigned k = 0; k < 6; k++) {
+        for (unsigned k = 0; k < 6; k++)
             status[k % 2] = secure_shake(&w->shake[k % 2], &w->pipes[k % 2]);
-        }
         assert_int_equal(status[0] + status[1], 2);
         keys[how] = w->shake[0].keys;
         assert_memory_equal(keys[how].out, w->shake[1].keys.in, 32);
         assert_memory_equal(keys[how].in, w->shake[1].keys.out, 32);
         assert_memory_not_equal(keys[how].in, keys[how].out, 32);
         assert_memory_equal(w->shake[0].secret, zero, 32);
-        for (unsigned other = 0; other < how; other++) {
+        for (unsigned other = 0; other < how; other++)
             assert_memory_not_equal(keys[how].out, keys[other].out, 32);
-        }
         free(w);
     }
 }
@@ -175,9 +172,8 @@ static void a_changed_opening_is_refused(void **unused) {
         while (w->lanes[0].end < SECURE_OPENING_BYTES && status[1] >= 0) {
             size_t had = w->lanes[0].end;
             (void)secure_shake(&w->shake[0], &w->pipes[0]);
-            if (had <= at && at < w->lanes[0].end) {
+            if (had <= at && at < w->lanes[0].end)
                 w->lanes[0].bytes[at] ^= 0x10;
-            }
             status[1] = secure_shake(&w->shake[1], &w->pipes[1]);
         }
         for (unsigned i = 0; i < 10 && status[1] == 0; i++) {

@@ -27,9 +27,8 @@ static void use_and_wipe(void) {
 
 static void a_wipe_stays(void **unused) {
     (void)unused;
-    for (unsigned i = 0; i < SECRET_BYTES; i++) {
+    for (unsigned i = 0; i < SECRET_BYTES; i++)
         secret[i] = (uint8_t)(0x81 + 3 * i);
-    }
     run_on_stack(use_and_leave);
     assert_true(holds(stack, sizeof stack, secret, sizeof secret));
     run_on_stack(use_and_wipe);
@@ -55,23 +54,19 @@ static void keep(const uint8_t made[SECURE_KEY_BYTES]) {
 static void toy_hash(uint8_t out[SECURE_KEY_BYTES],
                      const uint8_t key[SECURE_KEY_BYTES], const uint8_t *in,
                      size_t size) {
-    for (size_t i = 0; i < SECURE_KEY_BYTES; i++) {
+    for (size_t i = 0; i < SECURE_KEY_BYTES; i++)
         out[i] = (uint8_t)(key[i] * 7u + in[i % size] * 11u + 5 * i + size);
-    }
-    if (size != SECURE_GREETING_BYTES - SECURE_TAG_BYTES) { /* no tag */
+    if (size != SECURE_GREETING_BYTES - SECURE_TAG_BYTES) /* no tag */
         keep(out);
-    }
 }
 
 static void toy_x25519(uint8_t out[SECURE_KEY_BYTES],
                        const uint8_t mine[SECURE_KEY_BYTES],
                        const uint8_t point[SECURE_KEY_BYTES]) {
-    for (size_t i = 0; i < SECURE_KEY_BYTES; i++) {
+    for (size_t i = 0; i < SECURE_KEY_BYTES; i++)
         out[i] = (uint8_t)(mine[i] + point[i] + i);
-    }
-    if (point[0] != 9) {
+    if (point[0] != 9)
         keep(out);
-    }
 }
 
 static void toy_seal(uint8_t *out, const uint8_t *in, size_t size,
@@ -104,9 +99,8 @@ static void shake_on_stack(const struct secure_suite *suite, bool looks) {
     for (turns = 0; turns < 4;) {
         world->shake[turns % 2].self.suite = suite;
         run_on_stack(take_turn);
-        for (unsigned i = 0; looks && i < found_count; i++) {
+        for (unsigned i = 0; looks && i < found_count; i++)
             assert_false(holds(stack, sizeof stack, found[i], 32));
-        }
     }
 }
 
@@ -164,15 +158,13 @@ static void a_connection_that_ends_leaves_no_keys(void **unused) {
     found_count = 0;
     keep(w->shake[0].secret);
     keep(w->shake[1].secret);
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         (void)secure_shake(&w->shake[i % 2], &w->pipes[i % 2]);
-    }
     keep(w->shake[0].keys.in);
     keep(w->shake[0].keys.out);
     shake_hands(w, status); /* and start records */
-    for (unsigned i = 0; i < found_count; i++) {
+    for (unsigned i = 0; i < found_count; i++)
         assert_false(holds(w->shake, sizeof w->shake, found[i], 32));
-    }
     for (unsigned who = 0; who < 2; who++) {
         struct link_pipe p = secure_records_pipe(&w->records[1 - who]);
         assert_int_equal(p.send(p.context, said, sizeof said), sizeof said);
@@ -202,11 +194,10 @@ static void a_shake_that_ends_leaves_none(void **unused) {
         memset(ephemeral, 0x41, sizeof ephemeral);
         world = new_world(0x30, 0);
         struct secure_shake *shake = &world->shake[1];
-        if (given_up) {
+        if (given_up)
             secure_shake_end(shake);
-        } else {
+        else
             lane_send(&world->ends[0], noise, sizeof noise);
-        }
         assert_int_equal(secure_shake(shake, &world->pipes[1]), -1);
         assert_false(holds(shake, sizeof *shake, ephemeral, 32));
         free(world);

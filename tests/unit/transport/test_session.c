@@ -12,22 +12,19 @@ static void a_cut_wire_goes_on_where_it_was(void **unused) {
         p->ends[0].most = p->ends[1].most = 400;
         for (unsigned i = 0; i < 20000 && !finished(p); i++) {
             uint64_t phase = (i + seed) % 90;
-            if (phase == 60) {
+            if (phase == 60)
                 cut_pair(p, true);
-            } else if (phase == 61 + seed) {
+            else if (phase == 61 + seed)
                 cut_pair(p, false);
-            }
             step(p, 150);
-            if (phase > 61 && phase < 61 + seed) {
+            if (phase > 61 && phase < 61 + seed)
                 assert_true(link_state(p->ends[0].link) == LINK_DOWN);
-            }
         }
         assert_true(finished(p));
         const struct link_statistics *s = link_statistics(p->ends[0].link);
         assert_int_equal(s->sessions, 1);
-        if (seed > 1) {
+        if (seed > 1)
             assert_true(s->resumed >= 1 && s->pipe_closed >= 1);
-        }
         free_pair(p);
     }
 }
@@ -35,9 +32,8 @@ static void a_cut_wire_goes_on_where_it_was(void **unused) {
 static void a_peer_that_stops_for_long_is_called_silent(void **unused) {
     (void)unused;
     struct pair *p = new_pair(&small, &perfect, 2);
-    for (unsigned i = 0; i < 200; i++) {
+    for (unsigned i = 0; i < 200; i++)
         step(p, 100);
-    }
     for (unsigned i = 0; i < 1000; i++) { /* ten seconds */
         p->now_us += 10000;
         link_poll(p->ends[0].link, p->now_us);
@@ -72,9 +68,8 @@ static void restart(struct pair *p, uint32_t epoch,
             link_release(peer->link);
             peer->read++;
         }
-        if (link_statistics(peer->link)->sessions == sessions) {
+        if (link_statistics(peer->link)->sessions == sessions)
             write_some(peer, 0);
-        }
         link_poll_send(peer->link, p->now_us);
         assert_false(link_read(reborn->link, &message));
         link_poll(reborn->link, p->now_us);
@@ -95,9 +90,8 @@ static void a_restarted_peer_is_noticed(void **unused) {
         struct link_statistics sum = {0};
         p->ends[0].size_max = p->ends[1].size_max = 1608;
         for (unsigned life = 1; life < 6; life++) {
-            while (p->ends[0].written < 40 + 9 * seed) {
+            while (p->ends[0].written < 40 + 9 * seed)
                 step(p, 100);
-            }
             restart(p, 77777 * life + (uint32_t)seed, &sum);
         }
         run(p, p->ends[0].written + 50, 100, 60000000);
@@ -110,9 +104,8 @@ static void a_restarted_peer_is_noticed(void **unused) {
 static void greet_only(struct pair *p) {
     for (unsigned i = 0; i < 50; i++) {
         p->now_us += 10000;
-        for (unsigned who = 0; who < 2; who++) {
+        for (unsigned who = 0; who < 2; who++)
             link_poll(p->ends[who].link, p->now_us);
-        }
     }
 }
 
@@ -138,9 +131,8 @@ static void an_end_may_keep_to_its_peer(void **unused) {
     start(p, 1, 99);
     for (unsigned i = 0; i < 25000; i++) {
         p->now_us += 100;
-        for (unsigned who = 0; who < 2; who++) {
+        for (unsigned who = 0; who < 2; who++)
             link_poll(p->ends[who].link, p->now_us);
-        }
     }
     assert_int_equal(link_peer(p->ends[1].link)->refusal, LINK_IN_USE);
     assert_int_equal(link_state(p->ends[1].link), LINK_REFUSED);
@@ -156,9 +148,8 @@ static void an_end_may_keep_to_its_peer(void **unused) {
     p->ends[1] = third;
     for (unsigned i = 0; i < 35000; i++) {
         p->now_us += 100;
-        for (unsigned who = 0; who < 2; who++) {
+        for (unsigned who = 0; who < 2; who++)
             link_poll(p->ends[who].link, p->now_us);
-        }
         bool up = link_state(p->ends[1].link) == LINK_UP;
         assert_true(!up || i > 29000);
     }
@@ -183,9 +174,8 @@ static void who_is_sent_away_waits_for_the_other(void **unused) {
     start(p, 0, 78);
     for (unsigned i = 0; i < 32000; i++) {
         p->now_us += 100;
-        for (unsigned who = 0; who < 2; who++) {
+        for (unsigned who = 0; who < 2; who++)
             link_poll(p->ends[who].link, p->now_us);
-        }
         bool up = link_state(p->ends[1].link) == LINK_UP;
         assert_true(!up || i > 29000);
     }
@@ -248,16 +238,14 @@ static void farewell(void **unused) {
         p->ends[0].size_max = p->ends[1].size_max = 300;
         p->ends[0].most = 40;
         p->ends[1].most = 0;
-        for (unsigned i = 0; i < 3; i++) {
+        for (unsigned i = 0; i < 3; i++)
             step(p, 100);
-        }
         p->ends[0].most = p->ends[0].written;
         link_close(p->ends[0].link, p->now_us + 10000000);
         for (unsigned i = 0; i < 90000; i++) {
             step(p, 100);
-            if (link_state(p->ends[0].link) == LINK_CLOSED) {
+            if (link_state(p->ends[0].link) == LINK_CLOSED)
                 break;
-            }
         }
         assert_true(link_state(p->ends[1].link) == LINK_CLOSED);
         assert_int_equal(p->ends[1].read, p->ends[0].most);
@@ -276,9 +264,8 @@ static void farewells_that_cross_are_answered(void **unused) {
     for (unsigned held = 0; held < 2; held++) {
         struct pair *p = new_pair(&small, &perfect, 1);
         p->ends[0].most = p->ends[1].most = 0;
-        for (unsigned i = 0; i < 50; i++) {
+        for (unsigned i = 0; i < 50; i++)
             step(p, 100);
-        }
         struct link *one = p->ends[0].link, *other = p->ends[1].link;
         struct sim_direction *out =
             host_sim_cube_port(&p->cube, 1, 0)->end->out;
@@ -306,12 +293,10 @@ static void farewell_to_the_dead_ends_in_time(void **unused) {
     (void)unused;
     for (unsigned cut = 0; cut < 2; cut++) {
         struct pair *p = new_pair(&small, &perfect, 1);
-        for (unsigned i = 0; i < 50; i++) {
+        for (unsigned i = 0; i < 50; i++)
             step(p, 100);
-        }
-        if (cut) {
+        if (cut)
             cut_pair(p, true);
-        }
         uint64_t deadline = p->now_us + 300000;
         link_close(p->ends[0].link, deadline);
         while (link_state(p->ends[0].link) != LINK_CLOSED) {
@@ -345,9 +330,8 @@ static void what_is_unsent_is_forgotten(void **unused) {
             p->now_us += 200;
             written +=
                 i < 2000 && link_write(from->link, bytes, size, NULL, 0) == 0;
-            if (i % (20 + seed) == 19) {
+            if (i % (20 + seed) == 19)
                 forgotten += link_forget_unsent(from->link);
-            }
             link_poll(from->link, p->now_us);
             link_poll(to->link, p->now_us);
             while (link_read(to->link, &message)) {
@@ -378,9 +362,8 @@ struct script {
 static int script_receive(void *context, uint8_t *bytes, size_t size) {
     struct script *s = context;
     size = size < s->left ? size : s->left;
-    if (size == 0) {
+    if (size == 0)
         return 0;
-    }
     memcpy(bytes, s->hear, size);
     s->hear += size;
     s->left -= size;

@@ -10,9 +10,8 @@ static uint64_t rooms(const struct machine *m, unsigned i) {
     uint64_t bits = 0;
     for (unsigned to = 0; to < m->count; to++) {
         const struct place *p = &m->places[to];
-        if (to != i && cube_room(m->places[i].cube, p->self) > 0) {
+        if (to != i && cube_room(m->places[i].cube, p->self) > 0)
             bits |= (uint64_t)1 << to;
-        }
     }
     return bits;
 }
@@ -35,9 +34,8 @@ static void tend(struct machine *m, unsigned i,
 static void others_step(struct machine *m, unsigned i) {
     for (unsigned k = 0; k < m->count; k++) {
         unsigned j = draw(m) % m->count;
-        if (j != i) {
+        if (j != i)
             step(m, j);
-        }
     }
 }
 
@@ -81,9 +79,8 @@ static void messages_being_read_stay(void **unused) {
             read_slowly(m, i);
             others_step(m, i);
         }
-        for (unsigned i = 0; i < m->nodes; i++) {
+        for (unsigned i = 0; i < m->nodes; i++)
             passed += cube_statistics(m->places[i].cube)->passed_on;
-        }
         assert_true(passed > 0);
         destroy(m);
     }
@@ -107,9 +104,8 @@ static void others_chatter(struct machine *m, unsigned i) {
         cube_renew(host, &next);
     }
     unsigned j = draw(m) % m->nodes;
-    if (j != i && draw(m) % 100 == 0) {
+    if (j != i && draw(m) % 100 == 0)
         reboot(m, j);
-    }
 }
 
 /* What was decided in a generation is written in it, and read in no other. */
@@ -134,9 +130,8 @@ static void work_stays_in_its_generation(void **unused) {
                 assert_int_equal(words[0], generation);
                 cube_release(cube);
             }
-            for (unsigned w = 0; w < 8; w++) {
+            for (unsigned w = 0; w < 8; w++)
                 words[w] = generation;
-            }
             bool room = to != i && cube_room(cube, m->places[to].self) > 0;
             tend(m, i, others_chatter);
             late += generation != wiring_of(m, m->nodes)->generation;
@@ -158,9 +153,8 @@ static void a_farewell_waits(void **unused) {
     struct machine *m = build(1, &c, &perfect, 1);
     settle(m, 1);
     struct cube *one = m->places[0].cube, *other = m->places[1].cube;
-    for (unsigned i = 0; i < 20; i++) {
+    for (unsigned i = 0; i < 20; i++)
         poll_all(m, 1000);
-    }
     cube_close(other, m->now_us + 10000000);
     for (unsigned i = 0; i < 200; i++) {
         m->now_us += 1000;
@@ -170,9 +164,8 @@ static void a_farewell_waits(void **unused) {
         assert_true(cube_room(one, 1) > 0);
     }
     assert_int_equal(cube_write(one, 1, 0, "so", 2), 0);
-    for (unsigned i = 0; i < 60; i++) {
+    for (unsigned i = 0; i < 60; i++)
         poll_all(m, 1000);
-    }
     assert_true(cube_link_state(one, 0) == LINK_CLOSED);
     assert_true(cube_link_state(other, 0) == LINK_CLOSED);
     assert_int_equal(cube_room(one, 1), 0);

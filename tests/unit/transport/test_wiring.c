@@ -27,11 +27,10 @@ static void find_something(struct cube_wiring *w) {
     struct cube_wrong wrong = {(uint16_t)draw(NODES), (uint16_t)draw(NODES),
                                (uint8_t)draw(4), (uint8_t)draw(4),
                                (uint8_t)(1 + draw(3))};
-    if (draw(2) == 0) {
+    if (draw(2) == 0)
         (void)wiring_add_dead(w, dead, DIMENSION);
-    } else {
+    else
         (void)wiring_add_wrong(w, wrong);
-    }
 }
 
 /* Ends that find things and tell each other at random agree in the end, on
@@ -78,9 +77,8 @@ static void what_is_newer_wins_entirely(void **unused) {
         b.generation = draw(3);
         a.host_epoch = draw(3);
         b.host_epoch = draw(3);
-        for (unsigned i = 0; i < 10; i++) {
+        for (unsigned i = 0; i < 10; i++)
             find_something(draw(2) ? &a : &b);
-        }
         struct cube_wiring a_was = a;
         bool same = !wiring_newer(&a, &b) && !wiring_newer(&b, &a);
         assert_false(wiring_newer(&a, &b) && wiring_newer(&b, &a));
@@ -172,9 +170,8 @@ static void a_gateway_lives_while_its_hosts_wire_does(void **unused) {
     }
     wiring_settle(&w, DIMENSION);
     assert_int_equal(w.dead_count, DIMENSION);
-    for (unsigned i = 0; i < w.dead_count; i++) {
+    for (unsigned i = 0; i < w.dead_count; i++)
         assert_int_not_equal(w.dead[i].dimension, CUBE_WHOLE_NODE);
-    }
     w.gateway = 0;
     wiring_settle(&w, DIMENSION);
     assert_int_equal(w.dead_count, 1);
@@ -202,9 +199,8 @@ static void its_bytes(void **unused) {
     assert_int_equal(w.wrong[0].peer_link, 2);
     assert_int_equal(wiring_pack(&w, bytes), sizeof vector);
     assert_memory_equal(bytes, vector, sizeof vector);
-    for (unsigned i = 0; i < 30; i++) {
+    for (unsigned i = 0; i < 30; i++)
         find_something(&w);
-    }
     size_t size = wiring_pack(&w, bytes);
     assert_true(size <= WIRING_BYTES_MAX);
     assert_true(wiring_unpack(&again, bytes, size, DIMENSION));

@@ -73,11 +73,9 @@ static uint64_t mapped(const char *name) {
     unsigned long long kib = 0;
     FILE *status = fopen("/proc/self/status", "r");
     assert_non_null(status);
-    while (fgets(line, sizeof line, status) != NULL) {
-        if (strncmp(line, name, strlen(name)) == 0) {
+    while (fgets(line, sizeof line, status) != NULL)
+        if (strncmp(line, name, strlen(name)) == 0)
             (void)sscanf(line + strlen(name), "%llu", &kib);
-        }
-    }
     (void)fclose(status);
     return kib << 10;
 }

@@ -46,9 +46,8 @@ static void test_bytes(void **unused) {
         assert_int_equal(host_parse_bytes(good[i].text, &bytes), 0);
         assert_int_equal(bytes, good[i].bytes);
     }
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(host_parse_bytes(bad[i], &bytes), -1);
-    }
 }
 
 static void test_numbers(void **unused) {
@@ -103,9 +102,8 @@ static void test_exponents(void **unused) {
         assert_int_equal(host_parse_number(good[i].text, 0, UINT64_MAX, &n), 0);
         assert_true(n == good[i].number);
     }
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(host_parse_number(bad[i], 0, UINT64_MAX, &n), -1);
-    }
 }
 
 /* What is wrong with a number of nodes, and which ones there are. */

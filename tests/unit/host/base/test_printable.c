@@ -122,9 +122,8 @@ static void test_what_a_shell_reads(void **unused) {
         memcpy(words[i], word, sizeof word);
         assert_int_equal(host_text_quote(quoted, sizeof quoted, word), 0);
         fprintf(script, "printf '%%s\\0' %s\n", quoted);
-        for (char *c = quoted; *c != '\0'; c++) {
+        for (char *c = quoted; *c != '\0'; c++)
             *c = *c == '\n' ? ' ' : *c;
-        }
         host_text_printable(printable, sizeof printable, quoted);
         assert_string_equal(printable, quoted);
     }
@@ -166,11 +165,10 @@ static void test_nearest(void **unused) {
     (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *found = host_text_nearest(cases[i].word, name_of, names);
-        if (cases[i].nearest == NULL) {
+        if (cases[i].nearest == NULL)
             assert_null(found);
-        } else {
+        else
             assert_string_equal(found, cases[i].nearest);
-        }
     }
     (void)host_text_nearest(long_word, name_of, names);
 }

@@ -72,9 +72,8 @@ static void obey(char what, unsigned number) {
         screen.row -= number;
     } else if (what == 'K' || what == 'J') {
         erase(screen.text[screen.row], screen.column);
-        for (unsigned i = screen.row + 1; what == 'J' && i < ROWS; i++) {
+        for (unsigned i = screen.row + 1; what == 'J' && i < ROWS; i++)
             erase(screen.text[i], 0);
-        }
     } else {
         fail();
     }
@@ -279,9 +278,8 @@ static void test_lines(void **unused) {
     host_progress_phase("reading", "MB");
     assert_int_equal(host_progress_rows_max(), 0);
     for (; shown < 60000 && poll(&file, 1, 0) == 0; shown++) {
-        if (shown % 8 == 0) {
+        if (shown % 8 == 0)
             host_progress_phase("triangulating", "Mtet");
-        }
         (void)poll(NULL, 0, 10); /* clock: a line comes every three seconds */
         host_progress_show(1, 4, 2000000);
     }

@@ -39,9 +39,8 @@ static void write_file(const char *path, const void *bytes, size_t size) {
 
 static int make_folder(void **state) {
     (void)state;
-    if (mkdtemp(folder) == NULL) {
+    if (mkdtemp(folder) == NULL)
         return -1;
-    }
     snprintf(map, sizeof map, "%s/x.map", folder);
     snprintf(counts, sizeof counts, "%s/7.count", folder);
     return 0;

@@ -57,9 +57,8 @@ static void test_fit(void **state) {
                           : (double)(sim_draw(&random) % 1000) * (k + 1);
             ns += a[i][k] * made[k];
         }
-        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++) {
+        for (int k = 0; k < HOST_CALIBRATE_TERMS; k++)
             a[i][k] /= ns;
-        }
     }
     host_calibrate_fit((const double(*)[HOST_CALIBRATE_TERMS])a,
                        HOST_CALIBRATE_RUNS, x);
@@ -83,9 +82,8 @@ static void one_medium(bool shared, uint64_t last_us) {
     memset(bytes, 1, sizeof bytes);
     for (int i = 0; i < 2; i++) {
         sim_wire_init(&wire[i], memory[i], &quality, &now_us, 1);
-        if (shared) {
+        if (shared)
             sim_wire_share(&wire[i], &medium_ns);
-        }
     }
     for (int i = 0; i < 2; i++) {
         struct link_pipe pipe = sim_pipe(&wire[i].end[0]);
@@ -129,9 +127,8 @@ static void test_figures(void **state) {
         check_speed_up("2", 10000, 1u << i, uniform_10k[i]);
         check_speed_up("2", 20000, 1u << i, uniform_20k[i]);
     }
-    for (unsigned i = 0; i < 6; i++) {
+    for (unsigned i = 0; i < 6; i++)
         check_speed_up("5", 20000, 8u << i, hybrid[i]);
-    }
     check_speed_up("3", 10000, 8, 4.75);
     check_speed_up("3", 20000, 8, 5.12);
     check_speed_up("6", 4000, 7, 2.86);

@@ -96,9 +96,8 @@ static inline void begin(unsigned dimension, bool json) {
     };
     struct host_error error = {0};
     memset(&desk, 0, sizeof desk);
-    if (host_world_open(&desk.world, &options, &error) != 0) {
+    if (host_world_open(&desk.world, &options, &error) != 0)
         fail_msg("%s", error.text);
-    }
     desk.world.strike_us = desk.world.second_us = UINT64_MAX;
     desk.place = (struct host_shell_place){.open = open_world,
                                            .close = close_world,
@@ -125,9 +124,8 @@ static inline int says(const char *line) {
 /* Until so much of the world's time has passed. */
 static inline void let_pass(uint64_t us) {
     uint64_t end_us = desk.world.now_us + us;
-    while (desk.world.now_us < end_us) {
+    while (desk.world.now_us < end_us)
         host_shell_tend(&desk.shell, end_us - desk.world.now_us);
-    }
 }
 
 /* Both ways: what is sent is lost, and nobody is told. */
@@ -142,9 +140,8 @@ static inline void deafen(unsigned node, unsigned link, bool deaf) {
 static inline json_t *object(void) {
     json_error_t error;
     json_t *answer = json_loads(desk.said, 0, &error);
-    if (answer == NULL) {
+    if (answer == NULL)
         fail_msg("%s: %s", error.text, desk.said);
-    }
     assert_string_equal(strchr(desk.said, '\n'), "\n");
     return answer;
 }

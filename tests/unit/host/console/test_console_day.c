@@ -10,9 +10,8 @@
 enum { HOURS = 24, HOURS_EMULATED = 2, SETTLE_S = 30 };
 
 static void is_well(const char *line) {
-    if (says(line) != 0) {
+    if (says(line) != 0)
         fail_msg("%s: %s%s", line, desk.said, desk.failed);
-    }
     assert_true(desk.said[0] != '\0');
 }
 
@@ -57,9 +56,8 @@ static void a_day_passes(void **unused) {
         all_is_well();
         size_t used = mallinfo2().uordblks;
         first = hour == 2 ? used : first;
-        if (hour > 2 && used > first + 4096) {
+        if (hour > 2 && used > first + 4096)
             fail_msg("hour %u: %zu bytes, %zu at first", hour, used, first);
-        }
         let_pass(end_us - desk.world.now_us);
     }
     all_is_well();

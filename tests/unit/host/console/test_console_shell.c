@@ -35,9 +35,8 @@ static void a_line_may_have_too_many_words(void **unused) {
     char line[4096] = "ping";
     (void)unused;
     begin(0, false);
-    for (unsigned i = 0; i < 2 * HOST_SHELL_WORDS; i++) {
+    for (unsigned i = 0; i < 2 * HOST_SHELL_WORDS; i++)
         strcat(line, " 0");
-    }
     assert_int_equal(says(line), HOST_USAGE);
     end();
 }
@@ -71,9 +70,8 @@ static void completes(const char *line, const char *expected, size_t from) {
         free(words[i]);
     }
     assert_string_equal(all, expected);
-    if (count > 0) {
+    if (count > 0)
         assert_int_equal(at, from);
-    }
 }
 
 static void words_are_completed(void **unused) {
@@ -107,9 +105,8 @@ static void equal_rows_are_folded(void **unused) {
     static char text[SAID];
     struct host_fold fold = {0};
     (void)unused;
-    for (unsigned i = 0; i < 8; i++) {
+    for (unsigned i = 0; i < 8; i++)
         host_fold_add(&fold, i, i == 5 ? "down" : "up");
-    }
     host_fold_add(&fold, CUBE_HOST, "up");
     text[0] = '\0';
     host_fold_print(&fold, "STATE", fold_line, text);
@@ -290,9 +287,8 @@ static void a_person_may_interrupt(void **unused) {
 
 static bool take_picture(void *context, const char *text) {
     (void)context;
-    if (text == NULL) {
+    if (text == NULL)
         return false;
-    }
     assert_non_null(strstr(text, "MEMORY"));
     return ++desk.pictures < desk.enough;
 }

@@ -21,9 +21,8 @@ static void take(void *context, const char *text) {
 
 static const char *folded(const uint32_t *time_s, unsigned count) {
     struct host_fold fold = {0};
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         host_fold_add_timed(&fold, i, "up \1 all", time_s[i]);
-    }
     said[0] = '\0';
     host_fold_print(&fold, "TIME", take, NULL);
     host_fold_free(&fold);

@@ -70,9 +70,8 @@ int host_gpio_set(struct host_gpio *gpio, bool active) {
     played->up_us[line] = active ? host_now_us() : played->up_us[line];
     played->held_us[line] = host_now_us() - played->up_us[line];
     played->active[line] = active;
-    if (active && line == played->on && played->signal != 0) {
+    if (active && line == played->on && played->signal != 0)
         kill(getpid(), played->signal);
-    }
     return 0;
 }
 
@@ -117,9 +116,8 @@ static void open_lines(void) {
 }
 
 static void nothing_is_active(void) {
-    for (unsigned i = 0; i < LINES_MAX; i++) {
+    for (unsigned i = 0; i < LINES_MAX; i++)
         assert_false(played->active[i]);
-    }
 }
 
 /* --- resets --------------------------------------------------------------- */
@@ -185,9 +183,8 @@ static volatile bool active_then;
 
 static void see(int signal) {
     seen = signal;
-    for (unsigned i = 0; i < LINES_MAX; i++) {
+    for (unsigned i = 0; i < LINES_MAX; i++)
         active_then = active_then || played->active[i];
-    }
 }
 
 /* A reset of node 0 in which a signal comes while line `on` is active. */

@@ -157,9 +157,8 @@ static void nodes_restart_when_told(void **state) {
                             &place.error));
     stay(3 * S);
     wait_for(all(), 6 * S);
-    for (unsigned i = 0; i < 8; i++) {
+    for (unsigned i = 0; i < 8; i++)
         assert_int_equal(place.visit.node[i].starts, 2);
-    }
     close_place();
 }
 
@@ -213,9 +212,8 @@ static void pull_and_put_back(const struct place *as, unsigned node,
     stay(10 * S);
     assert_int_equal(cube_wiring(place.visit.cube)->dead_count, 0);
     ask(all(), NODE_LINKS, 0, S);
-    for (unsigned i = 0; i < place.world.nodes; i++) {
+    for (unsigned i = 0; i < place.world.nodes; i++)
         assert_int_equal(place.visit.node[i].starts, 1);
-    }
     close_place();
 }
 

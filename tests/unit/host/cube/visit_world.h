@@ -54,19 +54,16 @@ static inline void open_place(const struct place *as) {
         .steps_max = UINT64_MAX};
     memset(&place, 0, sizeof place);
     place.random = as->seed * 2 + 1;
-    if (host_world_open(&place.world, &options, &place.error) != 0) {
+    if (host_world_open(&place.world, &options, &place.error) != 0)
         fail_msg("%s", place.error.text);
-    }
     place.world.strike_us = place.world.second_us = UINT64_MAX;
-    for (unsigned i = 0; i < place.world.nodes; i++) {
+    for (unsigned i = 0; i < place.world.nodes; i++)
         host_world_late(&place.world, i, draw(100000));
-    }
 }
 
 static inline void good(int status) {
-    if (status != 0) {
+    if (status != 0)
         fail_msg("%s", place.error.text);
-    }
 }
 
 /* Comes to the cube as another start of the host. */
@@ -102,9 +99,8 @@ static inline struct host_node_set only(unsigned node) {
 /* Of a set, those that are there. */
 static inline unsigned there(const struct host_node_set *set) {
     unsigned count = 0;
-    for (unsigned i = 0; i < place.world.nodes; i++) {
+    for (unsigned i = 0; i < place.world.nodes; i++)
         count += host_node_set_has(set, i) && place.visit.node[i].there;
-    }
     return count;
 }
 
@@ -128,11 +124,9 @@ static inline void stay(uint64_t us) {
 static inline void ask(struct host_node_set set, enum node_question what,
                        unsigned target, uint64_t us) {
     good(host_visit_ask(&place.visit, &set, what, target, us, &place.error));
-    for (unsigned i = 0; i < place.world.nodes; i++) {
-        if (host_node_set_has(&set, i) && !place.visit.node[i].answered) {
+    for (unsigned i = 0; i < place.world.nodes; i++)
+        if (host_node_set_has(&set, i) && !place.visit.node[i].answered)
             fail_msg("node %u has not answered question %u", i, (unsigned)what);
-        }
-    }
 }
 
 static inline unsigned wire_of(unsigned node, unsigned link) {
@@ -141,9 +135,8 @@ static inline unsigned wire_of(unsigned node, unsigned link) {
 
 /* Both ways: what is sent is lost, and nobody is told. */
 static inline void pull(unsigned node, unsigned link, bool out) {
-    for (unsigned side = 0; side < 2; side++) {
+    for (unsigned side = 0; side < 2; side++)
         host_sim_cube_deaf(&place.world.cube, wire_of(node, link), side, out);
-    }
 }
 
 #endif

@@ -32,18 +32,15 @@ static int make_cube(void **unused) {
     for (uint32_t i = 0; i < ROWS * ROWS * ROWS; i++) {
         uint32_t at[3] = {i / stride[0], i / ROWS % ROWS, i % ROWS};
         double xyz[3] = {at[0], at[1], at[2]};
-        if (host_points_append(&points, xyz, 1, &error) != 0) {
+        if (host_points_append(&points, xyz, 1, &error) != 0)
             return -1;
-        }
         for (unsigned k = 0; k < 6; k++) {
             uint32_t(*v)[4] = host_tetrahedra_room(&tets, 1, &error);
-            if (at[0] == SIDE || at[1] == SIDE || at[2] == SIDE || v == NULL) {
+            if (at[0] == SIDE || at[1] == SIDE || at[2] == SIDE || v == NULL)
                 continue;
-            }
             (*v)[0] = i;
-            for (unsigned d = 0; d < 3; d++) {
+            for (unsigned d = 0; d < 3; d++)
                 (*v)[d + 1] = (*v)[d] + stride[steps[k][d]];
-            }
             host_tetrahedra_keep(&tets, 1);
         }
     }
@@ -79,9 +76,8 @@ static double section_area(struct host_plane plane, double unit) {
     double area = 0.0;
     assert_int_equal(host_section_make(&section, &points, &tets, plane, &error),
                      0);
-    for (uint64_t i = 0; i < section.count; i++) {
+    for (uint64_t i = 0; i < section.count; i++)
         area += area_of(&section.cells[i]);
-    }
     assert_true(section.extent[0] == SIDE * unit);
     assert_true(section.extent[1] == SIDE * unit);
     host_section_free(&section);
@@ -98,9 +94,8 @@ static void test_covers_the_section_once(void **unused) {
     (void)unused;
     points.xyz = scaled;
     for (size_t u = 0; u < sizeof units / sizeof units[0]; u++) {
-        for (uint64_t i = 0; i < 3 * points.count; i++) {
+        for (uint64_t i = 0; i < 3 * points.count; i++)
             scaled[i] = (xyz[i] + from[u]) * units[u];
-        }
         for (unsigned axis = 0; axis < 3; axis++) {
             for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
                 double z = (at[i] + from[u]) * units[u];
@@ -132,14 +127,12 @@ static void test_default_plane(void **unused) {
     (void)unused;
     struct host_plane plane = host_plane_through_middle(&points);
     assert_true(plane.axis == 2 && plane.at == 3.0);
-    for (uint64_t i = 0; i < points.count; i++) {
+    for (uint64_t i = 0; i < points.count; i++)
         points.xyz[3 * i] *= 0.5;
-    }
     plane = host_plane_through_middle(&points);
     assert_true(plane.axis == 0 && plane.at == 1.5);
-    for (uint64_t i = 0; i < points.count; i++) {
+    for (uint64_t i = 0; i < points.count; i++)
         points.xyz[3 * i] *= 2.0;
-    }
 }
 
 /* --- pictures ------------------------------------------------------------- */
@@ -185,14 +178,12 @@ static double path_area(const char *d) {
         double to[2] = {at[0], at[1]};
         d += strspn(d, " ");
         command = strchr("Mmlhvz", *d) != NULL ? *d++ : command;
-        if (command == 'z') {
+        if (command == 'z')
             memcpy(to, start, sizeof to);
-        } else if (command != 'v') {
+        else if (command != 'v')
             to[0] = strtod(d, (char **)&d) + (command == 'M' ? 0 : at[0]);
-        }
-        if (command != 'z' && command != 'h') {
+        if (command != 'z' && command != 'h')
             to[1] = strtod(d, (char **)&d) + (command == 'M' ? 0 : at[1]);
-        }
         if (command == 'm' || command == 'M') {
             memcpy(start, to, sizeof to);
         } else {
@@ -200,9 +191,8 @@ static double path_area(const char *d) {
                            (at[1] - start[1]) * (to[0] - start[0]));
         }
         memcpy(at, to, sizeof to);
-        if (command == 'z') {
+        if (command == 'z')
             d += strspn(d, " ");
-        }
     }
     return area;
 }
@@ -321,17 +311,14 @@ static void test_raster(void **unused) {
                             {{-4, 20}, {-4, -4}, {3.3, 7.1}}};
     double triangle[3][2] = {{2, 2}, {12, 2}, {2, 12}}, sum = 0.0;
     (void)unused;
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         host_raster_add(&raster, split[i], 3, one);
-    }
-    for (unsigned i = 0; i < N * N; i++) {
+    for (unsigned i = 0; i < N * N; i++)
         assert_true(fabs((double)pixels[i][3] - 1.0) < 1e-6);
-    }
     memset(pixels, 0, sizeof pixels);
     host_raster_add(&raster, triangle, 3, one);
-    for (unsigned i = 0; i < N * N; i++) {
+    for (unsigned i = 0; i < N * N; i++)
         sum += (double)pixels[i][3];
-    }
     assert_true(fabs(sum - 50.0) < 0.01);
 }
 

@@ -121,11 +121,10 @@ static void start(unsigned i, bool ended_badly) {
     b->confirmed = b->off = false;
     b->slot = loader_slots_start(&b->slots, &b->rules, ended_badly, &b->boot);
     b->as.identity.epoch = b->boot > 0 ? b->boot : b->as.identity.epoch + 1;
-    if (b->slot < LOADER_SLOTS && !b->stays && loader_slots_try(&b->slots)) {
+    if (b->slot < LOADER_SLOTS && !b->stays && loader_slots_try(&b->slots))
         b->node = node_start(&b->as, &why);
-    } else {
+    else
         b->loader = loader_start(&b->as, &b->slots, &why);
-    }
     assert_null(why);
     b->stays = false;
 }
@@ -195,9 +194,8 @@ static bool is_roused(unsigned i) {
     for (unsigned d = 0; d < machine.dimension + (i == 0); d++) {
         const struct sim_end *end = host_sim_cube_port(&wires, i, d)->end;
         if (sim_next_us(end->in, 0) <= now_us ||
-            sim_room_us(end->out) <= now_us) {
+            sim_room_us(end->out) <= now_us)
             return true;
-        }
     }
     return false;
 }
@@ -206,23 +204,20 @@ static void look(unsigned i) {
     struct board *b = &board[i];
     uint32_t erased = b->chip.erased, programs = b->chip.programs;
     if (now_us < b->busy_us ||
-        (!b->off && b->sleeping && now_us < b->due_us && !is_roused(i))) {
+        (!b->off && b->sleeping && now_us < b->due_us && !is_roused(i)))
         return;
-    }
     if (setjmp(b->chip.lost) != 0) {
         lose_power(i);
         return;
     }
-    for (unsigned d = 0; d < machine.dimension + (i == 0); d++) {
+    for (unsigned d = 0; d < machine.dimension + (i == 0); d++)
         host_sim_cube_port(&wires, i, d)->end->out->blocked = false;
-    }
-    if (b->off) {
+    if (b->off)
         start(i, false);
-    } else if (b->loader != NULL) {
+    else if (b->loader != NULL)
         step_loader(b);
-    } else {
+    else
         step_node(b);
-    }
     uint64_t us = (uint64_t)(b->chip.erased - erased) * ERASE_US +
                   (uint64_t)(b->chip.programs - programs) * PAGE_US;
     b->busy_us = b->busy_us > now_us ? b->busy_us : now_us + us;
@@ -237,12 +232,10 @@ static void idle(void *unused, uint64_t wait_us) {
     (void)unused;
     do {
         now_us += STEP_US;
-        if (strike != NULL) {
+        if (strike != NULL)
             strike();
-        }
-        for (unsigned i = 0; i < machine.nodes; i++) {
+        for (unsigned i = 0; i < machine.nodes; i++)
             look(i);
-        }
     } while (now_us < host_busy_us ||
              (now_us < until_us && sim_next_us(end->in, 0) > now_us &&
               sim_room_us(end->out) > now_us));
@@ -292,27 +285,23 @@ static void open_world(unsigned dimension, uint64_t seed) {
                               .check = check};
     board = calloc(nodes, sizeof *board);
     assert_non_null(board);
-    for (unsigned i = 0; i < nodes; i++) {
+    for (unsigned i = 0; i < nodes; i++)
         make_board(i);
-    }
     assert_int_equal(host_visit_open(&visit, &machine, &error), 0);
 }
 
 static void close_world(void) {
     host_visit_close(&visit);
-    for (unsigned i = 0; i < machine.nodes; i++) {
+    for (unsigned i = 0; i < machine.nodes; i++)
         free(board[i].as.arena);
-    }
     free(board);
     host_sim_cube_close(&wires);
 }
 
 static bool all_have_it(void) {
-    for (unsigned i = 0; i < machine.nodes; i++) {
-        if (spread.node[i].phase < HOST_SPREAD_VERIFIED) {
+    for (unsigned i = 0; i < machine.nodes; i++)
+        if (spread.node[i].phase < HOST_SPREAD_VERIFIED)
             return false;
-        }
-    }
     return true;
 }
 
@@ -329,9 +318,8 @@ static double flash(const struct made *made) {
         assert_int_equal(host_spread_step(&spread, 50000, &error), 0);
         whole_us = whole_us == 0 && all_have_it() ? now_us : whole_us;
     }
-    if (host_spread_result(&spread, &error) != 0) {
+    if (host_spread_result(&spread, &error) != 0)
         fail_msg("%s", error.text);
-    }
     host_spread_close(&spread);
     return 1e-6 * (double)(whole_us - from_us);
 }

@@ -88,14 +88,12 @@ static void come_up(unsigned i) {
     struct node_who *who = &seen[i].who;
     bool image = b->kind == NODE_KIND_LOADER && !b->stay &&
                  (b->digest != 0 || b->verified);
-    if (image && b->verified && b->end == COMES_UP) {
+    if (image && b->verified && b->end == COMES_UP)
         b->digest = NEW;
-    }
     bool waits = b->verified && b->end == STAYS;
     b->verified = false;
-    if (image && !waits) {
+    if (image && !waits)
         b->kind = NODE_KIND_PROGRAM;
-    }
     b->stay = false;
     b->transfer = 0;
     b->phase = LOADER_WAITS;
@@ -103,9 +101,8 @@ static void come_up(unsigned i) {
     *who = (struct node_who){.protocol = NODE_PROTOCOL, .kind = b->kind};
     memcpy(who->board, b->name, strlen(b->name));
     memcpy(who->serial, b->serial, sizeof who->serial);
-    if (!b->no_loader) {
+    if (!b->no_loader)
         memcpy(who->loader, "0.1.0", 5);
-    }
     fill(who->digest, b->digest, sizeof who->digest);
     seen[i].there = seen[i].heard = true;
     seen[i].starts++;
@@ -115,16 +112,14 @@ static void go_down(unsigned i, uint64_t for_us) {
     struct board *b = &board[i];
     b->back_us = now_us + for_us;
     b->down_us = now_us;
-    if (b->kind == NODE_KIND_PROGRAM && !b->no_loader) {
+    if (b->kind == NODE_KIND_PROGRAM && !b->no_loader)
         b->kind = NODE_KIND_LOADER;
-    }
 }
 
 static uint32_t held(const struct board *b) {
     uint32_t count = 0;
-    for (uint32_t i = 0; i < BLOCKS; i++) {
+    for (uint32_t i = 0; i < BLOCKS; i++)
         count += b->map[i / 8] >> i % 8 & 1;
-    }
     return count;
 }
 
@@ -147,9 +142,8 @@ static void begin(struct board *b, unsigned i, const uint8_t *data) {
     struct loader_begin_message message;
     memcpy(&message, data, sizeof message);
     b->begins++;
-    if ((message.nodes[i / 8] >> i % 8 & 1) == 0) {
+    if ((message.nodes[i / 8] >> i % 8 & 1) == 0)
         return;
-    }
     assert_int_equal(message.bytes, BYTES);
     b->transfer = message.transfer;
     b->fault = b->refuses;
@@ -163,9 +157,8 @@ static void block(struct board *b, unsigned i, const uint8_t *data,
                   size_t size) {
     struct loader_block_message head;
     memcpy(&head, data, sizeof head);
-    if (b->transfer != head.transfer || b->phase != LOADER_TAKES) {
+    if (b->transfer != head.transfer || b->phase != LOADER_TAKES)
         return;
-    }
     b->blocks++;
     assert_true(head.block < BLOCKS);
     assert_int_equal(size - sizeof head, head.block == BLOCKS - 1
@@ -173,17 +166,15 @@ static void block(struct board *b, unsigned i, const uint8_t *data,
                                              : LOADER_BLOCK_BYTES);
     assert_int_equal(head.crc,
                      frame_crc32c(0, data + sizeof head, size - sizeof head));
-    if (draw(100) >= loss) {
+    if (draw(100) >= loss)
         b->map[head.block / 8] |= (uint8_t)(1u << head.block % 8);
-    }
     b->phase = held(b) == BLOCKS ? LOADER_WHOLE : LOADER_TAKES;
     if (b->restless) {
         b->map[0] = 0;
         go_down(i, RESTART_US);
     }
-    if (i == 1 && b->blocks == lose_power_at) {
+    if (i == 1 && b->blocks == lose_power_at)
         go_down(1, RESTART_US);
-    }
 }
 
 static void obey(struct board *b, unsigned i, const uint8_t *data) {
@@ -205,9 +196,8 @@ static void deliver(unsigned i, uint8_t type, const uint8_t *data,
                     size_t size) {
     struct board *b = &board[i];
     if (!b->on || b->back_us != 0 || b->kind != NODE_KIND_LOADER || b->mute ||
-        b->deaf) {
+        b->deaf)
         return;
-    }
     if (type == NODE_IMAGE_BEGIN) {
         begin(b, i, data);
     } else if (type == NODE_IMAGE_BLOCK) {
@@ -234,9 +224,8 @@ bool host_visit_send(struct host_visit *unused, uint16_t dest, uint8_t type,
                      const void *data, size_t size) {
     (void)unused;
     assert_true(size <= CUBE_PAYLOAD_MAX);
-    if (queued == QUEUE) {
+    if (queued == QUEUE)
         return false;
-    }
     queue[queued].dest = dest;
     queue[queued].type = type;
     queue[queued].size = size;
@@ -249,9 +238,8 @@ int host_visit_round(struct host_visit *unused, uint64_t wait_us,
                      struct host_error *error) {
     (void)unused;
     now_us += queued > 0 ? A_MESSAGE_US : wait_us;
-    if (lost) {
+    if (lost)
         return host_fail(error, HOST_CUBE, "host: no wire; plug it in");
-    }
     for (unsigned i = 0; i < NODES; i++) {
         struct board *b = &board[i];
         if (!b->on && off_until_us[i] != 0 && now_us >= off_until_us[i]) {
@@ -263,14 +251,11 @@ int host_visit_round(struct host_visit *unused, uint64_t wait_us,
         seen[i].heard = b->on && !b->mute &&
                         (b->back_us == 0 || now_us - b->down_us < HEARD_US);
     }
-    if (queued == 0) {
+    if (queued == 0)
         return 0;
-    }
-    for (unsigned i = 0; i < NODES; i++) {
-        if (queue[0].dest == CUBE_ALL || queue[0].dest == i) {
+    for (unsigned i = 0; i < NODES; i++)
+        if (queue[0].dest == CUBE_ALL || queue[0].dest == i)
             deliver(i, queue[0].type, queue[0].data, queue[0].size);
-        }
-    }
     queued--;
     memmove(queue, queue + 1, queued * sizeof queue[0]);
     return 0;

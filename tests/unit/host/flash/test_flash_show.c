@@ -37,9 +37,8 @@ static int prepare(void **unused) {
         .node = node,
         .image = {.number = 3, .board = "mps2-an500", .version = "1.2"}};
     host_node_set_all(&spread.options.nodes, NODES);
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         node[i].blocks = 100;
-    }
     return 0;
 }
 

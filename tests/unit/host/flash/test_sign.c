@@ -44,9 +44,8 @@ static int set_up(void **unused) {
     uint8_t code[CODE];
     (void)unused;
     assert_non_null(mkdtemp(folder));
-    for (unsigned i = 0; i < CODE; i++) {
+    for (unsigned i = 0; i < CODE; i++)
         code[i] = (uint8_t)(i * 7);
-    }
     put("code", code, sizeof code);
     assert_int_equal(host_sign_key_make(in("lab"), &error), 0);
     assert_int_equal(host_sign_key_make(in("other"), &error), 0);
@@ -58,9 +57,8 @@ static int tear_down(void **unused) {
     static const char *const names[] = {"code", "lab",   "lab.pub",  "other",
                                         "cube", "image", "other.pub"};
     (void)unused;
-    for (unsigned i = 0; i < sizeof names / sizeof names[0]; i++) {
+    for (unsigned i = 0; i < sizeof names / sizeof names[0]; i++)
         assert_int_equal(unlink(in(names[i])), 0);
-    }
     return rmdir(folder);
 }
 
@@ -95,9 +93,8 @@ static enum loader_fault signed_by(const char *public) {
     assert_int_equal(host_sign_public_read(key, in(public), &error), 0);
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
     enum loader_fault fault = host_image_fault(&file);
-    if (fault == LOADER_GOOD) {
+    if (fault == LOADER_GOOD)
         fault = loader_image_signed(file.source.data, &sign_sodium, key);
-    }
     host_image_close(&file);
     return fault;
 }
@@ -183,9 +180,8 @@ static enum loader_fault refusal(const uint8_t *bytes, size_t size,
     struct loader_image image;
     uint8_t digest[SIGN_DIGEST_BYTES];
     enum loader_fault fault = loader_image_unpack(&image, bytes);
-    if (fault != LOADER_GOOD || image.bytes != size - LOADER_HEADER_BYTES) {
+    if (fault != LOADER_GOOD || image.bytes != size - LOADER_HEADER_BYTES)
         return LOADER_NO_IMAGE;
-    }
     fault = loader_image_signed(bytes, &sign_sodium, key);
     host_image_digest(bytes, bytes + LOADER_HEADER_BYTES, image.bytes, digest);
     return fault == LOADER_GOOD &&
@@ -227,9 +223,8 @@ static void an_image_that_is_not_whole_is_refused(void **unused) {
     memcpy(bytes, file.source.data, sizeof bytes - 1);
     host_image_close(&file);
     for (size_t size = 0; size <= sizeof bytes; size++) {
-        if (size == sizeof bytes - 1 || (size % 97 != 0 && size < CODE)) {
+        if (size == sizeof bytes - 1 || (size % 97 != 0 && size < CODE))
             continue;
-        }
         error = (struct host_error){0};
         put("image", bytes, size);
         assert_int_equal(host_image_open(&file, in("image"), &error),

@@ -29,9 +29,8 @@ static int prepare(void **unused) {
     struct loader_image header = {.bytes = BYTES - LOADER_HEADER_BYTES,
                                   .board = "mps2-an500"};
     (void)unused;
-    for (unsigned i = 0; i < BYTES; i++) {
+    for (unsigned i = 0; i < BYTES; i++)
         image[i] = (uint8_t)(i * i >> 3);
-    }
     fill(header.digest, NEW, sizeof header.digest);
     loader_image_pack(&header, image);
     machine = (struct host_machine){.nodes = NODES,
@@ -66,11 +65,9 @@ static int prepare(void **unused) {
 }
 
 static int run(void) {
-    for (unsigned i = 0; i < NODES; i++) {
-        if (board[i].on && !seen[i].there) {
+    for (unsigned i = 0; i < NODES; i++)
+        if (board[i].on && !seen[i].there)
             come_up(i);
-        }
-    }
     assert_int_equal(host_spread_open(&spread, &visit, &options, &error), 0);
     int status = host_spread_look(&spread, &error);
     for (unsigned step = 0; status == 0 && !host_spread_over(&spread); step++) {
@@ -95,9 +92,8 @@ static void is_in(unsigned i, enum host_spread_phase phase) {
 }
 
 static void all_are_in(enum host_spread_phase phase) {
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         is_in(i, phase);
-    }
 }
 
 /* What goes with a generation is not waited for. */
@@ -138,10 +134,9 @@ static void every_block_goes_once_to_all(void **unused) {
  * to it alone. */
 static void only_what_is_lacking_is_sent(void **unused) {
     (void)unused;
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         memset(board[i].map, 0xff, 1); /* blocks 0 .. 7 */
-    }
-    board[2].map[0] = 0xf7; /* but for 3 */
+    board[2].map[0] = 0xf7;            /* but for 3 */
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
     assert_int_equal(spread.sent, BLOCKS - 7);
@@ -175,14 +170,12 @@ static void what_is_lost_is_sent_again(void **unused) {
 
 static void where_the_image_is_nothing_happens(void **unused) {
     (void)unused;
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         board[i].digest = NEW;
-    }
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_HAS);
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         assert_int_equal(board[i].restarts, 0);
-    }
     host_spread_close(&spread);
     (void)prepare(NULL);
     board[1].digest = NEW; /* again: verified and started anew */
@@ -232,9 +225,8 @@ static void every_refusal_says_what_to_do(void **unused) {
     (void)unused;
     for (unsigned f = LOADER_GOOD + 1; f <= LOADER_FAULTS; f++) {
         (void)prepare(NULL);
-        for (unsigned i = 0; i < NODES; i++) {
+        for (unsigned i = 0; i < NODES; i++)
             board[i].refuses = (enum loader_fault)f;
-        }
         assert_int_equal(run(), HOST_INPUT);
         all_are_in(HOST_SPREAD_REFUSED);
         assert_non_null(strstr(error.text, "nodes 0-3: refuses"));
@@ -263,9 +255,8 @@ static void other_boards_are_passed_over_or_refused(void **unused) {
         is_in(1, known != 0 ? HOST_SPREAD_PASSED : HOST_SPREAD_REFUSED);
         is_in(2, known != 0 ? HOST_SPREAD_PASSED : HOST_SPREAD_REFUSED);
         is_in(3, HOST_SPREAD_REFUSED);
-        for (unsigned i = 1; i < NODES; i++) {
+        for (unsigned i = 1; i < NODES; i++)
             assert_int_equal(board[i].restarts, 0);
-        }
         assert_true((strstr(said, "incode deploy") != NULL) == (known == 0));
         host_spread_close(&spread);
     }
@@ -370,11 +361,9 @@ static void a_look_changes_nothing(void **unused) {
     (void)unused;
     board[1].digest = NEW;
     board[2].on = false;
-    for (unsigned i = 0; i < NODES; i++) {
-        if (board[i].on) {
+    for (unsigned i = 0; i < NODES; i++)
+        if (board[i].on)
             come_up(i);
-        }
-    }
     assert_int_equal(host_spread_open(&spread, &visit, &options, &error), 0);
     assert_int_equal(host_spread_look(&spread, &error), 0);
     is_in(0, HOST_SPREAD_LEAVES);
@@ -409,9 +398,8 @@ static void chance_does_not_stop_it(void **unused) {
             board[i].digest = board[i].kind == NODE_KIND_LOADER ? 0 : OLD;
             board[i].map[0] = (uint8_t)draw(256);
         }
-        if (run() != 0) {
+        if (run() != 0)
             print_error("seed %u: %s\n", seed, error.text);
-        }
         all_are_in(HOST_SPREAD_DONE);
         host_spread_close(&spread);
     }

@@ -91,9 +91,8 @@ static void hear(void *unused, const struct cube_message *message) {
 }
 
 static void stay_for(uint64_t us) {
-    for (uint64_t end_us = now_us + us; now_us < end_us;) {
+    for (uint64_t end_us = now_us + us; now_us < end_us;)
         assert_int_equal(host_visit_round(&visit, 10000, &error), 0);
-    }
 }
 
 static bool is_named(const struct board *b, const uint8_t *serial) {
@@ -158,9 +157,8 @@ static void a_loader_answers_as_a_node(void **unused) {
     for (enum node_question q = NODE_WHO; q <= NODE_PROBE; q++) {
         assert_int_equal(host_visit_ask(&visit, &all, q, 1, 3000000, &error),
                          0);
-        for (unsigned i = 0; i < 4; i++) {
+        for (unsigned i = 0; i < 4; i++)
             assert_true(visit.node[i].answered);
-        }
     }
     assert_int_equal(
         host_visit_restart(&visit, &all, NODE_RESTART_STAY, &error), 0);
@@ -171,9 +169,8 @@ static void a_loader_answers_as_a_node(void **unused) {
     }
     assert_true(host_visit_send(&visit, CUBE_ALL, NODE_STOP, NULL, 0));
     stay_for(2000000);
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         assert_int_equal(board[i].boot, 3);
-    }
     close_world();
 }
 
@@ -197,9 +194,8 @@ static void a_board_with_a_worn_flash_waits_and_says_so(void **unused) {
     assert_int_equal(visit.node[1].starts, starts + 1);
     assert_int_equal(visit.node[1].who.kind, NODE_KIND_LOADER);
     assert_int_equal(visit.node[1].who.boot, 0);
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         assert_true(i == 1 || board[i].node != NULL);
-    }
     assert_int_equal(
         host_visit_ask(&visit, &worn, NODE_LOG, 0, 3000000, &error), 0);
     assert_non_null(strstr((const char *)visit.node[1].answer, "is worn"));
@@ -220,17 +216,15 @@ static unsigned struck;
 static int pulled; /* the wire, or -1 */
 
 static void pull(bool out) {
-    for (unsigned side = 0; side < 2; side++) {
+    for (unsigned side = 0; side < 2; side++)
         host_sim_cube_deaf(&wires, (unsigned)pulled, side, out);
-    }
 }
 
 /* Power goes in the midst of one of a board's next operations, or at once; a
  * wire is off for a while. */
 static void befall(void) {
-    if (now_us < strike_us) {
+    if (now_us < strike_us)
         return;
-    }
     if (pulled >= 0) {
         pull(false);
         pulled = -1;
@@ -267,16 +261,14 @@ static void losses_cost_time_alone(void **unused) {
  * machine that has much to do. */
 static void hold_up(void) {
     uint64_t until_us;
-    if (now_us < strike_us) {
+    if (now_us < strike_us)
         return;
-    }
     until_us = now_us + 1000000 + draw(9000000);
     unsigned who = draw(machine.nodes + 1);
-    if (who == machine.nodes) {
+    if (who == machine.nodes)
         host_busy_us = until_us;
-    } else if (!board[who].off) {
+    else if (!board[who].off)
         board[who].busy_us = until_us;
-    }
     strike_us = until_us + 1000 * draw(10000);
 }
 

@@ -59,9 +59,8 @@ static inline double value_of(uint64_t i) {
 
 static inline void put_values(struct bytes *b, uint64_t n, bool wide,
                               bool big) {
-    for (uint64_t i = 0; i < n; i++) {
+    for (uint64_t i = 0; i < n; i++)
         put_number(b, value_of(i), wide, big);
-    }
 }
 
 static inline void put_base64(struct bytes *b, const uint8_t *from, size_t n) {
@@ -69,9 +68,8 @@ static inline void put_base64(struct bytes *b, const uint8_t *from, size_t n) {
                                 "abcdefghijklmnopqrstuvwxyz0123456789+/";
     for (size_t i = 0; i < n; i += 3) {
         uint32_t bits = 0;
-        for (size_t k = 0; k < 3; k++) {
+        for (size_t k = 0; k < 3; k++)
             bits = bits << 8 | (i + k < n ? from[i + k] : 0u);
-        }
         for (size_t k = 0; k < 4; k++) {
             char c = i + k > n ? '=' : digit[bits >> (18 - 6 * k) & 63];
             put(b, &c, 1);
@@ -84,13 +82,11 @@ static inline void expect_rows(const char *path, const struct bytes *b,
                                uint64_t n) {
     struct host_points points;
     struct host_error error = {0};
-    if (host_points_parse(path, b->data, b->n, &points, &error) != 0) {
+    if (host_points_parse(path, b->data, b->n, &points, &error) != 0)
         fail_msg("%s", error.text);
-    }
     assert_int_equal(points.count, n);
-    for (uint64_t i = 0; i < 3 * n; i++) {
+    for (uint64_t i = 0; i < 3 * n; i++)
         assert_true(points.xyz[i] == value_of(i));
-    }
     host_points_free(&points);
 }
 
@@ -115,9 +111,8 @@ static inline void refused(const char *path, const char *text,
         host_points_parse(path, text, strlen(text), &points, &error),
         HOST_INPUT);
     assert_null(points.xyz);
-    if (strstr(error.text, expected) == NULL) {
+    if (strstr(error.text, expected) == NULL)
         fail_msg("expected '%s' in '%s'", expected, error.text);
-    }
     assert_null(strchr(error.text, '\n'));
     assert_non_null(strstr(error.text, "; "));
 }

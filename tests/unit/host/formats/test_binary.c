@@ -34,13 +34,11 @@ static void ply_of_every_coding(void **unused) {
             put_word(&b, 8, 4, big);
             put_word(&b, 0, 1, big);
             for (uint64_t i = 0; i < 12; i++) {
-                if (i % 3 == 0) {
+                if (i % 3 == 0)
                     put_word(&b, 200, 1, big);
-                }
                 put_number(&b, value_of(i), wide != 0, big);
-                if (i % 3 == 2) {
+                if (i % 3 == 2)
                     put_word(&b, 1, 2, big);
-                }
             }
             put_word(&b, 3, 1, big);
             put_word(&b, 0, 4, big);
@@ -94,11 +92,10 @@ static void ply_is_as_long_as_it_says(void **unused) {
                      "3 0 1 2\n3 0 1 3\n",
                      heads[i].vertices, heads[i].faces);
         b.n = (size_t)n;
-        if (heads[i].wrong != NULL) {
+        if (heads[i].wrong != NULL)
             refused("a.ply", (char *)b.data, heads[i].wrong);
-        } else {
+        else
             expect_rows("a.ply", &b, 4);
-        }
     }
 }
 
@@ -224,42 +221,35 @@ static void plot3d_of_every_variant(void **unused) {
         uint64_t blocks = (bits & 8) != 0 ? 2 : 1;
         struct bytes b = {.n = 0};
         if (blocks == 2) {
-            if (marks) {
+            if (marks)
                 put_word(&b, 4, 4, big);
-            }
             put_word(&b, blocks, 4, big);
-            if (marks) {
+            if (marks)
                 put_word(&b, 4, 4, big);
-            }
         }
-        if (marks) {
+        if (marks)
             put_word(&b, 12 * blocks, 4, big);
-        }
         for (uint64_t k = 0; k < blocks; k++) {
             put_word(&b, 2, 4, big);
             put_word(&b, 3, 4, big);
             put_word(&b, 2 + k, 4, big);
         }
-        if (marks) {
+        if (marks)
             put_word(&b, 12 * blocks, 4, big);
-        }
         uint64_t first = 0;
         for (uint64_t k = 0; k < blocks; k++) {
             uint64_t n = 6 * (2 + k);
             uint64_t length = n * ((wide ? 24u : 12u) + (iblank ? 4u : 0u));
-            if (marks) {
+            if (marks)
                 put_word(&b, length, 4, big);
-            }
             for (uint64_t i = 0; i < 3 * n; i++) {
                 put_number(&b, value_of(3 * (first + i % n) + i / n), wide,
                            big);
             }
-            for (uint64_t i = 0; iblank && i < n; i++) {
+            for (uint64_t i = 0; iblank && i < n; i++)
                 put_word(&b, 1, 4, big);
-            }
-            if (marks) {
+            if (marks)
                 put_word(&b, length, 4, big);
-            }
             first += n;
         }
         expect_rows("a.p3d", &b, first);

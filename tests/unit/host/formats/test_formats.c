@@ -65,9 +65,8 @@ static void found_by_extension(void **unused) {
             assert_int_equal(f->extensions[k][0], '.');
             (void)snprintf(path, sizeof path, "dir.off/a%s", f->extensions[k]);
             assert_ptr_equal(host_format_named(path), f);
-            for (char *c = path; *c != '\0'; c++) {
+            for (char *c = path; *c != '\0'; c++)
                 *c = *c >= 'a' && *c <= 'z' ? (char)(*c - 32) : *c;
-            }
             strcat(path, ".Gz");
             assert_ptr_equal(host_format_named(path), f);
             assert_null(host_format_of(path, HOST_WRITE_POINTS));
@@ -175,9 +174,8 @@ static void packed_files(void **unused) {
     expect_rows("a.xyz.gz", &b, 2);
     size_t whole = b.n;
     for (size_t padding = 1; padding <= 512; padding *= 8) {
-        for (b.n = whole; b.n < whole + padding;) {
+        for (b.n = whole; b.n < whole + padding;)
             put_word(&b, 0, 1, false);
-        }
         expect_rows("a.xyz.gz", &b, 2);
     }
     struct host_points points;

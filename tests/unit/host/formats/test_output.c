@@ -46,9 +46,8 @@ int link(const char *from, const char *to) {
 }
 
 int rename(const char *from, const char *to) {
-    if (raise_at > 0 && --raise_at == 0) {
+    if (raise_at > 0 && --raise_at == 0)
         (void)raise(SIGTERM);
-    }
     if (taken_over != NULL && strcmp(to, taken_over) != 0) {
         (void)unlink(taken_over);
         put(taken_over, "of somebody else");
@@ -76,9 +75,8 @@ static unsigned files(void) {
     unsigned count = 0;
     DIR *all = opendir(".");
     assert_non_null(all);
-    for (struct dirent *one; (one = readdir(all)) != NULL;) {
+    for (struct dirent *one; (one = readdir(all)) != NULL;)
         count += one->d_name[0] != '.';
-    }
     (void)closedir(all);
     return count;
 }
@@ -105,9 +103,8 @@ static const char *beside(const char *name, const char *what, pid_t writer) {
 
 static void open_all(struct host_output *out, struct host_error *error) {
     for (int i = 0; i < OUTPUTS; i++) {
-        if (host_output_open(&out[i], names[i], error) != 0) {
+        if (host_output_open(&out[i], names[i], error) != 0)
             _exit(100);
-        }
         host_output_text(&out[i], "not whole");
     }
 }
@@ -121,9 +118,8 @@ static _Noreturn void be_ended(int number, int closed, void (*ignored)(int)) {
     host_output_guard();
     open_all(out, &error);
     if (files() != OUTPUTS ||
-        host_output_close(out, (size_t)closed, &error) != 0) {
+        host_output_close(out, (size_t)closed, &error) != 0)
         _exit(101);
-    }
     (void)raise(number);
     host_output_close(out + closed, (size_t)(OUTPUTS - closed), &error);
     host_output_commit(&error);
@@ -134,9 +130,8 @@ static _Noreturn void be_ended(int number, int closed, void (*ignored)(int)) {
 static int ended(int number, int closed, void (*ignored)(int)) {
     int status = -1;
     pid_t child = fork();
-    if (child == 0) {
+    if (child == 0)
         be_ended(number, closed, ignored);
-    }
     assert_true(child > 0);
     assert_int_equal(waitpid(child, &status, 0), child);
     return status;
@@ -200,9 +195,8 @@ static void an_ignored_signal_stays_ignored(void **unused) {
     int status = ended(SIGHUP, 0, SIG_IGN);
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     assert_int_equal(files(), OUTPUTS);
-    for (int k = 0; k < OUTPUTS; k++) {
+    for (int k = 0; k < OUTPUTS; k++)
         take(names[k], "not whole");
-    }
 }
 
 static void a_signal_amid_the_names_is_too_late(void **unused) {
@@ -213,9 +207,8 @@ static void a_signal_amid_the_names_is_too_late(void **unused) {
         raise_at = 0;
         assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
         assert_int_equal(files(), OUTPUTS);
-        for (int k = 0; k < OUTPUTS; k++) {
+        for (int k = 0; k < OUTPUTS; k++)
             take(names[k], "not whole");
-        }
     }
 }
 
@@ -233,9 +226,8 @@ static void however_many_there_are(void **unused) {
             char name[16];
             (void)snprintf(name, sizeof name, "%d.npy", i);
             if (host_output_open(&out, name, &error) != 0 ||
-                host_output_close(&out, 1, &error) != 0) {
+                host_output_close(&out, 1, &error) != 0)
                 _exit(100);
-            }
         }
         (void)raise(files() == MANY ? SIGTERM : SIGKILL);
         _exit(101);
@@ -302,9 +294,8 @@ static void what_a_killed_process_left_is_no_hindrance(void **unused) {
     assert_int_equal(host_output_close(out, OUTPUTS, &error), 0);
     assert_int_equal(host_output_commit(&error), 0);
     assert_int_equal(files(), OUTPUTS);
-    for (int k = 0; k < OUTPUTS; k++) {
+    for (int k = 0; k < OUTPUTS; k++)
         take(names[k], "not whole");
-    }
 }
 
 static void write_one(const char *path) {
@@ -343,9 +334,8 @@ static const pid_t lost = 4194305; /* no process has it */
 static void leave_whole(const char *name, const char *former) {
     put(name, "new");
     assert_int_equal(link(name, beside(name, "made", lost)), 0);
-    if (former != NULL) {
+    if (former != NULL)
         put(beside(name, "kept", lost), former);
-    }
 }
 
 static void cleaning_takes_no_more_than_was_made(void **unused) {

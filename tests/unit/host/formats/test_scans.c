@@ -16,9 +16,8 @@ static void pts_with_and_without_a_count(void **unused) {
         "  2 \r\n-3 -2.5 -2\r\n-1.5 -1 -.5 -1200\r\n\r\n",
         "-3 -2.5 -2 55\n-1.5 -1 -.5", "1\n-3 -2.5 -2 1\n1\n-1.5 -1 -.5 1\n",
         "0\n2\n-3 -2.5 -2 1\n-1.5 -1 -.5 1\n0\n"};
-    for (size_t i = 0; i < sizeof two / sizeof two[0]; i++) {
+    for (size_t i = 0; i < sizeof two / sizeof two[0]; i++)
         expect_text("a.pts", two[i], 2);
-    }
     refused("a.pts", "3\n1 2 3\n4 5 6\n", "a.pts:4:1: fewer than the 3 points");
     refused("a.pts", "1\n1 2 3\n4 5 6\n", "a.pts:3:1: more than the 1 points");
     refused("a.pts", "2\n1 2 3\n2\n4 5 6\n", "a.pts:3:2: 1 column");
@@ -37,9 +36,8 @@ static void obj_of_every_habit(void **unused) {
         "f 1 2 \\\nv 7 7 7\nv -3 -2.5 -2\ng a \\\n\\\nv 8 8 8\nv -1.5 -1 -.5",
         "# C:\\models\\\nv -3 -2.5 -2 # C:\\\nv -1.5 -1 -.5\\",
         "\xef\xbb\xbfv -3 -2.5 -2\nusemtl a\\b\nv -1.5 -1 -.5\nend\n"};
-    for (size_t i = 0; i < sizeof two / sizeof two[0]; i++) {
+    for (size_t i = 0; i < sizeof two / sizeof two[0]; i++)
         expect_text("a.obj", two[i], 2);
-    }
     refused("a.obj", "v 1 2 3\nv 1 2\n", "a.obj:2:6: the line ends where");
     refused("a.obj", "v 1 2 \\\nv 1 2 3\n", "a.obj:2:1: 'v' is no number");
     refused("a.obj", "v 1 2 nan\n", "a.obj:1:7: NaN");
@@ -89,17 +87,14 @@ static void stl_in_binary(void **unused) {
     for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
         struct bytes b = {.n = 0};
         put_text(&b, headers[i]);
-        while (b.n < 80) {
+        while (b.n < 80)
             put_word(&b, ' ', 1, false);
-        }
         put_word(&b, 2, 4, false);
         for (uint64_t k = 0; k < 2; k++) {
-            for (int d = 0; d < 3; d++) {
+            for (int d = 0; d < 3; d++)
                 put_number(&b, NAN, false, false); /* a normal that is none */
-            }
-            for (uint64_t n = 0; n < 9; n++) {
+            for (uint64_t n = 0; n < 9; n++)
                 put_number(&b, value_of(9 * k + n), false, false);
-            }
             put_word(&b, 0xffff, 2, false); /* a colour, as some have it */
         }
         expect_rows("a.stl", &b, 6);
@@ -129,9 +124,8 @@ struct las {
 };
 
 static void put_zeros(struct bytes *b, size_t until) {
-    while (b->n < until) {
+    while (b->n < until)
         put_word(b, 0, 1, false);
-    }
 }
 
 /* Records whose points are value_of: X / 1024 - 2^20 and the like. */
@@ -151,17 +145,15 @@ static void put_las(struct bytes *b, const struct las *las) {
     put_word(b, las->length, 2, false);
     put_word(b, las->few, 4, false);
     put_zeros(b, 131);
-    for (int d = 0; d < 6; d++) {
+    for (int d = 0; d < 6; d++)
         put_number(b, d < 3 ? scale : shift, true, false);
-    }
     put_zeros(b, las->minor < 4 ? las->header : 247);
     if (las->minor == 4) {
         put_word(b, las->many, 8, false);
         put_zeros(b, las->header);
     }
-    for (unsigned i = 0; i < las->gap; i++) {
+    for (unsigned i = 0; i < las->gap; i++)
         put_word(b, 'g', 1, false);
-    }
     put(b, "\xdd\xcc", las->signature ? 2 : 0);
     for (unsigned i = 0; i < las->rows; i++) {
         const size_t end = b->n + las->length;
@@ -169,9 +161,8 @@ static void put_las(struct bytes *b, const struct las *las) {
             double whole = (value_of(3 * i + d) - shift) / scale;
             put_word(b, (uint64_t)(int64_t)whole, 4, false);
         }
-        while (b->n < end) {
+        while (b->n < end)
             put_word(b, 0xff, 1, false);
-        }
     }
 }
 
@@ -211,13 +202,11 @@ static void las_is_rounded_as_specified(void **unused) {
     const int32_t whole[] = {INT32_MIN, 123456789, -1};
     put_las(&b, &las);
     b.n = 131;
-    for (int d = 0; d < 6; d++) {
+    for (int d = 0; d < 6; d++)
         put_number(&b, d < 3 ? scale : shift[d - 3], true, false);
-    }
     b.n = 227;
-    for (int d = 0; d < 3; d++) {
+    for (int d = 0; d < 3; d++)
         put_word(&b, (uint32_t)whole[d], 4, false);
-    }
     b.n += 8;
     struct host_points points;
     struct host_error error = {0};
@@ -273,9 +262,8 @@ static void las_that_is_wrong(void **unused) {
         assert_int_equal(
             host_points_parse("a.las", b.data, b.n, &points, &error),
             HOST_INPUT);
-        if (strstr(error.text, wrong[i].why) == NULL) {
+        if (strstr(error.text, wrong[i].why) == NULL)
             fail_msg("expected '%s' in '%s'", wrong[i].why, error.text);
-        }
     }
     refused("a.las", "1 2 3\n", "no LAS file");
     refused("a.laz", "1 2 3\n", "a.laz: its points are compressed, ");

@@ -44,9 +44,8 @@ static void leave_memory(uint64_t bytes) {
     struct rlimit limit = before;
     FILE *status = fopen("/proc/self/status", "r");
     assert_non_null(status);
-    while (kib == 0 && fgets(line, sizeof line, status) != NULL) {
+    while (kib == 0 && fgets(line, sizeof line, status) != NULL)
         (void)sscanf(line, "VmSize: %llu kB", &kib);
-    }
     (void)fclose(status);
     limit.rlim_cur = (kib << 10) + bytes;
     assert_int_equal(setrlimit(RLIMIT_AS, &limit), 0);
@@ -55,14 +54,12 @@ static void leave_memory(uint64_t bytes) {
 /* n MiB of lines, packed. */
 static void pack(const char *name, int n) {
     static char lines[1 << 20];
-    for (size_t i = 0; i < sizeof lines; i++) {
+    for (size_t i = 0; i < sizeof lines; i++)
         lines[i] = "1 2 3 4\n"[i % 8];
-    }
     gzFile file = gzopen(name, "wb1");
     assert_non_null(file);
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < n; i++)
         assert_int_equal(gzwrite(file, lines, sizeof lines), sizeof lines);
-    }
     assert_int_equal(gzclose(file), Z_OK);
 }
 
@@ -104,9 +101,8 @@ static void text_beyond_the_memory(void **unused) {
         struct host_error error = {0};
         gzFile file = gzopen(names[k], "wb1");
         assert_non_null(file);
-        for (int i = 0; i < 200; i++) {
+        for (int i = 0; i < 200; i++)
             assert_int_equal(gzwrite(file, lines, sizeof lines), sizeof lines);
-        }
         assert_true(gzputs(file, k == 2 ? "v 1 2 3\n" : "1 2 3\n") > 0);
         assert_int_equal(gzclose(file), Z_OK);
         leave_memory((uint64_t)64 << 20);
@@ -129,9 +125,8 @@ static void pieces_are_as_the_whole(void **unused) {
     struct host_error error = {0};
     gzFile file = gzopen("rows.xyz.gz", "wb1");
     assert_non_null(file);
-    for (int i = 0; i < ROWS; i++) {
+    for (int i = 0; i < ROWS; i++)
         assert_true(gzprintf(file, "%d.5 %d 7\n", i, -3 * i) > 0);
-    }
     assert_int_equal(gzclose(file), Z_OK);
     assert_int_equal(host_points_read("rows.xyz.gz", &points, &error), 0);
     assert_int_equal(points.count, ROWS);
@@ -168,9 +163,8 @@ static void pieces_are_as_the_whole(void **unused) {
     error = (struct host_error){0};
     assert_int_equal(host_points_read("rows.npy.gz", &points, &error), 0);
     assert_int_equal(points.count, ROWS);
-    for (int i = 0; i < 3 * ROWS; i++) {
+    for (int i = 0; i < 3 * ROWS; i++)
         assert_true(points.xyz[i] == i * 0.25);
-    }
     host_points_free(&points);
     file = gzopen("rows.npy.gz", "ab1");
     assert_int_equal(gzwrite(file, head, 8), 8);
@@ -198,9 +192,8 @@ static void a_pipe_that_brings_little(void **unused) {
     if (child == 0) {
         char byte;
         int from = open("packed", O_RDONLY), to = open("pipe.ply.gz", O_WRONLY);
-        while (read(from, &byte, 1) == 1 && write(to, &byte, 1) == 1) {
+        while (read(from, &byte, 1) == 1 && write(to, &byte, 1) == 1)
             (void)usleep(200); /* clock: so that the reader comes to wait */
-        }
         _exit(0);
     }
     assert_int_equal(host_points_read("pipe.ply.gz", &points, &error), 0);
@@ -309,9 +302,8 @@ static char *zeros_in_vtk(size_t points, size_t *bytes) {
         compress2((Bytef *)head + 16, &packed, (Bytef *)zeros, size, 1), Z_OK);
     const uint32_t words[] = {1, (uint32_t)size, (uint32_t)size,
                               (uint32_t)packed};
-    for (int i = 0; i < 16; i++) {
+    for (int i = 0; i < 16; i++)
         head[i] = (char)(words[i / 4] >> (8 * (i % 4)));
-    }
     static const char end[] = "</AppendedData></VTKFile>";
     memcpy(head + 16 + packed, end, sizeof end - 1);
     *bytes = (size_t)n + 16 + packed + sizeof end - 1;

@@ -64,9 +64,8 @@ static void numbers_are_correctly_rounded(void **unused) {
         assert_int_equal(
             host_points_parse("a.xyz", b->data, b->n, &points, &error), 0);
         if (points.xyz[0] != expected ||
-            signbit(points.xyz[0]) != signbit(expected)) {
+            signbit(points.xyz[0]) != signbit(expected))
             fail_msg("%s: %.17g, not %.17g", text, points.xyz[0], expected);
-        }
         host_points_free(&points);
     }
     free(b);
@@ -321,9 +320,8 @@ static void binary_is_no_text(void **unused) {
         assert_int_equal(host_points_parse(files[i].path, files[i].bytes,
                                            files[i].n, &points, &error),
                          HOST_INPUT);
-        if (strstr(error.text, files[i].where) == NULL) {
+        if (strstr(error.text, files[i].where) == NULL)
             fail_msg("%s, not %s", error.text, files[i].where);
-        }
     }
 }
 

@@ -90,15 +90,13 @@ static void written_and_read_back(void **unused) {
             in_folder(&folder, names[i], path);
             assert_int_equal(host_write_probe(path, NULL, &error), 0);
             write_whole(path, &points, &tets);
-            if (host_tetrahedra_read(path, &again, &read, &error) != 0) {
+            if (host_tetrahedra_read(path, &again, &read, &error) != 0)
                 fail_msg("%s", error.text);
-            }
             assert_int_equal(again.count, tets.count);
             assert_memory_equal(again.v, tets.v, 16 * tets.count);
             assert_int_equal(read.count, i < 4 ? 200 : 0);
-            if (i < 4) {
+            if (i < 4)
                 assert_memory_equal(read.xyz, points.xyz, 24 * 200);
-            }
             host_tetrahedra_free(&again);
             host_points_free(&read);
         }
@@ -235,9 +233,8 @@ static void refused(const char *path, const char *text, const char *expected) {
     assert_int_equal(
         host_tetrahedra_parse(path, text, strlen(text), &tets, NULL, &error),
         HOST_INPUT);
-    if (strstr(error.text, expected) == NULL) {
+    if (strstr(error.text, expected) == NULL)
         fail_msg("expected '%s' in '%s'", expected, error.text);
-    }
     assert_non_null(strstr(error.text, "; "));
 }
 
@@ -328,9 +325,8 @@ static void other_writers_files(void **unused) {
         struct host_points points;
         struct host_error error = {0};
         if (host_tetrahedra_parse(files[i][0], files[i][1], strlen(files[i][1]),
-                                  &tets, &points, &error) != 0) {
+                                  &tets, &points, &error) != 0)
             fail_msg("%zu: %s", i, error.text);
-        }
         const uint32_t expected[8] = {0, 1, 2, 3, 1, 2, 3, 4};
         assert_int_equal(tets.count, 2);
         assert_memory_equal(tets.v, expected, sizeof expected);
@@ -405,14 +401,11 @@ static const char *printed(const char *path, const double *x, unsigned n,
 /* The digits of a number, but for those that only place its point. */
 static int significant(const char *number, char digits[64]) {
     int n = 0;
-    for (; *number != '\0' && *number != 'e'; number++) {
-        if (*number >= (n == 0 ? '1' : '0') && *number <= '9') {
+    for (; *number != '\0' && *number != 'e'; number++)
+        if (*number >= (n == 0 ? '1' : '0') && *number <= '9')
             digits[n++] = *number;
-        }
-    }
-    while (n > 0 && digits[n - 1] == '0') {
+    while (n > 0 && digits[n - 1] == '0')
         n--;
-    }
     digits[n] = '\0';
     return n;
 }
@@ -421,22 +414,19 @@ static int significant(const char *number, char digits[64]) {
  * nearer. */
 static void check_number(const char *number, double x) {
     char other[64], digits[64], others[64];
-    if (strtod(number, NULL) != x) {
+    if (strtod(number, NULL) != x)
         fail_msg("%s, and not %.17g", number, x);
-    }
     int n = significant(number, digits);
     assert_true(n <= 17);
     if (n > 1) {
         (void)snprintf(other, sizeof other, "%.*e", n - 2, x);
-        if (strtod(other, NULL) == x) {
+        if (strtod(other, NULL) == x)
             fail_msg("%s, where %s does", number, other);
-        }
     }
     (void)snprintf(other, sizeof other, "%.*e", n > 0 ? n - 1 : 0, x);
     (void)significant(other, others);
-    if (strtod(other, NULL) == x && strcmp(digits, others) != 0) {
+    if (strtod(other, NULL) == x && strcmp(digits, others) != 0)
         fail_msg("%s, where %s is nearer", number, other);
-    }
 }
 
 /* Of many sizes; some of few digits, some next to powers of two. */

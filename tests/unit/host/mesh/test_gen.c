@@ -20,9 +20,8 @@ static struct host_points made(const char *kind, uint64_t n, uint64_t seed) {
     struct host_error error = {0};
     assert_int_equal(host_gen(kind, n, seed, &points, &error), 0);
     assert_int_equal(points.count, n);
-    for (uint64_t i = 0; i < 3 * n; i++) {
+    for (uint64_t i = 0; i < 3 * n; i++)
         assert_true(isfinite(points.xyz[i]));
-    }
     return points;
 }
 
@@ -45,9 +44,8 @@ static void digests_are_known(void **unused) {
         sha256_init(&sha);
         sha256_update(&sha, 24 * points.count, (const uint8_t *)points.xyz);
         sha256_digest(&sha, sizeof sum, sum);
-        for (size_t k = 0; k < 8; k++) {
+        for (size_t k = 0; k < 8; k++)
             (void)snprintf(text + 2 * k, 3, "%02x", sum[k]);
-        }
         assert_string_equal(text, known[i][1]);
         assert_non_null(strstr(host_gen_kinds, known[i][0]));
         host_points_free(&points);
@@ -145,9 +143,8 @@ static void some_kinds_have_no_chance_in_them(void **unused) {
         struct host_points a = made(kinds[i].kind, 500, 1);
         struct host_points b = made(kinds[i].kind, 500, 2);
         int others = 0;
-        for (int k = 0; k < 1500; k++) {
+        for (int k = 0; k < 1500; k++)
             others += a.xyz[k] != b.xyz[k];
-        }
         assert_int_equal(others != 0, kinds[i].chance);
         host_points_free(&a);
         host_points_free(&b);

@@ -41,9 +41,8 @@ static int compare_rows(const void *a, const void *b, void *context) {
     for (int d = 0; d < 3; d++) {
         double x = xyz[3 * (size_t)*p + (size_t)d];
         double y = xyz[3 * (size_t)*q + (size_t)d];
-        if (x != y) {
+        if (x != y)
             return x < y ? -1 : 1;
-        }
     }
     return *p < *q ? -1 : *p > *q;
 }
@@ -54,9 +53,8 @@ static uint8_t *lowest_rows(double *xyz, size_t n, size_t *distinct) {
     uint8_t *lowest = calloc(n, 1);
     assert_non_null(rows);
     assert_non_null(lowest);
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++)
         rows[i] = (uint32_t)i;
-    }
     qsort_r(rows, n, sizeof *rows, compare_rows, xyz);
     *distinct = 0;
     for (size_t i = 0; i < n; i++) {
@@ -141,9 +139,8 @@ static void check_boxes(const struct host_order *order) {
             assert_int_equal(host_page(order, number, &page), 1568);
             incode_boxes_axes(&page.boxes, box_lo, box_hi);
             uint64_t width = 1;
-            for (uint32_t k = 1; k < l; k++) {
+            for (uint32_t k = 1; k < l; k++)
                 width *= INCODE_FANOUT;
-            }
             double lo[3] = {INFINITY, INFINITY, INFINITY};
             double hi[3] = {-INFINITY, -INFINITY, -INFINITY};
             for (uint64_t b = c * width;
@@ -255,9 +252,8 @@ static void bricks_are_compact(void **unused) {
         const struct incode_boxes *b = &order.boxes[c / INCODE_FANOUT];
         uint32_t i = c % INCODE_FANOUT;
         double e[3];
-        for (int d = 0; d < 3; d++) {
+        for (int d = 0; d < 3; d++)
             e[d] = b->unit * (double)(b->hi[d][i] - b->lo[d][i]);
-        }
         surface += 2 * (e[0] * e[1] + e[1] * e[2] + e[2] * e[0]);
     }
     for (uint32_t c = 0; c < order.tree.count[1]; c++) {

@@ -68,16 +68,13 @@ static void run(uint32_t blocks_memory) {
     struct host_error error = {0};
     memset(&model, 0, sizeof model);
     assert_int_equal(host_spill_init(&spill, blocks_memory, &error), 0);
-    for (uint32_t round = 0; round < 3000; round++) {
-        if (draw(4) != 0) {
+    for (uint32_t round = 0; round < 3000; round++)
+        if (draw(4) != 0)
             put_some(&spill, &model, &error);
-        } else {
+        else
             take_some(&spill, &model, &error);
-        }
-    }
-    for (uint32_t round = 0; round < 3000; round++) {
+    for (uint32_t round = 0; round < 3000; round++)
         take_some(&spill, &model, &error);
-    }
     host_spill_free(&spill);
 }
 

@@ -47,11 +47,9 @@ static void key_of(const uint32_t v[4], uint32_t key[5]) {
 
 static int compare_keys(const void *p, const void *q) {
     const uint32_t *a = p, *b = q;
-    for (int i = 0; i < 5; i++) {
-        if (a[i] != b[i]) {
+    for (int i = 0; i < 5; i++)
+        if (a[i] != b[i])
             return a[i] < b[i] ? -1 : 1;
-        }
-    }
     return 0;
 }
 
@@ -84,9 +82,8 @@ static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd) {
             assert_true(v[0] == mine[0] && v[1] == mine[1]);
             /* of equal sets either orientation may come first */
             if ((i == 0 || memcmp(key[i], key[i - 1], 16) != 0) &&
-                (i + 1 == n || memcmp(key[i], key[i + 1], 16) != 0)) {
+                (i + 1 == n || memcmp(key[i], key[i + 1], 16) != 0))
                 assert_int_equal(mine[4], key[i][4]);
-            }
         }
     }
     host_tetrahedra_free(&tets);
@@ -110,12 +107,10 @@ static void every_permutation_keeps_its_sign(void **unused) {
         uint32_t v[4] = {(uint32_t)code & 3, (uint32_t)code >> 2 & 3,
                          (uint32_t)code >> 4 & 3, (uint32_t)code >> 6};
         bool used[4] = {false};
-        for (int i = 0; i < 4; i++) {
+        for (int i = 0; i < 4; i++)
             used[v[i]] = true;
-        }
-        if (!used[0] || !used[1] || !used[2] || !used[3]) {
+        if (!used[0] || !used[1] || !used[2] || !used[3])
             continue;
-        }
         struct host_tetrahedra tets = {0};
         uint32_t before[5];
         key_of(v, before);
@@ -148,9 +143,8 @@ static void mapping_and_cutting(void **unused) {
     (void)unused;
     struct host_tetrahedra tets = {0};
     const uint32_t map[5] = {50, 40, 30, 20, 10};
-    for (int i = 0; i < 1000; i++) {
+    for (int i = 0; i < 1000; i++)
         add(&tets, 0, 1, 2, 3 + (uint32_t)i % 2);
-    }
     host_tetrahedra_map(&tets, map);
     for (int i = 0; i < 1000; i++) {
         const uint32_t expected[4] = {50, 40, 30, i % 2 == 0 ? 20 : 10};

@@ -29,9 +29,8 @@ static void all_nodes_are_of_a_board(void **unused) {
     (void)unused;
     assert_int_equal(parse("dimension = 4; " M7 "links = (" HOST_WIRE ");"), 0);
     assert_string_equal(file.board->name, "mps2-an500");
-    for (unsigned i = 0; i < 16; i++) {
+    for (unsigned i = 0; i < 16; i++)
         assert_true(host_cube_is_bare(&file, i));
-    }
     assert_false(host_cube_is_bare(&file, CUBE_HOST));
     assert_int_equal(file.serial_baud, 115200);
     assert_string_equal(host_cube_link(&file)->name, "uart");
@@ -125,9 +124,8 @@ static void what_a_board_has_not(void **unused) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         assert_int_equal(parse(cases[i].text), HOST_INPUT);
         if (strstr(error.text, cases[i].said) == NULL ||
-            strstr(error.text, "; ") == NULL) {
+            strstr(error.text, "; ") == NULL)
             fail_msg("%s: %s", cases[i].text, error.text);
-        }
     }
 }
 

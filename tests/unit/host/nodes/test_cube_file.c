@@ -50,21 +50,17 @@ static const char *const good =
 
 static bool has(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
                 unsigned count, const char *name, const char *value) {
-    for (unsigned i = 0; i + 1 < count; i += 2) {
-        if (strcmp(options[i], name) == 0 &&
-            strcmp(options[i + 1], value) == 0) {
+    for (unsigned i = 0; i + 1 < count; i += 2)
+        if (strcmp(options[i], name) == 0 && strcmp(options[i + 1], value) == 0)
             return true;
-        }
-    }
     return false;
 }
 
 static bool named(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
                   unsigned count, const char *name) {
     bool found = false;
-    for (unsigned i = 0; i < count; i++) {
+    for (unsigned i = 0; i < count; i++)
         found = found || strcmp(options[i], name) == 0;
-    }
     return found;
 }
 
@@ -237,12 +233,10 @@ static void mistakes_are_named(void **unused) {
         int status = host_cube_file_read(&file, path, &error);
         if (status != mistakes[i].code ||
             (status != 0 && (strstr(error.text, where) == NULL ||
-                             strstr(error.text, mistakes[i].what) == NULL))) {
+                             strstr(error.text, mistakes[i].what) == NULL)))
             fail_msg("case %zu: exit %d: %s", i, status, error.text);
-        }
-        if (status == 0) {
+        if (status == 0)
             host_cube_file_free(&file);
-        }
     }
 }
 
@@ -303,9 +297,8 @@ static void other_types_are_no_values(void **unused) {
         snprintf(expected, sizeof expected, "%s%s", path, cases[i].what);
         if (host_cube_file_read(&file, path, &error) != HOST_INPUT ||
             strstr(error.text, expected) == NULL ||
-            strstr(error.text, "; ") == NULL) {
+            strstr(error.text, "; ") == NULL)
             fail_msg("%s: exit %d: %s", cases[i].new, error.code, error.text);
-        }
     }
 }
 
@@ -335,13 +328,11 @@ static void what_the_library_is_not_given(void **unused) {
         error = (struct host_error){0};
         assert_int_equal(
             host_cube_file_parse(&file, "a.cube", cases[i].text, &error), 3);
-        if (strstr(error.text, cases[i].said) == NULL) {
+        if (strstr(error.text, cases[i].said) == NULL)
             fail_msg("%s: %s", cases[i].text, error.text);
-        }
     }
-    for (int i = 0; i < 100; i++) {
+    for (int i = 0; i < 100; i++)
         snprintf(many + strlen(many), sizeof many - strlen(many), "a%d=1;", i);
-    }
     error = (struct host_error){0};
     assert_int_equal(host_cube_file_parse(&file, "a.cube", many, &error), 3);
     assert_non_null(strstr(error.text, ":1: more settings"));

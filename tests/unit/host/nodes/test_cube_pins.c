@@ -115,9 +115,8 @@ static void room_for_all(void **unused) {
 static void refuse(const char *text, const char *said) {
     assert_int_equal(parse(text), HOST_INPUT);
     if (strncmp(error.text, said, strlen(said)) != 0 ||
-        strstr(error.text, "; ") == NULL) {
+        strstr(error.text, "; ") == NULL)
         fail_msg("%s: %s", text, error.text);
-    }
 }
 
 static void what_is_wrong_with_a_chips(void **unused) {

@@ -67,9 +67,8 @@ static void a_long_record_is_cut(void **unused) {
     (void)unused;
     host_console_init(&console, 1, "board");
     memset(text, 'x', sizeof text - 1);
-    for (size_t i = 0; i < sizeof end - 1; i++) {
+    for (size_t i = 0; i < sizeof end - 1; i++)
         text[600 + i] = end[i];
-    }
     hear_record(&console, text);
     assert_int_equal(console.faults, 1);
     assert_int_equal(strlen(console.fault), 600);
@@ -100,9 +99,8 @@ static void a_pipe_stays_as_it_is(void **unused) {
         host_console_pipe(&console, (struct link_pipe){&at, take, bring});
     assert_int_equal(pipe.send(pipe.context, bytes, sizeof bytes),
                      sizeof bytes);
-    while ((n = pipe.receive(pipe.context, bytes, sizeof bytes)) > 0) {
+    while ((n = pipe.receive(pipe.context, bytes, sizeof bytes)) > 0)
         got += (size_t)n;
-    }
     assert_int_equal(got, sizeof "\0\377" REPORT);
     assert_int_equal(console.faults, 1);
 }

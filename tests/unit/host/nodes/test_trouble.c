@@ -51,9 +51,8 @@ static void none_where_none_is_wanted(void **unused) {
     unsigned node;
     struct host_troubled t = {.nodes = 2};
     (void)unused;
-    for (uint64_t now = 1; now < 20 * EVERY_US; now += EVERY_US) {
+    for (uint64_t now = 1; now < 20 * EVERY_US; now += EVERY_US)
         assert_false(host_trouble_due(&t, now, &kind, &node));
-    }
 }
 
 int main(void) {

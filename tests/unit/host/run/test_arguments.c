@@ -316,9 +316,8 @@ static void printed(const char *word, char *text, size_t size) {
     close(ends[1]);
     while (read(ends[0], &c, 1) == 1 && used + 1 < size) {
         bool blank = c == ' ' || c == '\n';
-        if (!blank || used == 0 || text[used - 1] != ' ') {
+        if (!blank || used == 0 || text[used - 1] != ' ')
             text[used++] = blank ? ' ' : c;
-        }
     }
     text[used] = '\0';
     close(ends[0]);

@@ -113,9 +113,8 @@ static void test_names(void **unused) {
     static struct host_run_result result;
     fill(&result);
     json_t *o = written(&result);
-    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
         assert_non_null(json_object_get(o, names[i]));
-    }
     assert_int_equal(json_integer_value(json_object_get(o, "points")), 100);
     assert_int_equal(json_integer_value(json_object_get(o, "distinct_points")),
                      99);
@@ -133,9 +132,8 @@ static void test_names(void **unused) {
     assert_int_equal(json_array_size(nodes), 4);
     for (size_t k = 0; k < 4; k++) {
         json_t *node = json_array_get(nodes, k);
-        for (size_t i = 0; i < sizeof node_names / sizeof node_names[0]; i++) {
+        for (size_t i = 0; i < sizeof node_names / sizeof node_names[0]; i++)
             assert_non_null(json_object_get(node, node_names[i]));
-        }
         static const char *const built_by[] = {"faces", "points", "both",
                                                "none"};
         assert_int_equal(
@@ -154,9 +152,8 @@ static bool documented(const char *table, const char *name) {
     for (const char *row = table; (row = strstr(row, "\n| `")) != NULL;) {
         const char *end = strstr(row + 3, " |");
         const char *at = strstr(++row, quoted);
-        if (at != NULL && at < end) {
+        if (at != NULL && at < end)
             return true;
-        }
     }
     return false;
 }

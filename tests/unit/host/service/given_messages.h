@@ -109,18 +109,14 @@ static inline int send(uint16_t source, uint8_t type, const void *data,
     /* A copy of the right size, so that a sanitizer sees reads past it. */
     uint8_t *copy = malloc(size + 1);
     assert_non_null(copy);
-    if (size > 0) {
+    if (size > 0)
         memcpy(copy, data, size);
-    }
-    if (type == NODE_RESULT && size >= 8 && source < NODES && !gap) {
+    if (type == NODE_RESULT && size >= 8 && source < NODES && !gap)
         memcpy(copy + 4, &service.node[source].received, 4);
-    }
-    if (type == NODE_UNSPILL_REQUEST && size >= 20 && source < NODES && !gap) {
+    if (type == NODE_UNSPILL_REQUEST && size >= 20 && source < NODES && !gap)
         memcpy(copy + 16, &service.node[source].received, 4);
-    }
-    if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap) {
+    if (type == NODE_FINISHED && size >= 16 && source < NODES && !gap)
         memcpy(copy + 8, &service.node[source].received, 4);
-    }
     struct cube_message message = {source, (uint16_t)size, type, copy};
     int status = host_handle(&service, &message, error);
     free(copy);

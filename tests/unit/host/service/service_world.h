@@ -83,9 +83,8 @@ static inline uint64_t time_of(double when) {
 static inline void cut(unsigned node, unsigned link, bool deaf) {
     struct host_sim_cube *cube = &world.sim.cube;
     unsigned wire = host_sim_cube_wire(cube, node, link);
-    for (unsigned side = 0; side < 2; side++) {
+    for (unsigned side = 0; side < 2; side++)
         host_sim_cube_deaf(cube, wire, side, deaf);
-    }
 }
 
 static inline void lacks(unsigned node, unsigned link) {
@@ -121,18 +120,16 @@ static inline void strike(void *context) {
     struct host_world *w = &world.sim;
     (void)context;
     if (world.sick && w->node[0].state == HOST_WORLD_UP &&
-        node_held(w->node[0].node) > 0) {
+        node_held(w->node[0].node) > 0)
         host_world_crash(w, 0, 0, false);
-    }
     w->strike_us = world.sick ? w->now_us + SICK_US : UINT64_MAX;
     for (unsigned i = 0; i < EVENTS; i++) {
         struct event *event = &world.events[i];
         uint64_t time_us = time_of(event->when);
-        if (event->what != NOTHING && time_us <= w->now_us) {
+        if (event->what != NOTHING && time_us <= w->now_us)
             happen(event);
-        } else if (event->what != NOTHING && time_us < w->strike_us) {
+        else if (event->what != NOTHING && time_us < w->strike_us)
             w->strike_us = time_us;
-        }
     }
 }
 
@@ -154,12 +151,10 @@ static inline void start_world(void) {
         .strike = strike,
     };
     struct host_error error = {0};
-    if (host_world_open(&world.sim, &options, &error) != 0) {
+    if (host_world_open(&world.sim, &options, &error) != 0)
         fail_msg("%s", error.text);
-    }
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         host_world_late(&world.sim, i, draw(50));
-    }
     world.sim.strike_us = 0;
 }
 
@@ -191,11 +186,9 @@ static inline void machine_told(void *context, const char *line) {
 
 /* When the user was told so first; UINT64_MAX: never. */
 static inline uint64_t told_us(const char *text) {
-    for (unsigned i = 0; i < world.told_count; i++) {
-        if (strstr(world.told[i].line, text) != NULL) {
+    for (unsigned i = 0; i < world.told_count; i++)
+        if (strstr(world.told[i].line, text) != NULL)
             return world.told[i].us;
-        }
-    }
     return UINT64_MAX;
 }
 
@@ -226,9 +219,8 @@ static inline struct host_machine make_machine(void) {
     machine.ended = machine_ended;
     machine.onlookers = world.onlookers;
     machine.starved_us = world.starved_us;
-    if (world.starved_us != NULL) {
+    if (world.starved_us != NULL)
         machine.restarts = machine_restarts;
-    }
     return machine;
 }
 
@@ -263,9 +255,8 @@ static inline int run(const struct host_strategy *strategy,
         host_digest(&tets, digest);
     }
     host_tetrahedra_free(&tets);
-    if (world.host_fails == 0.0) {
+    if (world.host_fails == 0.0)
         end_world();
-    }
     return status;
 }
 
@@ -273,9 +264,8 @@ static inline void survives(const struct host_strategy *strategy) {
     struct host_digest digest;
     struct host_error error;
     start_world();
-    if (run(strategy, &digest, &error) != 0) {
+    if (run(strategy, &digest, &error) != 0)
         fail_msg("%s", error.text);
-    }
     assert_string_equal(digest.text, expected.text);
     assert_true(result.built >= result.tetrahedra);
     assert_true(result.make_tetra_calls >= result.tetrahedra);
@@ -306,21 +296,18 @@ static inline int end_runs(void **unused) {
 static inline void fails_with(const char *text) {
     struct host_digest digest;
     struct host_error error;
-    if (run(&host_spatial, &digest, &error) != HOST_CUBE) {
+    if (run(&host_spatial, &digest, &error) != HOST_CUBE)
         fail_msg("not an error of the cube: %s", error.text);
-    }
-    if (strstr(error.text, text) == NULL) {
+    if (strstr(error.text, text) == NULL)
         fail_msg("no '%s' in: %s", text, error.text);
-    }
     assert_non_null(strchr(error.text, ';'));
 }
 
 static inline void survives_as(const struct host_strategy *strategy) {
     struct host_digest digest;
     struct host_error error;
-    if (run(strategy, &digest, &error) != 0) {
+    if (run(strategy, &digest, &error) != 0)
         fail_msg("%s", error.text);
-    }
     assert_string_equal(digest.text, expected.text);
 }
 

@@ -34,11 +34,9 @@ static void triangulate(const struct host_points *points) {
     assert_non_null(vertex);
     assert_int_equal(host_delaunay(points->xyz, points->count, &truth, &error),
                      0);
-    for (uint32_t v = 0; v < order.bricks * INCODE_BRICK_POINTS; v++) {
-        if (order.row[v] != INCODE_NONE) {
+    for (uint32_t v = 0; v < order.bricks * INCODE_BRICK_POINTS; v++)
+        if (order.row[v] != INCODE_NONE)
             vertex[order.row[v]] = v;
-        }
-    }
     host_tetrahedra_map(&truth, vertex);
     free(vertex);
 }
@@ -60,9 +58,8 @@ static int tear_down_truth(void **unused) {
 
 static unsigned node_of(uint32_t brick) {
     unsigned node = 0;
-    while (brick >= order.region[node].last) {
+    while (brick >= order.region[node].last)
         node++;
-    }
     return node;
 }
 
@@ -76,9 +73,8 @@ static bool has(const uint32_t t[4], uint32_t v) {
 
 static bool is_of(unsigned node, const uint32_t t[4]) {
     bool is = true;
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 4; k++)
         is = is && node_of(t[k] / INCODE_BRICK_POINTS) == node;
-    }
     return is;
 }
 
@@ -93,9 +89,8 @@ static int64_t inside(unsigned node) {
                 has(u, t[0]) || has(u, t[1]) || has(u, t[2]) || has(u, t[3]);
             is = !near || is_of(node, u);
         }
-        if (is) {
+        if (is)
             return (int64_t)i;
-        }
     }
     fail_msg("no tetrahedron lies inside region %u", node);
     return NO_TET;
@@ -110,9 +105,8 @@ static void exchange(uint32_t t[4]) {
             uint32_t u[4] = {t[0], t[1], t[2], t[3]};
             double p[4][3];
             u[k] = v + i;
-            for (int n = 0; n < 4; n++) {
+            for (int n = 0; n < 4; n++)
                 host_vertex(&order, u[n], p[n]);
-            }
             if (!has(t, u[k]) && owner_of(u) == brick &&
                 incode_orient3d(&tally, p[0], p[1], p[2], p[3]) > 0) {
                 memcpy(t, u, sizeof u);
@@ -128,9 +122,8 @@ static void put(unsigned node, int64_t i) {
     uint32_t(*v)[4] = host_tetrahedra_room(&tets, 1, &error);
     assert_non_null(v);
     memcpy(*v, truth.v[i], sizeof *v);
-    if (i == given.exchanged) {
+    if (i == given.exchanged)
         exchange(*v);
-    }
     host_tetrahedra_keep(&tets, 1);
     assert_int_equal(host_ledger_found(&service.ledger,
                                        i == given.helped ? given.helper : node,
@@ -147,19 +140,15 @@ static void work(unsigned node, uint32_t first, uint32_t last) {
         uint32_t brick = owner_of(truth.v[i]);
         if (brick < first || brick >= last || (int64_t)i == given.left_out ||
             host_ledger_committed(&service.ledger, brick) ||
-            given.bare == ALL || has(truth.v[i], given.bare)) {
+            given.bare == ALL || has(truth.v[i], given.bare))
             continue;
-        }
         put(node, (int64_t)i);
-        if ((int64_t)i == given.twice) {
+        if ((int64_t)i == given.twice)
             put(node, (int64_t)i);
-        }
     }
-    for (uint32_t b = first; b < last; b++) {
-        if (!host_ledger_committed(&service.ledger, b)) {
+    for (uint32_t b = first; b < last; b++)
+        if (!host_ledger_committed(&service.ledger, b))
             assert_int_equal(host_ledger_commit(&service.ledger, node, b), 0);
-        }
-    }
 }
 
 static void work_all(void) {
@@ -167,11 +156,9 @@ static void work_all(void) {
         work(given.only, 0, order.bricks);
         return;
     }
-    for (unsigned n = 0; n < NODES; n++) {
-        if (order.region[n].first < order.region[n].last) {
+    for (unsigned n = 0; n < NODES; n++)
+        if (order.region[n].first < order.region[n].last)
             work(n, order.region[n].first, order.region[n].last);
-        }
-    }
 }
 
 /* Nothing is wrong yet. */
@@ -205,17 +192,15 @@ static void fails(void) {
     assert_true(service.ledger.alone);
     assert_true(service.loss);
     assert_true(service.audit.lost_work);
-    for (unsigned n = 0; n < NODES; n++) {
+    for (unsigned n = 0; n < NODES; n++)
         assert_int_equal(service.ledger.job[n].epoch, 0);
-    }
 }
 
 static void passes(void) {
     bool passed;
     struct host_error error = {0};
-    if (host_audit_step(&service, &passed, &error) != 0) {
+    if (host_audit_step(&service, &passed, &error) != 0)
         fail_msg("%s", error.text);
-    }
     assert_true(passed);
     assert_int_equal(service.audit.state, HOST_AUDIT_PASSED);
 }
@@ -226,9 +211,8 @@ static struct host_error gives_up(const char *text) {
     assert_int_equal(host_audit_step(&service, &passed, &error),
                      HOST_UNVERIFIED);
     assert_false(passed);
-    if (strncmp(error.text, text, strlen(text)) != 0) {
+    if (strncmp(error.text, text, strlen(text)) != 0)
         fail_msg("%s: not %s", error.text, text);
-    }
     assert_non_null(strstr(error.text, "; "));
     return error;
 }
@@ -243,9 +227,8 @@ static void excluded_is(unsigned node) {
 }
 
 static void said_is(const char *text) {
-    if (strstr(said, text) == NULL) {
+    if (strstr(said, text) == NULL)
         fail_msg("%s: not %s", said, text);
-    }
     assert_non_null(strstr(said, "; "));
 }
 
@@ -303,12 +286,10 @@ static void test_together(void **unused) {
                          "node 1; the bricks concerned are done again"
                        : "the check of the result failed; the bricks concerned "
                          "are done again");
-        for (uint32_t b = 0; b < order.bricks; b++) {
+        for (uint32_t b = 0; b < order.bricks; b++)
             assert_true(node_of(b) == 1 || !is_open(b));
-        }
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             assert_true(is_open(truth.v[at][k] / INCODE_BRICK_POINTS));
-        }
         *faults[i] = NO_TET;
         given.alone = ~0u;
         host_redo.lose(&service.work);
@@ -338,9 +319,8 @@ static void test_no_tetrahedra(void **unused) {
         given.alone = i == 1 ? 0 : ~0u;
         given.bare = ALL;
         work_all();
-        if (i == 2) {
+        if (i == 2)
             service.ledger.by[1] = HOST_LEDGER_ALONE | 2;
-        }
         fails();
         excluded_is(i == 0 ? 1 : NOBODY);
         said_is(i == 0 ? "node 1 link 0: its result is wrong: it left out all "
@@ -394,9 +374,8 @@ static void test_far_point(void **unused) {
 /* A tetrahedron of that node's region is wrong. */
 static void spoil(unsigned node) {
     uint64_t i = 0;
-    while (i < tets.count && !is_of(node, tets.v[i])) {
+    while (i < tets.count && !is_of(node, tets.v[i]))
         i++;
-    }
     assert_true(i < tets.count);
     exchange(tets.v[i]);
 }
@@ -413,9 +392,8 @@ static void test_unclear(void **unused) {
     fails();
     assert_int_equal(service.audit.unclear, 1);
     assert_true(service.ledger.committed > 0);
-    for (uint32_t b = 0; b < order.bricks; b++) {
+    for (uint32_t b = 0; b < order.bricks; b++)
         again[b] = is_open(b);
-    }
     given.alone = 1 << 0 | 1 << 1;
     host_redo.lose(&service.work);
     work_all();
@@ -529,9 +507,8 @@ static void lost_is_exact(enum host_verifying verifying, bool during) {
     service.verifying = verifying;
     work_all();
     loses = during;
-    if (!during) {
+    if (!during)
         assert_int_equal(host_generation_renew(&service, 0, &error), 0);
-    }
     if (during && exact) {
         assert_int_equal(host_audit_step(&service, &passed, &error), 0);
         assert_false(passed);

@@ -109,9 +109,8 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
 static void a_busy_machine_is_no_reason(void **unused) {
     uint64_t slow[NODES];
     (void)unused;
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         slow[i] = 900000 + 30000 * i;
-    }
     pass(10 * SECOND, slow);
     for (unsigned i = 1; i < NODES; i++) {
         uint64_t usual = slow[i];
@@ -120,9 +119,8 @@ static void a_busy_machine_is_no_reason(void **unused) {
         slow[i] = usual;
         pass(now_us + 4 * SECOND, slow);
     }
-    if (told_us != 0) {
+    if (told_us != 0)
         fail_msg("%s", told);
-    }
 }
 
 /* One that answers no more is found among quick ones in no time, and among slow
@@ -133,9 +131,8 @@ static void one_that_stands_still_is_named(void **unused) {
             uint64_t after_us[NODES];
             char start[40];
             (void)set_up(unused);
-            for (unsigned k = 0; k < NODES; k++) {
+            for (unsigned k = 0; k < NODES; k++)
                 after_us[k] = busy == 0 ? 60000 : 900000 + 30000 * k;
-            }
             pass(10 * SECOND, after_us);
             assert_int_equal(told_us, 0);
             uint64_t silent_since_us = now_us - node[i].silent_us;

@@ -53,9 +53,8 @@ static void idle(void *context, uint64_t wait_us) {
     node.now_us += wait_us < 1000 ? wait_us + 1 : 1000;
     link_poll(node.link, node.now_us);
     if (link_take_datagram(node.link, &datagram, &ask) &&
-        wiring_unpack(&wiring, datagram.data, datagram.size, 0)) {
+        wiring_unpack(&wiring, datagram.data, datagram.size, 0))
         node.heard = wiring.generation;
-    }
     if (node.now_us >= node.next_us) {
         node.next_us = node.now_us + 50000;
         tell();
@@ -136,9 +135,8 @@ static void ends_soon(void) {
     struct host_error error = meet();
     assert_int_equal(error.code, HOST_CUBE);
     assert_non_null(strstr(error.text, "node 0 link 0: "));
-    if (strstr(error.text, "; restart the nodes") == NULL) {
+    if (strstr(error.text, "; restart the nodes") == NULL)
         fail_msg("%s", error.text);
-    }
     assert_true(node.now_us < 2000000);
 }
 

@@ -20,13 +20,11 @@ static void test_any_bytes(void **unused) {
             uint8_t data[CUBE_PAYLOAD_MAX];
             uint32_t size = draw(draw(4) == 0 ? CUBE_PAYLOAD_MAX : 40);
             struct host_error error = {0};
-            for (uint32_t i = 0; i < size; i++) {
+            for (uint32_t i = 0; i < size; i++)
                 data[i] = (uint8_t)(draw(2) == 0 ? 0 : draw(256));
-            }
             uint32_t epoch = 1 + draw(NODES);
-            if (size >= 4 && draw(2) == 0) {
+            if (size >= 4 && draw(2) == 0)
                 memcpy(data, &epoch, 4);
-            }
             uint8_t type =
                 (uint8_t)(draw(8) == 0 ? draw(256) : NODE_READY + draw(8));
             if (send((uint16_t)draw(NODES + 1), type, data, size, &error) !=
@@ -37,11 +35,9 @@ static void test_any_bytes(void **unused) {
                 break;
             }
         }
-        for (uint64_t i = 0; i < tets.count; i++) {
-            for (int k = 0; k < 4; k++) {
+        for (uint64_t i = 0; i < tets.count; i++)
+            for (int k = 0; k < 4; k++)
                 assert_true(tets.v[i][k] < 64 * order.bricks);
-            }
-        }
         end();
     }
 }
@@ -384,15 +380,13 @@ static void test_wrong_pages(void **unused) {
         bool doubted = reports[i].wrong.sender != CUBE_HOST;
         begin();
         service.work.living = NODES;
-        if (reports[i].alone) {
+        if (reports[i].alone)
             host_audit_alone(&service);
-        }
         assert_int_equal(send(3, NODE_WRONG_PAGE, &reports[i].wrong,
                               sizeof reports[i].wrong, &error),
                          0);
-        if (strncmp(said, reports[i].text, strlen(reports[i].text)) != 0) {
+        if (strncmp(said, reports[i].text, strlen(reports[i].text)) != 0)
             fail_msg("%s: not %s", said, reports[i].text);
-        }
         for (unsigned n = 0; n < NODES; n++) {
             assert_int_equal(service.node[n].aside,
                              n == 3 && (!doubted || reports[i].alone));
@@ -463,9 +457,8 @@ static void test_texts(void **unused) {
         assert_int_equal(
             send(3, wrong[i].type, wrong[i].data, wrong[i].size, &error),
             HOST_CUBE);
-        if (strstr(error.text, wrong[i].text) == NULL) {
+        if (strstr(error.text, wrong[i].text) == NULL)
             fail_msg("%s: not %s", error.text, wrong[i].text);
-        }
         end();
     }
 }

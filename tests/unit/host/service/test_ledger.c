@@ -72,9 +72,8 @@ static void fill(struct host_tetrahedra *tets) {
     for (uint32_t v = 0; v + 3 < 512; v++) {
         uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, &error);
         assert_non_null(row);
-        for (uint32_t k = 0; k < 4; k++) {
+        for (uint32_t k = 0; k < 4; k++)
             (*row)[k] = v + (k + v) % 4;
-        }
         host_tetrahedra_keep(tets, 1);
     }
 }
@@ -98,9 +97,8 @@ static void test_abandon(void **unused) {
         assert_int_equal(host_ledger_found(&ledger, 7, 0, &error), 0);
     }
     assert_int_equal(ledger.runs, 6);
-    for (uint64_t i = 0; i < tets.count; i++) {
+    for (uint64_t i = 0; i < tets.count; i++)
         assert_int_equal(host_ledger_finder(&ledger, i), i / 100 % 2);
-    }
     assert_int_equal(host_ledger_commit(&ledger, 0, 1), 0);
     assert_int_equal(host_ledger_commit(&ledger, 1, 6), 0);
     assert_int_equal(host_ledger_abandon(&ledger, 4, &order, &tets), 509 - 128);
@@ -167,9 +165,8 @@ static void test_ranges(void **unused) {
             uint32_t again = host_ledger_open(&ledger, 0, first, last);
             assert_true(again > epoch);
             epoch = again;
-            while (first < last) {
+            while (first < last)
                 assert_int_equal(host_ledger_commit(&ledger, 0, first++), 0);
-            }
             assert_int_equal(host_ledger_finish(&ledger, 0), 0);
         }
         assert_string_equal(ranges, cases[i].ranges);

@@ -44,9 +44,8 @@ static void begin(uint64_t memory, uint64_t tetrahedra) {
 }
 
 static void send(uint64_t pages) {
-    while (pages-- > 0) {
+    while (pages-- > 0)
         host_paging_sent(&service);
-    }
 }
 
 static void test_told_once(void **unused) {

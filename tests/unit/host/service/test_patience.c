@@ -40,9 +40,8 @@ static void test_idle(void **unused) {
             world.patience_s = patiences[k];
             world.events[0] = (struct event){IDLE, 0.4, i, 0};
             survives(k % 2 == 0 ? &host_spatial : &host_sequential);
-            if (k % 2 == 1 && i > 0) {
+            if (k % 2 == 1 && i > 0)
                 continue; /* it may have no work, as an undisturbed holder */
-            }
             snprintf(text, sizeof text,
                      "node %u link %u: answers, but has done nothing for %u s",
                      i, i == 0 ? (unsigned)DIMENSION : 2u,
@@ -92,14 +91,12 @@ static void test_idle_in_each_strategy(void **unused) {
         struct host_error error = {0};
         bool builds = row == &host_master_slaves || row == &host_linda;
         if (host_strategy_check(row, NODES, &usual, INCODE_FACE_OWN,
-                                INCODE_BUILD_AUTO, &error) != 0) {
+                                INCODE_BUILD_AUTO, &error) != 0)
             continue;
-        }
         for (unsigned i = 0; i < NODES; i++) {
             idles_in(row, i, 0);
-            if (builds) {
+            if (builds)
                 idles_in(row, i, 3);
-            }
         }
     }
 }
@@ -108,9 +105,8 @@ static void test_idle_in_each_strategy(void **unused) {
  */
 
 static void cut_off(unsigned node) {
-    for (unsigned d = 0; d < DIMENSION; d++) {
+    for (unsigned d = 0; d < DIMENSION; d++)
         world.events[d] = (struct event){CUT, 0.4, node, d};
-    }
 }
 
 /* One that is killed, stopped or cut off is named within two seconds, and
@@ -211,9 +207,8 @@ static void test_never_started(void **unused) {
             snprintf(text, sizeof text, "node %u: no answer, %s", i,
                      i == 0 ? "and the other 7 are behind it; "
                             : "7 of 8 are there; ");
-            if (patiences[k] > 1) {
+            if (patiences[k] > 1)
                 told_at(text, 1500000);
-            }
         }
     }
 }
@@ -274,9 +269,8 @@ static void test_late(void **unused) {
 static void test_all_idle(void **unused) {
     (void)unused;
     prepare();
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         world.events[i] = (struct event){IDLE, 0.4, i, 0};
-    }
     start_world();
     fails_with("no node is left to work");
     unsigned others = 0, nobody = 0;

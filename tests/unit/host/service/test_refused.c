@@ -20,14 +20,12 @@ static void refuses_message(uint8_t type, const void *data, size_t size,
         begin();
         machine.kill = anew > 0 ? ends_node : NULL;
         service.node[1].started_anew = anew >= 2;
-        for (unsigned i = 0; anew == 3 && i < NODES; i++) {
+        for (unsigned i = 0; anew == 3 && i < NODES; i++)
             service.node[i].aside = i != 1;
-        }
         assert_int_equal(send(1, type, data, size, &error),
                          anew == 3 ? HOST_UNVERIFIED : 0);
-        if (strstr(anew == 3 ? error.text : said, text) == NULL) {
+        if (strstr(anew == 3 ? error.text : said, text) == NULL)
             fail_msg("no '%s' in: %s %s", text, said, error.text);
-        }
         assert_int_equal(strstr(error.text, "no other node is left") != NULL,
                          anew == 3);
         assert_int_equal(strstr(said, "it is excluded") != NULL,
@@ -56,9 +54,8 @@ static void test_refused_results(void **unused) {
     uint32_t first = order.region[1].first, v = first * INCODE_BRICK_POINTS;
     uint32_t loose = first, last = order.bricks - 1;
     char text[80];
-    while (order.fill[loose] == INCODE_BRICK_POINTS) {
+    while (order.fill[loose] == INCODE_BRICK_POINTS)
         assert_true(++loose < order.region[1].last);
-    }
     uint32_t padding = loose * INCODE_BRICK_POINTS + order.fill[loose];
     snprintf(text, sizeof text, "a result with vertex %u, which is no point",
              padding);
@@ -103,9 +100,8 @@ static void test_spilled(void **unused) {
     uint32_t v = order.region[1].first * INCODE_BRICK_POINTS;
     uint32_t after = order.bricks * INCODE_BRICK_POINTS, padding = 0;
     while (padding % INCODE_BRICK_POINTS <
-           order.fill[padding / INCODE_BRICK_POINTS]) {
+           order.fill[padding / INCODE_BRICK_POINTS])
         padding++;
-    }
     const struct incode_face good[] = {
         {{v, v + 1, 0}}, {{0, 1, v}}, {{v + 1, INCODE_NONE, INCODE_NONE}}};
     const struct incode_face bad[] = {
@@ -156,9 +152,8 @@ static void floods(uint8_t type, const void *data, size_t size,
         sent++;
     }
     assert_true(sent < 1000000);
-    if (strstr(said, text) == NULL) {
+    if (strstr(said, text) == NULL)
         fail_msg("no '%s' in: %s", text, said);
-    }
     assert_true(service.node[1].aside);
     assert_true(tets.count <= 4097 + 1024 * bricks);
     assert_true(service.spill.faces <= 65538 + 1024 * bricks);

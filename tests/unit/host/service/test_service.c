@@ -27,20 +27,17 @@ static void test_restarts(void **unused) {
         survives_restart(i, 0.1 * (i + 1), &host_sequential);
     }
     prepare();
-    for (unsigned k = 0; k < EVENTS; k++) {
+    for (unsigned k = 0; k < EVENTS; k++)
         world.events[k] = (struct event){RESTART, 0.3 * k, k * 5 % NODES, 0};
-    }
     survives(&host_spatial);
 }
 
 /* While the pages go to all, those behind the gap must blame nobody. */
 static void test_restarts_at_first(void **unused) {
     (void)unused;
-    for (unsigned when = 1; when <= 15; when++) {
-        for (unsigned node = 0; node < 4; node++) {
+    for (unsigned when = 1; when <= 15; when++)
+        for (unsigned node = 0; node < 4; node++)
             survives_restart(node, 0.004 * when, &host_exchange);
-        }
-    }
 }
 
 /* Any mixture of them; SERVICE_ROUNDS for more than a few. */
@@ -123,9 +120,8 @@ static void test_for_ever(void **unused) {
     start_world();
     world.sick = true;
     assert_int_equal(run(&host_sequential, &digest, &error), HOST_CUBE);
-    if (strstr(error.text, "node 0 link 3: ") == NULL) {
+    if (strstr(error.text, "node 0 link 3: ") == NULL)
         fail_msg("%s", error.text);
-    }
 }
 
 /* Nodes that were left in the midst of a run serve the next host. */
@@ -144,9 +140,8 @@ static void test_next_host(void **unused) {
         }
         assert_string_equal(error.text, "the host fails; as it should");
         world.host_fails = 0.0;
-        if (run(&host_spatial, &digest, &error) != 0) {
+        if (run(&host_spatial, &digest, &error) != 0)
             fail_msg("%s", error.text);
-        }
         assert_string_equal(digest.text, expected.text);
     }
 }

@@ -36,9 +36,8 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
                size_t size) {
     assert_int_equal(dest, CUBE_HOST);
     assert_true(size <= CUBE_PAYLOAD_MAX);
-    if (cube->room == 0) {
+    if (cube->room == 0)
         return CUBE_AGAIN;
-    }
     cube->room--;
     cube->count++;
     cube->type = type;
@@ -62,9 +61,8 @@ static void begin(enum host_lie way, uint32_t one_in) {
 static void row_of(uint32_t k, uint32_t i, uint32_t v[4]) {
     uint32_t base = 64 * k;
     v[0] = base + i / EACH;
-    for (uint32_t j = 1; j < 4; j++) {
+    for (uint32_t j = 1; j < 4; j++)
         v[j] = base + STARS + (3 * i + j) % 50;
-    }
 }
 
 /* Every fourth star has been found by another node. */
@@ -87,9 +85,8 @@ static size_t results(uint32_t k, uint8_t data[CUBE_PAYLOAD_MAX + 4]) {
         }
         assert_int_equal(node_result_finder(&writer, finder_of(star)), 1);
         assert_int_equal(node_result_star(&writer, v[0], apexes, EACH), EACH);
-        if (star % 2 == 1) {
+        if (star % 2 == 1)
             assert_int_equal(node_result_commit(&writer, k), 1);
-        }
     }
     return sizeof head + writer.size;
 }
@@ -112,9 +109,8 @@ static void read_back(const uint8_t *data, size_t size, uint32_t k,
         event = node_result_read(&reader, seen->row + seen->rows,
                                  2 * ROWS - seen->rows, &count);
         assert_int_not_equal(event, NODE_RESULT_GARBAGE);
-        for (; count > 0; count--) {
+        for (; count > 0; count--)
             seen->finder[seen->rows++] = reader.finder;
-        }
         if (event == NODE_RESULT_COMMIT) {
             assert_int_equal(reader.brick, k);
             seen->commits++;
@@ -204,9 +200,8 @@ static void what_does_not_fit_is_not_told(void **unused) {
     (void)unused;
     node_result_begin(&writer, data + head, CUBE_PAYLOAD_MAX - head, SELF);
     const uint32_t far[1][3] = {{1u << 30, 1u << 31, 3u << 30}};
-    while (node_result_star(&writer, v, far, 1) == 1) {
+    while (node_result_star(&writer, v, far, 1) == 1)
         v += 1u << 29;
-    }
     size_t size = head + writer.size;
     begin(HOST_LIE_REPEAT, 1);
     assert_int_equal(host_liar_alter(&liar, CUBE_HOST, NODE_RESULT, data, size),

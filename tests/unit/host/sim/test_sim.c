@@ -74,9 +74,8 @@ static struct host_sim_plan small_run(void) {
     plan.gather_us = 20;
     plan.step_us = 20;
     plan.host_us = 20;
-    for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+    for (int k = 0; k < HOST_SIM_FAULTS; k++)
         plan.wanted[k] = false;
-    }
     plan.weather = (struct sim_faults){{0}, 0, 0};
     return plan;
 }

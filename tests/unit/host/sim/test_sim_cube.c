@@ -71,9 +71,8 @@ static void every_wire_leads_where_it_should(void **unused) {
         for (unsigned i = 0; i < cube.nodes; i++) {
             assert_int_equal(host_sim_cube_links(&cube, i),
                              dimension + (i == 0));
-            for (unsigned d = 0; d < dimension; d++) {
+            for (unsigned d = 0; d < dimension; d++)
                 check_wire(&cube, i, d, i ^ 1u << d, d);
-            }
         }
         check_wire(&cube, 0, dimension, cube.nodes, 0);
         check_wire(&cube, cube.nodes, 0, 0, dimension);
@@ -88,9 +87,8 @@ static void a_host_may_have_more_wires(void **unused) {
     o.dimension = 3;
     o.host_ports = 4;
     open_cube(&cube, &o);
-    for (unsigned k = 0; k < 4; k++) {
+    for (unsigned k = 0; k < 4; k++)
         check_wire(&cube, 8, k, k, 3);
-    }
     host_sim_cube_close(&cube);
     o.host_ports = 0;
     o.spare_node = 6;
@@ -123,9 +121,8 @@ static void a_wire_breaks_as_often_as_it_is_mended(void **unused) {
         now_us += 100;
         assert_int_equal(get(&cube, 1, 1), 9);
         assert_int_equal(get(&cube, 3, 1), k < 2 ? -1 : 7);
-        if (k < 2) {
+        if (k < 2)
             host_sim_cube_deaf(&cube, wire, 0, false);
-        }
     }
     assert_int_equal(host_sim_cube_struck(&cube, SIM_CUT), 2);
     assert_int_equal(host_sim_cube_struck(&cube, SIM_DEAF), 2);
@@ -201,9 +198,8 @@ static void every_kind_of_fault_is_drawn(void **unused) {
     for (uint64_t seed = 1; seed <= 400; seed++) {
         struct host_sim_plan plan;
         host_sim_plan_draw(&plan, seed, 0);
-        for (int k = 0; k < HOST_SIM_FAULTS; k++) {
+        for (int k = 0; k < HOST_SIM_FAULTS; k++)
             wanted[k] += plan.wanted[k];
-        }
     }
     for (int k = 0; k < HOST_SIM_FAULTS; k++) {
         const struct host_sim_kind *kind = &host_sim_kinds[k];
@@ -211,9 +207,8 @@ static void every_kind_of_fault_is_drawn(void **unused) {
         assert_true(wanted[k] > 20);
         assert_false(kind->one_in > 0 && kind->draw != NULL);
         assert_true(kind->take_back == NULL || kind->happen != NULL);
-        for (int other = 0; other < k; other++) {
+        for (int other = 0; other < k; other++)
             assert_string_not_equal(kind->name, host_sim_kinds[other].name);
-        }
     }
 }
 

@@ -49,9 +49,8 @@ static inline void cut(struct host_tetrahedra *tets, uint64_t i) {
 /* The right ones again, in an order of chance. */
 static inline void restore(struct fixture *f) {
     host_tetrahedra_cut(&f->tets, 0);
-    for (uint64_t i = 0; i < f->right.count; i++) {
+    for (uint64_t i = 0; i < f->right.count; i++)
         append(&f->tets, f->right.v[i]);
-    }
     for (uint64_t i = f->tets.count; i > 1; i--) {
         uint32_t t[4], (*v)[4] = f->tets.v;
         uint64_t k = draw(f, i);
@@ -73,11 +72,9 @@ static inline void open_order(struct fixture *f) {
     f->named = calloc(f->sites.count, 1);
     assert_non_null(vertex);
     assert_non_null(f->named);
-    for (uint32_t v = 0; v < f->sites.count; v++) {
-        if (f->order.row[v] != INCODE_NONE) {
+    for (uint32_t v = 0; v < f->sites.count; v++)
+        if (f->order.row[v] != INCODE_NONE)
             vertex[f->order.row[v]] = v;
-        }
-    }
     reference_delaunay(f->points.xyz, (uint32_t)f->points.count, &f->right);
     host_tetrahedra_map(&f->right, vertex);
     free(vertex);
@@ -111,27 +108,22 @@ static inline void close_set(struct fixture *f) {
 static inline int orientation(const struct fixture *f, const uint32_t t[4]) {
     struct incode_tally tally = {0};
     double p[4][3];
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 4; k++)
         host_site(&f->sites, t[k], p[k]);
-    }
     return incode_orient3d(&tally, p[0], p[1], p[2], p[3]);
 }
 
 static inline bool is_one_of(const uint32_t *v, int n, uint32_t vertex) {
-    for (int i = 0; i < n; i++) {
-        if (v[i] == vertex) {
+    for (int i = 0; i < n; i++)
+        if (v[i] == vertex)
             return true;
-        }
-    }
     return false;
 }
 
 static inline bool is_row(const struct fixture *f, const uint32_t t[4]) {
-    for (int k = 0; k < 4; k++) {
-        if (t[k] >= f->sites.count || !host_site_is_vertex(&f->sites, t[k])) {
+    for (int k = 0; k < 4; k++)
+        if (t[k] >= f->sites.count || !host_site_is_vertex(&f->sites, t[k]))
             return false;
-        }
-    }
     return orientation(f, t) > 0;
 }
 
@@ -145,9 +137,8 @@ static inline void open_points(struct fixture *f, const double *xyz,
 
 static inline uint32_t vertex_of(const struct fixture *f, uint32_t row) {
     uint32_t v = 0;
-    while (f->order.row[v] != row) {
+    while (f->order.row[v] != row)
         v++;
-    }
     return v;
 }
 
@@ -171,18 +162,15 @@ static inline bool has_facet(const struct fixture *f, const uint32_t p[3]) {
     for (uint64_t i = 0; i < f->tets.count; i++) {
         const uint32_t *t = f->tets.v[i];
         if (!is_one_of(t, 4, p[0]) || !is_one_of(t, 4, p[1]) ||
-            !is_one_of(t, 4, p[2]) || !is_row(f, t)) {
+            !is_one_of(t, 4, p[2]) || !is_row(f, t))
             continue;
-        }
         for (uint32_t c = 0; c < 4; c++) {
             uint32_t q[3];
             host_facet_outward(t, c, q);
-            for (int k = 0; k < 3; k++) {
+            for (int k = 0; k < 3; k++)
                 if (p[0] == q[k] && p[1] == q[(k + 1) % 3] &&
-                    p[2] == q[(k + 2) % 3]) {
+                    p[2] == q[(k + 2) % 3])
                     return true;
-                }
-            }
         }
     }
     return false;
@@ -192,14 +180,11 @@ static inline void hear(void *context, const uint64_t *tets, int tet_count,
                         const uint32_t *vertices, int count, const char *what) {
     struct fixture *f = context;
     assert_non_null(what);
-    for (int i = 0; i < tet_count; i++) {
+    for (int i = 0; i < tet_count; i++)
         assert_true(tets[i] < f->tets.count);
-    }
-    for (int i = 0; i < count; i++) {
-        if (vertices[i] < f->sites.count) {
+    for (int i = 0; i < count; i++)
+        if (vertices[i] < f->sites.count)
             f->named[vertices[i]] = 1;
-        }
-    }
 }
 
 static inline int check(struct fixture *f, enum host_check_depth depth,

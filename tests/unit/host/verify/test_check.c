@@ -10,9 +10,8 @@
 static bool is_of_hull(const struct fixture *f, const uint32_t p[3]) {
     for (uint32_t v = 0; v < f->sites.count; v++) {
         const uint32_t t[4] = {p[0], p[1], p[2], v};
-        if (host_site_is_vertex(&f->sites, v) && orientation(f, t) > 0) {
+        if (host_site_is_vertex(&f->sites, v) && orientation(f, t) > 0)
             return false;
-        }
     }
     return true;
 }
@@ -22,18 +21,15 @@ static bool is_whole(const struct fixture *f, uint32_t v) {
     bool used = false;
     for (uint64_t i = 0; i < f->tets.count; i++) {
         const uint32_t *t = f->tets.v[i];
-        if (!is_row(f, t) ||
-            (t[0] != v && t[1] != v && t[2] != v && t[3] != v)) {
+        if (!is_row(f, t) || (t[0] != v && t[1] != v && t[2] != v && t[3] != v))
             continue;
-        }
         used = true;
         for (uint32_t c = 0; c < 4; c++) {
             uint32_t p[3];
             host_facet_outward(t, c, p);
             const uint32_t twin[3] = {p[0], p[2], p[1]};
-            if (t[c] != v && !has_facet(f, twin) && !is_of_hull(f, p)) {
+            if (t[c] != v && !has_facet(f, twin) && !is_of_hull(f, p))
                 return false;
-            }
         }
     }
     return used;
@@ -41,11 +37,9 @@ static bool is_whole(const struct fixture *f, uint32_t v) {
 
 /* What the interface promises of a tetrahedron that is missing. */
 static void expect_named(const struct fixture *f, const uint32_t t[4]) {
-    for (int k = 0; k < 4; k++) {
-        if (!f->named[t[k]] && !is_whole(f, t[k])) {
+    for (int k = 0; k < 4; k++)
+        if (!f->named[t[k]] && !is_whole(f, t[k]))
             fail_msg("vertex %u of a missing tetrahedron is not named", t[k]);
-        }
-    }
 }
 
 /* Both depths find a fault and name the place of what is missing. */
@@ -53,12 +47,10 @@ static void expect_found(struct fixture *f, const char *damage,
                          const uint32_t (*missing)[4], uint64_t count) {
     for (int depth = 0; depth < 2; depth++) {
         struct host_check_report r;
-        if (check(f, (enum host_check_depth)depth, &r) != HOST_UNVERIFIED) {
+        if (check(f, (enum host_check_depth)depth, &r) != HOST_UNVERIFIED)
             fail_msg("depth %d: not found: %s", depth, damage);
-        }
-        for (uint64_t i = 0; i < count; i++) {
+        for (uint64_t i = 0; i < count; i++)
             expect_named(f, missing[i]);
-        }
     }
     restore(f);
 }
@@ -87,9 +79,8 @@ static int kind_of(const struct fixture *f, const uint32_t t[4]) {
     for (uint32_t c = 0; c < 4; c++) {
         uint32_t p[3];
         host_facet_outward(t, c, p);
-        if (is_of_hull(f, p)) {
+        if (is_of_hull(f, p))
             return 0;
-        }
     }
     uint32_t brick = t[0] / INCODE_BRICK_POINTS;
     return t[1] / INCODE_BRICK_POINTS == brick &&
@@ -134,9 +125,8 @@ static void repeat(struct fixture *f, uint64_t i) {
 static void repeat_often(struct fixture *f, uint64_t i) {
     uint32_t t[4];
     memcpy(t, f->tets.v[i], sizeof t);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         append(&f->tets, t);
-    }
     expect_found(f, "four times", NULL, 0);
 }
 
@@ -153,9 +143,8 @@ static void exchange(struct fixture *f, uint64_t i) {
         uint32_t t[1][4], wrong = (uint32_t)draw(f, f->sites.count);
         memcpy(t, f->tets.v[i], sizeof t);
         if (wrong == t[0][0] || wrong == t[0][1] || wrong == t[0][2] ||
-            wrong == t[0][3]) {
+            wrong == t[0][3])
             continue;
-        }
         f->tets.v[i][k] = wrong;
         expect_found(f, "exchanged", (const uint32_t(*)[4])t, 1);
     }
@@ -166,9 +155,8 @@ static void invent(struct fixture *f, uint64_t i) {
     uint32_t t[4];
     (void)i;
     for (int tries = 0; tries < 100; tries++) {
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             t[k] = (uint32_t)draw(f, f->sites.count);
-        }
         if (is_row(f, t)) {
             append(&f->tets, t);
             expect_found(f, "invented", NULL, 0);
@@ -208,9 +196,8 @@ static void single(struct fixture *f) {
     void (*const damage[])(struct fixture *, uint64_t) = {
         drop,   repeat,       repeat_often, turn,
         invent, out_of_range, exchange,     unused_slot};
-    for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
+    for (size_t i = 0; i < sizeof damage / sizeof *damage; i++)
         at_each_place(f, damage[i]);
-    }
 }
 
 static void damage_is_found(void **unused) {
@@ -225,9 +212,8 @@ static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last) {
     for (uint64_t i = f->tets.count; i-- > 0;) {
         const uint32_t *t = f->tets.v[i];
         bool gone = false;
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             gone = gone || (t[k] >= first && t[k] < last);
-        }
         if (gone) {
             append(&missing, t);
             cut(&f->tets, i);
@@ -241,9 +227,8 @@ static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last) {
 }
 
 static void drop_bricks(struct fixture *f) {
-    for (uint32_t b = 0; b < f->order.bricks; b += 3) {
+    for (uint32_t b = 0; b < f->order.bricks; b += 3)
         drop_all_at(f, b * INCODE_BRICK_POINTS, (b + 1) * INCODE_BRICK_POINTS);
-    }
     for (uint32_t i = 0; i < 8; i++) {
         uint32_t v = (uint32_t)draw(f, f->sites.count);
         drop_all_at(f, v, v + 1);
@@ -286,9 +271,8 @@ static void missing_stars_are_found(void **unused) {
 
 /* All of it twice: every sum is twice what it was. */
 static void twice(struct fixture *f) {
-    for (uint64_t i = 0; i < f->right.count; i++) {
+    for (uint64_t i = 0; i < f->right.count; i++)
         append(&f->tets, f->right.v[i]);
-    }
     expect_found(f, "everything twice", NULL, 0);
 }
 
@@ -319,9 +303,8 @@ static void garbage_is_refused(void **unused) {
         host_tetrahedra_cut(&f.tets, 0);
         for (int i = 0; i < 1 + round % 100; i++) {
             uint32_t t[4];
-            for (int k = 0; k < 4; k++) {
+            for (int k = 0; k < 4; k++)
                 t[k] = (uint32_t)draw(&f, f.sites.count + 1);
-            }
             append(&f.tets, t);
         }
         assert_int_equal(check(&f, (enum host_check_depth)(round % 2), &r),
@@ -354,9 +337,8 @@ static void faults_are_bounded(void **unused) {
         assert_int_equal(heard, most);
         assert_true(r.faults > 100);
         int lines = 0;
-        for (const char *at = r.text; *at != 0; at++) {
+        for (const char *at = r.text; *at != 0; at++)
             lines += *at == '\n';
-        }
         assert_int_equal(lines, 8);
     }
     close_set(&f);

@@ -18,9 +18,8 @@ static void leave_out(struct fixture *f, const uint32_t vertex[120],
     map[row < next ? row : next] = vertex[next]; /* stands for both */
     host_tetrahedra_map(&tets, map);
     host_tetrahedra_cut(&f->tets, 0);
-    for (uint64_t i = 0; i < tets.count; i++) {
+    for (uint64_t i = 0; i < tets.count; i++)
         append(&f->tets, tets.v[i]);
-    }
     for (int depth = 0; depth < 2; depth++) {
         assert_int_equal(check(f, (enum host_check_depth)depth, &r),
                          HOST_UNVERIFIED);
@@ -35,14 +34,11 @@ static void a_left_out_point_is_found(void **unused) {
     struct fixture f;
     uint32_t vertex[120] = {0};
     open_set(&f, "uniform", 120, 5);
-    for (uint32_t v = 0; v < f.sites.count; v++) {
-        if (f.order.row[v] != INCODE_NONE) {
+    for (uint32_t v = 0; v < f.sites.count; v++)
+        if (f.order.row[v] != INCODE_NONE)
             vertex[f.order.row[v]] = v;
-        }
-    }
-    for (uint32_t row = 0; row < 120; row++) {
+    for (uint32_t row = 0; row < 120; row++)
         leave_out(&f, vertex, row);
-    }
     close_set(&f);
 }
 
@@ -85,16 +81,14 @@ static void flips(struct fixture *f) {
             struct host_check_report r;
             uint32_t gone[4];
             memcpy(gone, f->tets.v[i], sizeof gone);
-            if (!flip(f, i, j)) {
+            if (!flip(f, i, j))
                 continue;
-            }
             assert_int_equal(check(f, HOST_CHECK_TILING, &r), 0);
             assert_int_equal(check(f, HOST_CHECK_DELAUNAY, &r),
                              HOST_UNVERIFIED);
             assert_non_null(strstr(r.text, "are not Delaunay"));
-            for (int k = 0; k < 4; k++) {
+            for (int k = 0; k < 4; k++)
                 assert_true(f->named[gone[k]]);
-            }
             restore(f);
             break;
         }
@@ -116,23 +110,20 @@ static void a_body_twice_is_found(void **unused) {
     for (int tries = 0; tries < 200000 && bodies <= 20; tries++) {
         struct host_check_report r;
         uint32_t p[5];
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < 5; k++)
             p[k] = (uint32_t)draw(&f, f.sites.count);
-        }
         const uint32_t made[5][4] = {{p[0], p[1], p[2], p[3]},
                                      {p[0], p[2], p[1], p[4]},
                                      {p[0], p[1], p[4], p[3]},
                                      {p[1], p[2], p[4], p[3]},
                                      {p[2], p[0], p[4], p[3]}};
         bool all = true;
-        for (int k = 0; k < 5; k++) {
+        for (int k = 0; k < 5; k++)
             all = all && is_row(&f, made[k]);
-        }
         if (all) {
             bodies++;
-            for (int k = 0; k < 5; k++) {
+            for (int k = 0; k < 5; k++)
                 append(&f.tets, made[k]);
-            }
             assert_int_equal(check(&f, HOST_CHECK_TILING, &r), HOST_UNVERIFIED);
             assert_non_null(strstr(r.text, "has both its tetrahedra on one "
                                            "side"));
@@ -178,9 +169,8 @@ static void flat_ones_are_found(void **unused) {
             uint32_t p[3];
             host_facet_outward(f.right.v[i], c, p);
             const uint32_t other[3] = {p[0], p[2], p[1]};
-            if (!has_facet(&f, other)) { /* a facet of the hull */
+            if (!has_facet(&f, other)) /* a facet of the hull */
                 covered += cover(&f, p);
-            }
         }
     }
     assert_true(covered > 20);
@@ -257,9 +247,8 @@ static void false_vertices_count_once(void **unused) {
     struct host_check_report r[2];
     uint32_t free_slot = 0, alone;
     open_set(&f, "uniform", 300, 1);
-    while (host_site_is_vertex(&f.sites, free_slot)) {
+    while (host_site_is_vertex(&f.sites, free_slot))
         free_slot++;
-    }
     assert_in_range(free_slot, 1, f.sites.count - 1);
     alone = f.right.v[0][0];
     for (int run = 0; run < 2; run++) {
@@ -286,9 +275,8 @@ static void false_vertices_count_once(void **unused) {
 static bool is_on_box(const struct fixture *f, const uint32_t v[3]) {
     double p[3][3];
     bool on = false;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         host_site(&f->sites, v[k], p[k]);
-    }
     for (int d = 0; d < 3; d++) {
         on = on || (p[0][d] == p[1][d] && p[1][d] == p[2][d] &&
                     (p[0][d] <= f->order.lo[d] || p[0][d] >= f->order.hi[d]));

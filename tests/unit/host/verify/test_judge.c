@@ -9,20 +9,17 @@
 static bool inside(const struct fixture *f, const uint32_t t[4], uint32_t v) {
     struct incode_tally tally = {0};
     double p[5][3];
-    for (int k = 0; k < 4; k++) {
+    for (int k = 0; k < 4; k++)
         host_site(&f->sites, t[k], p[k]);
-    }
     host_site(&f->sites, v, p[4]);
     return incode_in_sphere(&tally, p[0], p[1], p[2], p[3], p[4]) > 0;
 }
 
 static bool is_delaunay(const struct fixture *f, const uint32_t t[4]) {
-    for (uint32_t v = 0; v < f->sites.count; v++) {
+    for (uint32_t v = 0; v < f->sites.count; v++)
         if (host_site_is_vertex(&f->sites, v) && !is_one_of(t, 4, v) &&
-            inside(f, t, v)) {
+            inside(f, t, v))
             return false;
-        }
-    }
     return true;
 }
 
@@ -31,9 +28,8 @@ static uint32_t apex_of(const struct fixture *f, const uint32_t facet[3]) {
     for (uint32_t v = 0; v < f->sites.count; v++) {
         const uint32_t u[4] = {facet[0], facet[1], facet[2], v};
         if (host_site_is_vertex(&f->sites, v) && !is_one_of(t, 4, v) &&
-            orientation(f, u) > 0 && (t[3] == INCODE_NONE || inside(f, t, v))) {
+            orientation(f, u) > 0 && (t[3] == INCODE_NONE || inside(f, t, v)))
             t[3] = v;
-        }
     }
     return t[3];
 }
@@ -89,9 +85,8 @@ static void judge_all(struct fixture *f, uint64_t most) {
     struct host_judge judge;
     struct host_error error = {0};
     assert_int_equal(host_judge_make(&judge, &f->sites, &error), 0);
-    for (uint64_t i = 0; i < f->tets.count && i < most; i++) {
+    for (uint64_t i = 0; i < f->tets.count && i < most; i++)
         tetrahedron_is_judged(f, &judge, f->tets.v[i]);
-    }
     random_ones_are_judged(f, &judge);
     host_judge_free(&judge);
 }
@@ -117,9 +112,8 @@ static void judged_on_lattices(void **unused) {
         double xyz[3 * POINTS];
         for (int k = 0; k < POINTS; k++) {
             const int cell[3] = {k % SIDE, k / SIDE % SIDE, k / SIDE / SIDE};
-            for (int d = 0; d < 3; d++) {
+            for (int d = 0; d < 3; d++)
                 xyz[3 * k + d] = cell[d] / parts[i][d];
-            }
         }
         open_points(&f, xyz, POINTS);
         judge_all(&f, UINT64_MAX);
@@ -137,9 +131,8 @@ static void judged_at_the_ends_of_the_range(void **unused) {
         struct host_points points = {0};
         struct host_error error = {0};
         assert_int_equal(host_gen("uniform", 90, 3, &points, &error), 0);
-        for (uint64_t k = 0; k < 270; k++) {
+        for (uint64_t k = 0; k < 270; k++)
             points.xyz[k] = scalbn(points.xyz[k] - 0.5, powers[i][k % 3]);
-        }
         open_points(&f, points.xyz, 90);
         host_points_free(&points);
         judge_all(&f, 100);

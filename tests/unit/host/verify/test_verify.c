@@ -49,9 +49,8 @@ static void expect(struct fixture *f, const char *what) {
         host_verify(&f->points, &f->tets, HOST_CHECK_DELAUNAY, &report, &error),
         HOST_UNVERIFIED);
     assert_true(report.faults > 0);
-    if (strstr(report.text, what) == NULL) {
+    if (strstr(report.text, what) == NULL)
         fail_msg("expected '%s' in:\n%s", what, report.text);
-    }
     assert_null(strchr(error.text, '\n'));
     assert_non_null(strstr(error.text, "; "));
 }
@@ -106,9 +105,8 @@ static void data_agrees(void **unused) {
         for (int k = 0; k < (tiny ? 2 : 3); k++) {
             struct host_check_report report;
             struct host_error error = {0};
-            for (uint64_t c = 0; c < 3 * f.points.count; c++) {
+            for (uint64_t c = 0; c < 3 * f.points.count; c++)
                 f.points.xyz[c] = ldexp(f.points.xyz[c], powers[k]);
-            }
             assert_int_equal(host_verify(&f.points, &f.tets,
                                          HOST_CHECK_DELAUNAY, &report, &error),
                              0);
@@ -131,9 +129,8 @@ static void right_ones_pass(void **unused) {
         struct fixture f = made(sets[i].kind, sets[i].n, i + 1);
         struct host_check_report r;
         int code = verify(&f, &r);
-        if (code != 0) {
+        if (code != 0)
             fail_msg("%s %u: %s", sets[i].kind, sets[i].n, r.text);
-        }
         assert_int_equal(r.tetrahedra, f.tets.count);
         assert_int_equal(r.hull_facets, 2 * r.hull_vertices - 4);
         close_fixture(&f);
@@ -230,10 +227,8 @@ static void each_wrong_apex_is_found(void **unused) {
     for (uint64_t i = 0; i < f.tets.count; i++) {
         uint32_t *t = f.tets.v[i];
         uint32_t wrong = (t[3] + 1 + (uint32_t)i % 7) % 40;
-        while (wrong == t[0] || wrong == t[1] || wrong == t[2] ||
-               wrong == t[3]) {
+        while (wrong == t[0] || wrong == t[1] || wrong == t[2] || wrong == t[3])
             wrong = (wrong + 1) % 40;
-        }
         t[3] = wrong;
         expect(&f, "");
         host_tetrahedra_free(&f.tets);
@@ -258,9 +253,8 @@ static bool flip(struct fixture *f, uint64_t i, uint64_t j, const uint32_t p[3],
     for (int k = 0; k < 3; k++) {
         uint32_t t[4] = {p[k], p[(k + 1) % 3], below, above};
         memcpy(made_of[k], t, sizeof t);
-        if (!positive(f, t)) {
+        if (!positive(f, t))
             return false;
-        }
     }
     memcpy(f->tets.v[i], made_of[0], sizeof made_of[0]);
     memcpy(f->tets.v[j], made_of[1], sizeof made_of[1]);
@@ -321,18 +315,16 @@ static void wrong_ties_are_found(void **unused) {
         uint32_t ring[4] = {c, d, c + 1, d + 1};
         for (int k = 0; k < 4; k++) {
             uint32_t t[4] = {a, b, ring[k], ring[(k + 1) % 4]};
-            if (!positive(&f, t)) {
+            if (!positive(&f, t))
                 t[0] = b, t[1] = a;
-            }
             uint32_t(*room)[4] = host_tetrahedra_room(&f.tets, 1, &error);
             memcpy(*room, t, sizeof t);
             host_tetrahedra_keep(&f.tets, 1);
         }
         struct host_check_report r;
         passed += verify(&f, &r) == 0;
-        if (r.faults > 0) {
+        if (r.faults > 0)
             assert_non_null(strstr(r.text, "not Delaunay"));
-        }
         close_fixture(&f);
     }
     assert_int_equal(passed, 1);
@@ -363,11 +355,9 @@ static void duplicates_stand_for_the_lowest(void **unused) {
     assert_int_equal(host_points_append(&f.points, copy, 1, &error), 0);
     assert_int_equal(verify(&f, &r), 0);
     assert_int_equal(r.distinct, 40);
-    for (uint64_t i = 0; i < f.tets.count; i++) {
-        for (int k = 0; k < 4; k++) {
+    for (uint64_t i = 0; i < f.tets.count; i++)
+        for (int k = 0; k < 4; k++)
             f.tets.v[i][k] = f.tets.v[i][k] == 7 ? 40 : f.tets.v[i][k];
-        }
-    }
     expect(&f, "repeats an earlier one");
     close_fixture(&f);
 }
@@ -381,9 +371,8 @@ static void two_bodies_are_found(void **unused) {
                      0);
     for (uint64_t i = 0; i < g.tets.count; i++) {
         uint32_t(*room)[4] = host_tetrahedra_room(&f.tets, 1, &error);
-        for (int k = 0; k < 4; k++) {
+        for (int k = 0; k < 4; k++)
             (*room)[k] = g.tets.v[i][k] + 30;
-        }
         host_tetrahedra_keep(&f.tets, 1);
     }
     expect(&f, "");
@@ -399,9 +388,8 @@ static void dents_are_found(void **unused) {
     uint64_t kept = 0;
     for (uint64_t i = 0; i < f.tets.count; i++) {
         const uint32_t *t = f.tets.v[i];
-        if (t[0] != 0) {
+        if (t[0] != 0)
             memmove(f.tets.v[kept++], t, sizeof *f.tets.v);
-        }
     }
     host_tetrahedra_cut(&f.tets, kept);
     expect(&f, "is a dent of the hull");

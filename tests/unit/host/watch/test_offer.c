@@ -48,21 +48,18 @@ static void answer_for(struct host_onlooking *onlooking,
                        const struct host_machine *machine, unsigned node) {
     struct node_question_message question;
     uint8_t bytes[CUBE_PAYLOAD_MAX] = {0};
-    if (!host_onlooking_due(onlooking, node, &question)) {
+    if (!host_onlooking_due(onlooking, node, &question))
         return;
-    }
     struct node_answer_head head = {question.tag, question.what};
     struct cube_message message = {.data = bytes, .source = (uint16_t)node};
     size_t size = question.what == NODE_LOG ? sizeof bytes : 16 + node;
     memcpy(bytes, &head, sizeof head);
-    for (size_t i = sizeof head; i < size; i++) {
+    for (size_t i = sizeof head; i < size; i++)
         bytes[i] = (uint8_t)(i * 7 + node + question.what);
-    }
     message.size = (uint16_t)size;
     host_onlooking_sent(onlooking, node);
-    if (node != SILENT || question.what != NODE_LINKS) {
+    if (node != SILENT || question.what != NODE_LINKS)
         assert_true(host_onlooking_take(onlooking, machine, &message));
-    }
 }
 
 static _Noreturn void hold(int begun, int ended) {
@@ -80,9 +77,8 @@ static _Noreturn void hold(int begun, int ended) {
     (void)!write(begun, "b", 1);
     while (read(ended, &byte, 1) < 0 && errno == EAGAIN) {
         host_onlooking_look(&onlooking, &machine, holder_us(NULL), &progress);
-        for (unsigned i = 0; i < NODES; i++) {
+        for (unsigned i = 0; i < NODES; i++)
             answer_for(&onlooking, &machine, i);
-        }
         progress.tetrahedra++;
         usleep(1000); /* clock: looks again */
     }
@@ -126,9 +122,8 @@ static int set_up(void **unused) {
 }
 
 static void look_at(struct host_look *look) {
-    if (host_look_open(look, wire, &error) != 0) {
+    if (host_look_open(look, wire, &error) != 0)
         fail_msg("%s", error.text);
-    }
 }
 
 /* --- looks -----------------------------------------------------------------
@@ -209,9 +204,8 @@ static void test_several(void **unused) {
     struct host_look look[HOST_LOOKERS_MAX], late;
     (void)unused;
     begin_holder();
-    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
+    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         look_at(&look[i]);
-    }
     assert_int_equal(host_look_open(&late, wire, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "four programs look on already; "));
     host_look_close(&late);
@@ -229,11 +223,9 @@ static void test_several(void **unused) {
     }
     assert_int_equal(host_look_ask(&late, &all, NODE_TOP, WAIT_US, &error), 0);
     host_look_close(&late);
-    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++) {
-        if (i != 1) {
+    for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
+        if (i != 1)
             host_look_close(&look[i]);
-        }
-    }
     end_holder();
 }
 
@@ -288,17 +280,15 @@ static void test_queue(void **unused) {
     begin_holder();
     look_at(&look);
     kill(holder, SIGSTOP);
-    for (unsigned i = 0; i < CALLS; i++) {
+    for (unsigned i = 0; i < CALLS; i++)
         assert_true(host_holder_find(&who, wire));
-    }
     assert_int_equal(who.pid, 0);
     host_holder_text(&who, text, sizeof text);
     assert_string_equal(text, "a program that stands still");
     kill(holder, SIGCONT);
     assert_int_equal(host_look_ask(&look, &all, NODE_TOP, WAIT_US, &error), 0);
-    while (!host_holder_find(&who, wire) || who.pid != holder) {
+    while (!host_holder_find(&who, wire) || who.pid != holder)
         (void)usleep(SECOND / 100); /* clock: looks again */
-    }
     host_look_close(&look);
     end_holder();
 }
@@ -320,13 +310,11 @@ static void hears(int file, const char *expected) {
     char line[400];
     size_t used = 0;
     while (used + 1 < sizeof line && read(file, line + used, 1) == 1 &&
-           line[used] != '\n') {
+           line[used] != '\n')
         used++;
-    }
     line[used] = '\0';
-    if (strstr(line, expected) == NULL) {
+    if (strstr(line, expected) == NULL)
         fail_msg("no '%s' in: %s", expected, line);
-    }
 }
 
 static void says(int file, const char *text) {
@@ -368,9 +356,8 @@ static void test_deaf(void **unused) {
     hears(file, "\"incode\"");
     look_at(&look);
     for (unsigned k = 0; k < 200; k++) {
-        if (send(file, "{\"ask\":\"log\"}\n", 14, MSG_NOSIGNAL) < 0) {
+        if (send(file, "{\"ask\":\"log\"}\n", 14, MSG_NOSIGNAL) < 0)
             break;
-        }
         assert_int_equal(host_look_ask(&look, &all, NODE_TOP, WAIT_US, &error),
                          0);
     }
@@ -420,9 +407,8 @@ static void begin_other(int file) {
     holder = fork();
     if (holder == 0) {
         close(ended[1]);
-        if (setresuid(OTHER_USER, OTHER_USER, OTHER_USER) != 0) {
+        if (setresuid(OTHER_USER, OTHER_USER, OTHER_USER) != 0)
             exit(1);
-        }
         hold(begun[1], ended[0]);
     }
     close(begun[1]);
@@ -441,9 +427,8 @@ static void check_other(int file, bool believed) {
     assert_int_equal(host_holder_find(&who, wire), believed);
     assert_int_equal(host_look_open(&look, wire, &error),
                      believed ? 0 : HOST_CUBE);
-    if (!believed) {
+    if (!believed)
         assert_non_null(strstr(error.text, "not have its wire open; "));
-    }
     host_look_close(&look);
     memset(&error, 0, sizeof error);
     end_holder();
@@ -466,9 +451,8 @@ static void test_other_users(void **unused) {
     struct sockaddr_un un = {.sun_family = AF_UNIX};
     int listener, call, other;
     (void)unused;
-    if (geteuid() != 0) {
+    if (geteuid() != 0)
         skip();
-    }
     int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
     assert_int_equal(grantpt(terminal) | unlockpt(terminal), 0);
     snprintf(wire, sizeof wire, "serial:%s", ptsname(terminal));

@@ -244,12 +244,11 @@ static inline void make_horizon(struct scene *s, uint32_t brick, double reach) {
     uint32_t missing;
     enum incode_horizon_made made;
     while ((made = try_horizon(s, brick, reach, &missing)) !=
-           INCODE_HORIZON_MADE) {
+           INCODE_HORIZON_MADE)
         if (made == INCODE_HORIZON_WAIT)
             deliver(s);
         else
             reach *= 0.75;
-    }
     assert_int_equal(s->h->centre, brick);
     assert_int_equal(s->h->page[s->h->self], brick);
     assert_int_equal(s->h->level[s->h->self], 0);

@@ -36,11 +36,9 @@ static size_t lattice(double (*p)[3], size_t side, double size) {
     static const double u[3] = {20, 20, -10}, v[3] = {-4, 22, 20};
     size_t n = 0;
     for (size_t i = 0; i < side; i++) {
-        for (size_t j = 0; j < side; j++, n++) {
-            for (int d = 0; d < 3; d++) {
+        for (size_t j = 0; j < side; j++, n++)
+            for (int d = 0; d < 3; d++)
                 p[n][d] = (u[d] * (double)i + v[d] * (double)j) / 30 * size;
-            }
-        }
     }
     return n;
 }
@@ -49,9 +47,8 @@ static size_t lattice(double (*p)[3], size_t side, double size) {
 static bool draw_face(const double *f[4], double (*p)[3], size_t n, size_t near,
                       struct incode_tally *tally) {
     size_t at = below(n - near);
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 4; i++)
         f[i] = p[at + below(near)];
-    }
     return f[0] != f[1] && f[0] != f[2] && f[1] != f[2] &&
            incode_orient3d(tally, f[0], f[1], f[2], f[3]) > 0;
 }
@@ -98,9 +95,8 @@ static void ball_on_a_rough_plane(void **unused) {
         double size = ldexp(1, (int)below(80) - 40), scale = 0.5 / size;
         size_t n = lattice(p, SIDE, size);
         const double *f[4];
-        if (!draw_face(f, p, n, 3 * SIDE, &tally)) {
+        if (!draw_face(f, p, n, 3 * SIDE, &tally))
             continue;
-        }
         struct incode_half_space half_space =
             half_space_of((const double **)f, p, n, scale);
         struct incode_near_degenerate degenerate = {.known = true,
@@ -111,9 +107,8 @@ static void ball_on_a_rough_plane(void **unused) {
         balls += degenerate.ball.radius < INFINITY;
         small += degenerate.ball.radius < 12;
         for (size_t i = 0; i < n; i++) {
-            if (p[i] == f[0] || p[i] == f[1] || p[i] == f[2] || p[i] == f[3]) {
+            if (p[i] == f[0] || p[i] == f[1] || p[i] == f[2] || p[i] == f[3])
                 continue;
-            }
             bool first =
                 incode_orient3d(&tally, f[0], f[1], f[2], p[i]) > 0 &&
                 incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p[i]) > 0;
@@ -179,9 +174,8 @@ static bool set_pencil(struct incode_pencil *pencil, const double b[3],
     incode_cross(n, b, c);
     double nn = incode_dot(n, n);
     double product = incode_max_norm(b) * incode_max_norm(c);
-    if (!(nn > least * product * product)) {
+    if (!(nn > least * product * product))
         return false;
-    }
     incode_cross(cn, c, n);
     incode_cross(nb, n, b);
     for (int d = 0; d < 3; d++) {
@@ -200,26 +194,22 @@ static void places_in_a_pencil(void **unused) {
     for (int k = 0; k < 200000; k++) {
         double p[5][3], b[3], c[3], r[2][3], t[2];
         struct incode_pencil pencil = {{0}, {0}, 1};
-        for (int i = 0; i < 5; i++) {
-            for (int d = 0; d < 3; d++) {
+        for (int i = 0; i < 5; i++)
+            for (int d = 0; d < 3; d++)
                 p[i][d] = draw() * (k % 2 == 0 ? 1 : 1 + 1e-3 * (double)d);
-            }
-        }
         for (int d = 0; d < 3; d++) {
             b[d] = p[1][d] - p[0][d];
             c[d] = p[2][d] - p[0][d];
             r[0][d] = p[3][d] - p[0][d];
             r[1][d] = p[4][d] - p[0][d];
         }
-        if (!set_pencil(&pencil, b, c, 1e-4)) {
+        if (!set_pencil(&pencil, b, c, 1e-4))
             continue;
-        }
         pencil.size = fmax(fmax(incode_max_norm(b), incode_max_norm(c)),
                            incode_max_norm(pencil.c0));
         if (!incode_pencil_place(&pencil, r[0], &t[0]) ||
-            !incode_pencil_place(&pencil, r[1], &t[1])) {
+            !incode_pencil_place(&pencil, r[1], &t[1]))
             continue;
-        }
         assert_int_equal(incode_orient3d(&tally, p[0], p[1], p[2], p[3]), 1);
         if (incode_pencil_later(&pencil, t[0]) < t[1]) {
             assert_true(incode_in_sphere(&tally, p[0], p[1], p[2], p[3], p[4]) <
@@ -244,9 +234,8 @@ static void first_of_the_local_points(void **unused) {
         g.around = 300;
         for (uint32_t i = 0; i < g.around; i++) {
             g.id[i] = i;
-            for (int d = 0; d < 3; d++) {
+            for (int d = 0; d < 3; d++)
                 g.p[d][i] = far + draw();
-            }
         }
         for (int d = 0; d < 3; d++) {
             g.around_lo[d] = far;
@@ -260,22 +249,19 @@ static void first_of_the_local_points(void **unused) {
         double b[3], c[3], t;
         incode_local_relative(&g, g.at[below(g.near)], b);
         incode_local_relative(&g, g.at[below(g.near)], c);
-        if (!set_pencil(&pencil, b, c, 1e-2)) {
+        if (!set_pencil(&pencil, b, c, 1e-2))
             continue;
-        }
         pencil.size = fmax(incode_max_norm(b), incode_max_norm(c));
         uint32_t count = incode_local_first(&g, &pencil, &t, out);
         found += count > 0;
         for (uint32_t i = 0; i < g.near && count > 0; i++) {
             double r[3], place;
             bool listed = false;
-            for (uint32_t m = 0; m < count; m++) {
+            for (uint32_t m = 0; m < count; m++)
                 listed = listed || out[m] == g.at[i];
-            }
             incode_local_relative(&g, g.at[i], r);
-            if (!listed && incode_pencil_place(&pencil, r, &place)) {
+            if (!listed && incode_pencil_place(&pencil, r, &place))
                 assert_true(incode_pencil_later(&pencil, place) > t);
-            }
         }
     }
     assert_true(found > 500);
@@ -285,13 +271,11 @@ static void first_of_the_local_points(void **unused) {
 static const double *first_of(const double *const f[3], const double *const *p,
                               size_t n, struct incode_tally *tally) {
     const double *first = NULL;
-    for (size_t i = 0; i < n; i++) {
+    for (size_t i = 0; i < n; i++)
         if (incode_orient3d(tally, f[0], f[1], f[2], p[i]) > 0 &&
             (first == NULL ||
-             incode_in_sphere(tally, f[0], f[1], f[2], first, p[i]) > 0)) {
+             incode_in_sphere(tally, f[0], f[1], f[2], first, p[i]) > 0))
             first = p[i];
-        }
-    }
     return first;
 }
 
@@ -308,31 +292,27 @@ static void close_candidates_of_a_rough_lattice(void **unused) {
         int power = exact ? 0 : (int)below(200) - 100;
         double corner[8][3], at[3];
         const double *q[8];
-        for (int j = 0; j < 3; j++) {
+        for (int j = 0; j < 3; j++)
             at[j] = (double)below(100) - 50;
-        }
         for (size_t i = 0; i < 8; i++) {
             size_t other = below(i + 1);
             q[i] = q[other];
             q[other] = corner[i];
             for (int d = 0; d < 3; d++) {
                 double sum = 0;
-                for (int j = 0; j < 3; j++) {
+                for (int j = 0; j < 3; j++)
                     sum += turn[j][d] * (at[j] + (double)(i >> j & 1));
-                }
                 corner[i][d] = ldexp(exact ? sum : sum / 30, power);
             }
         }
         struct incode_close_candidates close = {.count = 0};
         size_t n = 1 + below(5);
-        for (size_t i = 0; i < n; i++) {
+        for (size_t i = 0; i < n; i++)
             assert_true(incode_close_add(&close, q[3 + i]));
-        }
         uint32_t first = incode_close_first(
             &close, q[0], q[1], q[2], ldexp(1, -power - exact * 5), &tally);
-        if (first == INCODE_CLOSE_NONE) {
+        if (first == INCODE_CLOSE_NONE)
             continue;
-        }
         certain++;
         alone += n == 1;
         assert_ptr_equal(q[3 + first], first_of(q, q + 3, n, &tally));
@@ -347,16 +327,13 @@ static void draw_empty(const double *t[4], double (*p)[3], size_t n,
     const double *others[64];
     size_t count;
     do {
-        for (int i = 0; i < 3; i++) {
+        for (int i = 0; i < 3; i++)
             t[i] = p[below(n)];
-        }
         count = 0;
-        for (size_t i = 0; i < n; i++) {
+        for (size_t i = 0; i < n; i++)
             if (t[0] != t[1] && t[0] != t[2] && t[1] != t[2] &&
-                incode_orient3d(tally, t[0], t[1], t[2], p[i]) > 0) {
+                incode_orient3d(tally, t[0], t[1], t[2], p[i]) > 0)
                 others[count++] = p[i];
-            }
-        }
     } while (count < n - 3);
     t[3] = first_of(t, others, count, tally);
 }
@@ -379,9 +356,8 @@ static void radical_bounds_on_a_rough_sphere(void **unused) {
                 p[i][d] = draw() + draw() + draw() - 1.5;
                 length += p[i][d] * p[i][d];
             }
-            for (int d = 0; d < 3; d++) {
+            for (int d = 0; d < 3; d++)
                 p[i][d] = at + size * p[i][d] / sqrt(length);
-            }
         }
         const double *t[4], *f[4];
         for (int i = 0; i < 3; i++) {
@@ -389,9 +365,8 @@ static void radical_bounds_on_a_rough_sphere(void **unused) {
             incode_empty_spheres_add(&empty, t, scale);
         }
         for (int m = 0; m < 20; m++) {
-            if (!draw_face(f, p, POINTS, POINTS - 1, &tally)) {
+            if (!draw_face(f, p, POINTS, POINTS - 1, &tally))
                 continue;
-            }
             struct incode_radical_bound c;
             double b[3], d[3], n[3], r[3];
             for (int i = 0; i < 3; i++) {
@@ -450,9 +425,8 @@ static void radical_bounds_across_scales(void **unused) {
             const double r[3] = {0.25 * place[0], 0.25 * place[1],
                                  0.25 * place[2]};
             const double p[3] = {small * r[0], small * r[1], small * r[2]};
-            if (incode_dot(c.g, r) - c.slack * (r[0] + r[1] + r[2]) > c.level) {
+            if (incode_dot(c.g, r) - c.slack * (r[0] + r[1] + r[2]) > c.level)
                 out += incode_in_sphere(&tally, f[0], f[1], f[2], f[3], p) >= 0;
-            }
         }
     }
     assert_true(set > 100 && out == 0);

@@ -220,10 +220,9 @@ static void what_a_lifted_box_says(void **unused) {
         boxes.turn[d][1] = 16383;
     double axis[3][3];
     incode_boxes_turned(&boxes, 1, axis);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         for (int d = 0; d < 3; d++)
             assert_true(fabs(axis[k][d] - (d == (k + 1) % 3)) < 1e-3);
-    }
 }
 
 static void axes_are_orthonormal(void **unused) {

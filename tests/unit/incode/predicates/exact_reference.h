@@ -16,19 +16,17 @@ enum { REFERENCE_POINTS = 5 };
 static mpz_t reference_p[REFERENCE_POINTS][5], reference_t[12];
 
 static void reference_start(void) {
-    for (int i = 0; i < REFERENCE_POINTS; i++) {
+    for (int i = 0; i < REFERENCE_POINTS; i++)
         for (int k = 0; k < 5; k++)
             mpz_init(reference_p[i][k]);
-    }
     for (int i = 0; i < 12; i++)
         mpz_init(reference_t[i]);
 }
 
 static void reference_stop(void) {
-    for (int i = 0; i < REFERENCE_POINTS; i++) {
+    for (int i = 0; i < REFERENCE_POINTS; i++)
         for (int k = 0; k < 5; k++)
             mpz_clear(reference_p[i][k]);
-    }
     for (int i = 0; i < 12; i++)
         mpz_clear(reference_t[i]);
 }
@@ -55,10 +53,9 @@ static void reference_load(double (*p)[3], int n, const double *origin) {
                 mpz_mul_2exp(*to, *to, (mp_bitcnt_t)(e - least));
         }
     }
-    for (int i = 0; origin != NULL && i < n; i++) {
+    for (int i = 0; origin != NULL && i < n; i++)
         for (int k = 0; k < 3; k++)
             mpz_sub(reference_p[i][k], reference_p[i][k], reference_t[k]);
-    }
 }
 
 /* r = determinant of rows i, j, k of the loaded points; uses t[10]. */
@@ -88,10 +85,9 @@ static int reference_orient3d(double (*p)[3]) {
 }
 
 static bool reference_above(const double *a, const double *b) {
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
         if (a[k] != b[k])
             return a[k] > b[k];
-    }
     return false;
 }
 

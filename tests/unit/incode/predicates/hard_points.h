@@ -65,10 +65,9 @@ static double hard_shaken(uint64_t *seed, double x) {
 static void hard_box(uint64_t *seed, double p[5][3], const double lo[3],
                      const double hi[3]) {
     int corners = hard_below(seed, 8), step = 1 + 2 * hard_below(seed, 4);
-    for (int i = 0; i < 5; i++, corners += step) {
+    for (int i = 0; i < 5; i++, corners += step)
         for (int k = 0; k < 3; k++)
             p[i][k] = (corners >> k & 1) != 0 ? hi[k] : lo[k];
-    }
     if (hard_below(seed, 4) == 0) {
         int k = hard_below(seed, 3);
         p[4][k] = hard_shaken(seed, p[4][k]);
@@ -138,10 +137,9 @@ static double hard_edge(uint64_t *seed, int up) {
 }
 
 static void hard_each(uint64_t *seed, enum hard_family family, double p[5][3]) {
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 5; i++)
         for (int k = 0; k < 3; k++)
             p[i][k] = hard_coordinate(seed, family);
-    }
 }
 
 static void hard_permuted(uint64_t *seed, double p[5][3]) {
@@ -215,10 +213,9 @@ static void hard_points(uint64_t *seed, enum hard_family family,
 /* Whether no two of the five points are equal. */
 static int hard_distinct(double p[5][3]) {
     for (int i = 0; i < 5; i++) {
-        for (int j = 0; j < i; j++) {
+        for (int j = 0; j < i; j++)
             if (p[i][0] == p[j][0] && p[i][1] == p[j][1] && p[i][2] == p[j][2])
                 return 0;
-        }
     }
     return 1;
 }

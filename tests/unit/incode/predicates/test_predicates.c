@@ -282,10 +282,9 @@ struct use {
 static double largest_difference(double (*p)[3], int first, int n,
                                  const double *origin) {
     double most = 0;
-    for (int i = first; i < first + n; i++) {
+    for (int i = first; i < first + n; i++)
         for (int k = 0; k < 3; k++)
             most = fmax(most, fabs(p[i][k] - origin[k]));
-    }
     return most;
 }
 

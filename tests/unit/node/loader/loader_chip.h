@@ -60,12 +60,10 @@ static void chip_tear_block(struct chip *c, uint32_t at, const uint8_t *to,
                             uint32_t size) {
     uint32_t begin = at / c->flash.torn_bytes * c->flash.torn_bytes;
     uint32_t kind = chip_draw(c) % 4;
-    if (kind != 0) {
+    if (kind != 0)
         memcpy(c->bytes + at, to, size);
-    }
-    for (uint32_t i = 0; kind > 1 && i < c->flash.torn_bytes; i++) {
+    for (uint32_t i = 0; kind > 1 && i < c->flash.torn_bytes; i++)
         c->bytes[begin + i] = kind == 2 ? 0 : (uint8_t)chip_draw(c);
-    }
     longjmp(c->lost, 1);
 }
 
@@ -74,9 +72,8 @@ static void chip_tear_sector(struct chip *c, uint32_t at) {
     uint32_t block = c->flash.torn_bytes;
     uint32_t whole = chip_draw(c) % (c->flash.sector_bytes / block);
     memset(c->bytes + at, 0xff, (size_t)whole * block);
-    for (uint32_t i = 0; i < block; i++) {
+    for (uint32_t i = 0; i < block; i++)
         c->bytes[at + whole * block + i] = (uint8_t)chip_draw(c);
-    }
     longjmp(c->lost, 1);
 }
 
@@ -115,14 +112,12 @@ static bool chip_program(void *context, uint32_t at, const void *bytes,
     for (size_t i = 0; i < size; i++) {
         to[i] = c->bytes[at + i] & in[i];
         if (c->worn_out ||
-            (c->worn != 0 && at / c->flash.sector_bytes == c->worn)) {
+            (c->worn != 0 && at / c->flash.sector_bytes == c->worn))
             to[i] = c->bytes[at + i] & (uint8_t)~1u;
-        }
     }
     if (chip_loses(c)) {
-        if (c->flash.torn_bytes != 0) {
+        if (c->flash.torn_bytes != 0)
             chip_tear_block(c, at, to, (uint32_t)size);
-        }
         chip_tear(c, at, to, (uint32_t)size);
     }
     memcpy(c->bytes + at, to, size);
@@ -137,9 +132,8 @@ static bool chip_erase(void *context, uint32_t sector) {
     chip_spare(c, at, size);
     c->erased++;
     bool loses = chip_loses(c);
-    if (loses && c->flash.torn_bytes != 0) {
+    if (loses && c->flash.torn_bytes != 0)
         chip_tear_sector(c, at);
-    }
     uint32_t kind = chip_draw(c) % 4;
     for (uint32_t i = 0; i < size; i++) {
         uint8_t set = !loses || kind == 0             ? 0xff
@@ -148,9 +142,8 @@ static bool chip_erase(void *context, uint32_t sector) {
                                                       : 0;
         c->bytes[at + i] |= set;
     }
-    if (loses) {
+    if (loses)
         longjmp(c->lost, 1);
-    }
     return true;
 }
 
@@ -298,11 +291,9 @@ static inline void chip_block(struct loader_incoming *in,
 static inline void chip_bring(struct loader_incoming *in,
                               const struct made *made) {
     for (int pass = 0; pass < 8 && in->phase == LOADER_TAKES; pass++) {
-        for (uint32_t b = 0; b < in->blocks; b++) {
-            if ((in->map[b / 8] >> b % 8 & 1) == 0) {
+        for (uint32_t b = 0; b < in->blocks; b++)
+            if ((in->map[b / 8] >> b % 8 & 1) == 0)
                 chip_block(in, made, b);
-            }
-        }
     }
 }
 

@@ -72,9 +72,8 @@ static bool start(void) {
 
 static uint32_t most_of(uint32_t first, uint32_t sectors) {
     uint32_t most = 0;
-    for (uint32_t i = first; i < first + sectors; i++) {
+    for (uint32_t i = first; i < first + sectors; i++)
         most = erasures[i] > most ? erasures[i] : most;
-    }
     return most;
 }
 
@@ -113,9 +112,8 @@ static void restarts_cannot_wear_out_a_board(void **unused) {
 static bool bring_false(const struct made *made, bool restarts) {
     static struct made bad;
     bad = *made;
-    for (uint32_t i = LOADER_HEADER_BYTES; i < bad.bytes; i++) {
+    for (uint32_t i = LOADER_HEADER_BYTES; i < bad.bytes; i++)
         bad.all[i] ^= 0xff;
-    }
     chip_begin(&in, &bad);
     if (in.phase == LOADER_REFUSES) {
         assert_int_equal(in.fault, LOADER_TOO_OFTEN);
@@ -148,9 +146,8 @@ static void false_transfers_cannot_wear_out_a_slot(void **unused) {
         memcpy(before, erasures, sizeof before);
         if (bring_false(begun % 4 < 2 ? &one : &two, begun % 2 == 0)) {
             begun++;
-            for (uint32_t i = layout.first; i < SECTORS; i++) {
+            for (uint32_t i = layout.first; i < SECTORS; i++)
                 assert_true(erasures[i] - before[i] <= 3);
-            }
             continue;
         }
         if (from_us == 0) {

@@ -39,9 +39,8 @@ static bool write_block(void *context, uint32_t block, const uint8_t *bytes) {
     device.writes++;
     device.written = block;
     assert_true(block < CARD_BLOCKS);
-    if (device.dead) {
+    if (device.dead)
         return false;
-    }
     if (device.until_loss >= 0 && device.until_loss-- == 0) {
         for (unsigned i = 0; i < BLOCK; i++) {
             device.random = device.random * 1664525u + 1013904223u;
@@ -160,9 +159,8 @@ static void test_it_asks_little_of_the_card(void **state) {
     assert_int_equal(device.writes, LOADER_CARD_SECTOR / BLOCK);
     assert_true(flash.program(flash.context, 3 * LOADER_CARD_SECTOR, &in, 1));
     device.reads = device.writes = 0;
-    for (uint32_t at = 0; at < BLOCK; at += sizeof out) {
+    for (uint32_t at = 0; at < BLOCK; at += sizeof out)
         flash.read(flash.context, 3 * LOADER_CARD_SECTOR + at, out, sizeof out);
-    }
     assert_int_equal(device.reads, 1);
     assert_true(flash.erase(flash.context, 3));
     assert_int_equal(device.writes, 1);

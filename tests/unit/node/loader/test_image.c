@@ -132,9 +132,8 @@ static void a_signer_is_known_by_key_and_signature(void **unused) {
 static void every_fault_has_its_text(void **unused) {
     (void)unused;
     assert_null(loader_fault_text(LOADER_GOOD));
-    for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++) {
+    for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++)
         assert_non_null(loader_fault_text((enum loader_fault)i));
-    }
 }
 
 int main(void) {

@@ -38,9 +38,8 @@ static void live(const struct made *made, bool confirms) {
     unsigned slot = starts(&slots, false);
     assert_true(is_image(&slots, slot, made));
     assert_true(loader_slots_try(&slots));
-    if (confirms) {
+    if (confirms)
         assert_true(chip_confirm(&chip, slot));
-    }
 }
 
 /* An image that never comes up, tried until it is given up. */
@@ -49,9 +48,8 @@ static void give_up(const struct made *made, bool badly) {
     live(made, false);
     for (unsigned i = 1; i <= LOADER_TRIES; i++) {
         unsigned slot = starts(&slots, badly);
-        if (!is_image(&slots, slot, made)) {
+        if (!is_image(&slots, slot, made))
             return;
-        }
         assert_true(loader_slots_try(&slots));
     }
     assert_true(false);
@@ -93,9 +91,8 @@ static const struct {
 static void recover(const struct made *before, uint32_t held) {
     struct loader_slots slots;
     unsigned slot = starts(&slots, false);
-    if (before != NULL) {
+    if (before != NULL)
         assert_true(slot < LOADER_SLOTS);
-    }
     assert_true(slot == LOADER_SLOTS || is_image(&slots, slot, &new) ||
                 (before != NULL && is_image(&slots, slot, before)));
     loader_incoming_init(&in, &slots);
@@ -179,9 +176,8 @@ static void test_cuts_at_random(void **state) {
                     is_image(&slots, slot, &new) ||
                     is_image(&slots, slot, &third));
         assert_true(!done || is_image(&slots, slot, wanted));
-        if (i % 10 == 0) {
+        if (i % 10 == 0)
             live(wanted, true);
-        }
     }
 }
 

@@ -212,9 +212,8 @@ static void test_slots_serial(void **state) {
         chip.random = tear;
         assert_false(loader_slots_serial(&chip.flash, serial));
         chip.until_loss = tear == 0 ? -1 : 0;
-        if (setjmp(chip.lost) == 0) {
+        if (setjmp(chip.lost) == 0)
             (void)loader_slots_name(&chip.flash, two);
-        }
         chip.until_loss = -1;
         bool named = loader_slots_serial(&chip.flash, serial);
         assert_true(loader_slots_name(&chip.flash, one));
@@ -480,9 +479,8 @@ static void test_slots_tell_of_a_worn_flash(void **state) {
     bring_and_confirm(&old);
     chip.worn = 5 + 20 + 3; /* in slot 1 */
     begin(&new);
-    for (int i = 0; i < 20 && in.phase == LOADER_TAKES; i++) {
+    for (int i = 0; i < 20 && in.phase == LOADER_TAKES; i++)
         chip_bring(&in, &new);
-    }
     assert_int_equal(in.phase, LOADER_REFUSES);
     assert_int_equal(in.fault, LOADER_WORN);
     assert_int_equal(starts(false), 0);

@@ -20,9 +20,8 @@ static char path[64];
 
 static int make_folder(void **unused) {
     (void)unused;
-    if (mkdtemp(folder) == NULL) {
+    if (mkdtemp(folder) == NULL)
         return -1;
-    }
     snprintf(path, sizeof path, "%s/cube.key", folder);
     return 0;
 }
@@ -55,12 +54,10 @@ static void others_that_can_write_it_are_refused(void **unused) {
                                         : KEY_FILE_GOOD);
         assert_true((key_file_text(state).what == NULL) ==
                     (state == KEY_FILE_GOOD));
-        if (written) {
+        if (written)
             assert_memory_equal(key, none, sizeof none);
-        }
-        for (uint8_t i = 0; !written && i < sizeof key; i++) {
+        for (uint8_t i = 0; !written && i < sizeof key; i++)
             assert_int_equal(key[i], i);
-        }
     }
 }
 

@@ -50,9 +50,8 @@ static void bytes_come_out_as_they_went_in(void **unused) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
     (void)unused;
-    for (size_t i = 0; i < sizeof bytes; i++) {
+    for (size_t i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)(i * 2654435761u >> 13);
-    }
     for (size_t turn = 1; received < sizeof bytes; turn++) {
         size_t size = turn * 977 % 9000 + 1, room = turn * 613 % 5000 + 1;
         size = size < sizeof bytes - sent ? size : sizeof bytes - sent;
@@ -81,9 +80,8 @@ static void a_pipe_that_is_not_read_takes_no_more(void **unused) {
         sent += (size_t)moved;
     }
     assert_true(end.blocked);
-    while ((moved = pipe.receive(pipe.context, bytes, sizeof bytes)) > 0) {
+    while ((moved = pipe.receive(pipe.context, bytes, sizeof bytes)) > 0)
         received += (size_t)moved;
-    }
     assert_int_equal(received, sent);
     assert_true(pipe.send(pipe.context, bytes, sizeof bytes) > 0);
     assert_false(end.blocked);
@@ -129,9 +127,8 @@ int main(int argc, char **argv) {
         cmocka_unit_test_setup_teardown(an_end_is_noticed, open_end, close_end),
     };
     MPI_Init(&argc, &argv);
-    if (mpi_place_open(&place) != 0) {
+    if (mpi_place_open(&place) != 0)
         return 1;
-    }
     int failed = cmocka_run_group_tests(tests, NULL, NULL);
     mpi_place_close(&place);
     MPI_Finalize();

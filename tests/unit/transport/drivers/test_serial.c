@@ -46,9 +46,8 @@ static void a_pair_passes_every_byte(void **unused) {
     for (unsigned from = 0; from < 2; from++) {
         uint8_t sent[256], got[256];
         size_t have = 0;
-        for (unsigned i = 0; i < 256; i++) {
+        for (unsigned i = 0; i < 256; i++)
             sent[i] = (uint8_t)i;
-        }
         assert_int_equal(write(fds[from], sent, 256), 256);
         while (have < 256) {
             wait_for(fds[1 - from]);
@@ -181,9 +180,8 @@ static void who_made_a_terminal_is_no_user(void **unused) {
     close(fds[0]);
     close(fds[1]);
     close(ready[1]);
-    if (serial_port_open(&port, &settings) != 0) {
+    if (serial_port_open(&port, &settings) != 0)
         fail_msg("%s", port.fault);
-    }
     struct link_pipe pipe = serial_link_pipe(&port.pipe);
     assert_int_equal(pipe.send(pipe.context, &byte, 1), 1);
     byte = 0;
@@ -296,14 +294,12 @@ enum { STEP_US_MIN = 20, STEP_US_MAX = 200, MESSAGE = 1600, TRANSFER = 65536 };
 static double next_flip(struct wire *wire) {
     wire->random = wire->random * 6364136223846793005u + 1442695040888963407u;
     double u = (double)(wire->random >> 11) * 0x1p-53, sum = 0, term;
-    if (wire->error_rate <= 0) {
+    if (wire->error_rate <= 0)
         return 1e300;
-    }
     /* -ln(1 - u) by its series. */
     term = u = u > 0.999 ? 0.999 : u;
-    for (int k = 1; k < 2000 && term > 1e-9; k++, term *= u) {
+    for (int k = 1; k < 2000 && term > 1e-9; k++, term *= u)
         sum += term / k;
-    }
     return sum / wire->error_rate;
 }
 
@@ -389,9 +385,8 @@ static double transfer(struct wire *wire, unsigned transfers) {
                 uint64_t left = wanted - end->written;
                 size_t size = left < MESSAGE ? left : MESSAGE;
                 memcpy(bytes, &end->written, 8);
-                if (link_write(end->link, bytes, size, NULL, 0) != 0) {
+                if (link_write(end->link, bytes, size, NULL, 0) != 0)
                     break;
-                }
                 begin = begin == 0 ? now : begin;
                 end->written += size;
             }
@@ -405,9 +400,8 @@ static double transfer(struct wire *wire, unsigned transfers) {
 }
 
 static void close_wire(struct wire *wire) {
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4; i++)
         close(wire->fds[i]);
-    }
     free(wire->ends[0].memory);
     free(wire->ends[1].memory);
 }
@@ -446,9 +440,8 @@ static void a_clean_wire_resends_nothing(void **unused) {
         struct wire wire;
         open_wire(&wire, bauds[i], 0);
         for (unsigned turn = 0; turn < 3; turn++) {
-            for (unsigned k = 0; k < 20; k++) {
+            for (unsigned k = 0; k < 20; k++)
                 echo(&wire, 16);
-            }
             echo(&wire, MESSAGE);
             echo(&wire, 16);
             wire.ends[0].written = wire.ends[0].read = 0;

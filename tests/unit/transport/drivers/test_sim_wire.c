@@ -42,9 +42,8 @@ static int get(struct lab *lab, uint8_t *bytes, size_t size) {
 
 /* A frame without a zero but its last, that says its number. */
 static void fill(uint8_t *frame, uint32_t number) {
-    for (uint32_t i = 0; i < FRAME; i++) {
+    for (uint32_t i = 0; i < FRAME; i++)
         frame[i] = (uint8_t)(1 + (number * 31 + i * 7) % 255);
-    }
     frame[FRAME - 1] = 0;
 }
 
@@ -89,9 +88,8 @@ static void a_full_wire_takes_no_more(void **unused) {
     assert_true(sent <= BYTES && lab->wire.direction[0].blocked);
     assert_true(sim_room_us(&lab->wire.direction[0]) == UINT64_MAX);
     lab->now_us += 100;
-    for (int n; (n = get(lab, in, sizeof in)) > 0;) {
+    for (int n; (n = get(lab, in, sizeof in)) > 0;)
         got += (uint64_t)n;
-    }
     assert_true(got == sent);
     assert_int_equal(put(lab, out, sizeof out), sizeof out);
     free(lab);
@@ -110,9 +108,8 @@ static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
         assert_int_equal(put(lab, frame, FRAME), FRAME);
         lab->now_us += 2 * FRAME + (faults == NULL ? 0 : faults->stall_us);
         int n = get(lab, in, sizeof in);
-        for (int k = 0; k < n; k++) {
+        for (int k = 0; k < n; k++)
             sum = sum * 31 + in[k];
-        }
         *got += (uint64_t)n;
     }
     *direction = lab->wire.direction[0];
@@ -139,9 +136,8 @@ static void faults_strike_as_often_as_they_should(void **unused) {
         double expected = each[kind] * chance[kind];
         double struck = (double)direction.struck[kind];
         assert_true(struck > 0.5 * expected && struck < 1.5 * expected);
-        for (int other = 0; other < SIM_FAULTS; other++) {
+        for (int other = 0; other < SIM_FAULTS; other++)
             assert_true(other == kind || direction.struck[other] == 0);
-        }
         assert_true(kind == SIM_STALL ? sum == right : sum != right);
         assert_true((got < clean) == (kind == SIM_LOSS || kind == SIM_DELETE));
         assert_true((got > clean) ==

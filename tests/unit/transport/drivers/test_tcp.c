@@ -135,9 +135,8 @@ static void a_link_over_tcp(void **unused) {
                 }
                 while (written[who] < MESSAGES &&
                        link_write(link, &written[who], 4, bytes + 4,
-                                  SIZE - 4) == 0) {
+                                  SIZE - 4) == 0)
                     written[who]++;
-                }
             }
         }
         close(fds[1]);

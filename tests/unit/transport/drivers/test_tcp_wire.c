@@ -17,9 +17,8 @@ static void addresses(void **unused) {
         assert_int_equal(tcp_address_parse(&a, good[i]), 0);
         assert_null(tcp_address_path(&a));
     }
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         assert_int_equal(tcp_address_parse(&a, bad[i]), -1);
-    }
     assert_int_equal(tcp_address_parse(&a, "[2001:db8::7]:7000"), 0);
     assert_false(tcp_address_is_any(&a));
     assert_int_equal(tcp_address_parse(&a, "[::]:7000"), 0);
@@ -176,9 +175,8 @@ static void one_who_is_led_elsewhere_ends_nothing(void **unused) {
         while (round == 0 ? ends[1].wire.connections == 0
                           : ends[1].wire.strangers < strangers + 3) {
             step(&lost);
-            if (round != 0) {
+            if (round != 0)
                 step(&ends[0]);
-            }
             step(&ends[1]);
             assert_true(clock_us() - begin < WAIT_US);
         }
@@ -207,16 +205,14 @@ static void with_strangers(const uint8_t *with) {
     open_end(&ends[1], 1, &at, with);
     open_end(&ends[0], 0, &at, with);
     assert_true(exchange(ends, 20));
-    for (unsigned i = 0; i < STRANGERS; i++) {
+    for (unsigned i = 0; i < STRANGERS; i++)
         fds[i] = -1;
-    }
     uint64_t looks = 0;
     for (unsigned round = 0; round < 20; round++) {
         uint64_t begin = clock_us(), strangers = ends[1].wire.strangers;
         for (unsigned i = 0; i < STRANGERS; i++) {
-            if (fds[i] >= 0) {
+            if (fds[i] >= 0)
                 close(fds[i]);
-            }
             fds[i] = stranger(&at);
             step(&ends[0]);
             step(&ends[1]);
@@ -238,16 +234,14 @@ static void with_strangers(const uint8_t *with) {
         }
     }
     unsigned open = 0;
-    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++) {
+    for (unsigned i = 0; i < TCP_CANDIDATES_MAX; i++)
         open += ends[1].wire.candidate[i].fd >= 0;
-    }
     assert_true(open <= TCP_CANDIDATES_MAX);
     assert_true(ends[1].wire.strangers >= 20 * 5);
     assert_true(with == NULL || ends[1].wire.connections == 5);
     assert_int_equal(link_statistics(ends[1].link)->sessions, 1);
-    for (unsigned i = 0; i < STRANGERS; i++) {
+    for (unsigned i = 0; i < STRANGERS; i++)
         close(fds[i]);
-    }
     uint64_t connections = ends[1].wire.connections;
     close_end(&ends[0]);
     close_end(&ends[1]);
@@ -305,9 +299,8 @@ static void flood_on(struct flood *f, const struct tcp_address *at,
         unsigned kind =
             f->kind == ALL_KINDS ? i % ALL_KINDS : (unsigned)f->kind;
         unsigned right = kind == HALF_RIGHT;
-        if (f->fd[i] >= 0) {
+        if (f->fd[i] >= 0)
             close(f->fd[i]);
-        }
         f->fd[i] = stranger(at);
         if (kind == HALF_RIGHT || kind == OTHER_KEY) {
             size_t size = right ? f->size[1] : OPENING_MAX;
@@ -316,9 +309,8 @@ static void flood_on(struct flood *f, const struct tcp_address *at,
     }
     for (unsigned i = 0; i < FLOOD; i++) {
         bool slow = f->kind == SLOW || (f->kind == ALL_KINDS && i % 4 == SLOW);
-        if (f->fd[i] >= 0 && slow) {
+        if (f->fd[i] >= 0 && slow)
             (void)!send(f->fd[i], f->opening[1], 1, MSG_NOSIGNAL);
-        }
     }
 }
 
@@ -351,17 +343,14 @@ static void a_flood_keeps_nobody_out(void **unused) {
             rest(TCP_CROWD_US);
             flood_on(&f, &at, 3);
             step(&ends[1]);
-            if (looks % 3 == 0) {
+            if (looks % 3 == 0)
                 step(&ends[0]);
-            }
-            if (looks == LOOKS_MAX) {
+            if (looks == LOOKS_MAX)
                 fail_msg("kind %d: not taken in %u looks", f.kind, looks);
-            }
         }
         assert_true(f.called > 200);
-        for (unsigned i = 0; i < FLOOD; i++) {
+        for (unsigned i = 0; i < FLOOD; i++)
             close(f.fd[i]);
-        }
         close_end(&ends[0]);
         close_end(&ends[1]);
     }

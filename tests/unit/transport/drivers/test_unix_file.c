@@ -93,9 +93,8 @@ static void another_user_is_sent_away(void **unused) {
     assert_int_equal(seteuid(65534), 0);
     int fd = stranger(&at);
     assert_int_equal(seteuid(0), 0);
-    for (unsigned i = 0; i < 1000 && ends[1].wire.strangers == 0; i++) {
+    for (unsigned i = 0; i < 1000 && ends[1].wire.strangers == 0; i++)
         step(&ends[1]);
-    }
     assert_int_equal(ends[1].wire.strangers, 1);
     assert_int_equal(ends[1].wire.connections, 0);
     close(fd);

@@ -40,11 +40,10 @@ static inline struct tcp_address free_address(int family) {
     assert_int_equal(
         tcp_address_parse(&a, family == AF_INET ? "127.0.0.1:1" : "[::1]:1"),
         0);
-    if (family == AF_INET) {
+    if (family == AF_INET)
         ((struct sockaddr_in *)&a.to)->sin_port = 0;
-    } else {
+    else
         ((struct sockaddr_in6 *)&a.to)->sin6_port = 0;
-    }
     int fd = socket(family, SOCK_STREAM, 0);
     assert_true(fd >= 0);
     assert_int_equal(bind(fd, &a.to.any, a.size), 0);
@@ -88,9 +87,8 @@ static inline void step(struct end *end) {
         end->read++;
         link_release(end->link);
     }
-    while (link_write(end->link, &end->written, 4, bytes, sizeof bytes) == 0) {
+    while (link_write(end->link, &end->written, 4, bytes, sizeof bytes) == 0)
         end->written++;
-    }
 }
 
 /* Steps until both have read so many more. */
@@ -100,9 +98,8 @@ static inline bool exchange(struct end *ends, uint32_t messages) {
     while (ends[0].read < want[0] || ends[1].read < want[1]) {
         step(&ends[0]);
         step(&ends[1]);
-        if (clock_us() - begin > WAIT_US) {
+        if (clock_us() - begin > WAIT_US)
             return false;
-        }
     }
     return true;
 }

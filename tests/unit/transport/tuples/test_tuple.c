@@ -37,9 +37,8 @@ static struct tuple_field drawn_field(void) {
 
 static struct tuple drawn_tuple(void) {
     struct tuple t = {.count = (uint8_t)(1 + draw(3)), .keyed = draw(2)};
-    for (unsigned i = 0; i < t.count; i++) {
+    for (unsigned i = 0; i < t.count; i++)
         t.field[i] = drawn_field();
-    }
     return t;
 }
 
@@ -100,9 +99,8 @@ static void matches(void **state) {
     for (unsigned i = 0; i < 100000; i++) {
         struct tuple t = drawn_tuple(), pattern = draw(4) ? t : drawn_tuple();
         for (unsigned k = 0; k < pattern.count; k++) {
-            if (draw(4) == 0) {
+            if (draw(4) == 0)
                 pattern.field[k] = drawn_field();
-            }
             pattern.field[k].formal = draw(3) == 0;
         }
         assert_true(tuple_write(&t, a, sizeof a) > 0);
@@ -130,9 +128,8 @@ static void spreads(void **state) {
         assert_true(tuple_write(&t, bytes, sizeof bytes) > 0);
         count[tuple_key(bytes) % 7]++;
     }
-    for (unsigned i = 0; i < 7; i++) {
+    for (unsigned i = 0; i < 7; i++)
         assert_true(count[i] > 850 && count[i] < 1150);
-    }
 }
 
 int main(void) {

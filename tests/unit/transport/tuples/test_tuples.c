@@ -22,12 +22,10 @@ struct model {
 
 static int model_find(const struct model *m, uint32_t a, uint32_t b,
                       bool wide) {
-    for (unsigned i = 0; i < m->count; i++) {
+    for (unsigned i = 0; i < m->count; i++)
         if ((a == OPEN || a == m->tuples[i].a) &&
-            (b == OPEN || b == m->tuples[i].b) && wide == m->tuples[i].wide) {
+            (b == OPEN || b == m->tuples[i].b) && wide == m->tuples[i].wide)
             return (int)i;
-        }
-    }
     return -1;
 }
 
@@ -55,9 +53,8 @@ static void put(struct world *w, struct model *m, unsigned caller) {
     uint32_t a = draw(w, 5), b = draw(w, 3);
     bool wide = draw(w, 4) == 0;
     struct tuple t = make(a, b, wide, draw(w, 2));
-    if (m->count == MODEL_MAX) {
+    if (m->count == MODEL_MAX)
         return;
-    }
     m->tuples[m->count].a = a;
     m->tuples[m->count].b = b;
     m->tuples[m->count++].wide = wide;
@@ -94,15 +91,13 @@ static void ask(struct world *w, struct model *m, unsigned caller, bool any) {
     }
     enum tuples_status status = finish(w, caller, number, &t);
     assert_int_equal(status, found < 0 ? TUPLES_NO : TUPLES_DONE);
-    if (found < 0) {
+    if (found < 0)
         return;
-    }
     assert_true((a == OPEN || t.field[0].as.uint32 == a) &&
                 (b == OPEN || second(&t) == b));
     found = model_got(m, found, &t, wide, any);
-    if (takes) {
+    if (takes)
         model_drop(m, found);
-    }
 }
 
 /* The caller stays at a place; or goes about, when all is said. */
@@ -118,17 +113,15 @@ static void random_program(unsigned places, bool roams, uint64_t seed) {
             settle(w);
             caller = draw(w, places);
         }
-        if (draw(w, 10) < puts) {
+        if (draw(w, 10) < puts)
             put(w, m, caller);
-        } else {
+        else
             ask(w, m, caller, roams);
-        }
     }
     settle(w);
     assert_int_equal(held(w), m->count);
-    while (m->count > 0) {
+    while (m->count > 0)
         ask(w, m, caller, roams);
-    }
     settle(w);
     assert_int_equal(held(w), 0);
     free_world(w);
@@ -139,9 +132,8 @@ static void equals_model(void **state) {
     static const unsigned places[] = {1, 2, 3, 5, 16};
     (void)state;
     for (uint64_t seed = 0; seed < seeds(40); seed++) {
-        for (unsigned i = 0; i < 5; i++) {
+        for (unsigned i = 0; i < 5; i++)
             random_program(places[i], false, seed);
-        }
         random_program(places[seed % 5], true, seed);
     }
 }
@@ -226,9 +218,8 @@ static void push_back(uint64_t seed) {
                 assert_true(putting[i] >= 0);
             }
         }
-        if (taking < 0 && draw(w, 20) == 0) {
+        if (taking < 0 && draw(w, 20) == 0)
             taking = tuples_in(w->space[4], &pattern);
-        }
         if (taking >= 0 &&
             tuples_poll(w->space[4], taking, &t) == TUPLES_DONE) {
             uint32_t maker = t.field[0].as.uint32;
@@ -241,11 +232,9 @@ static void push_back(uint64_t seed) {
         }
     }
     settle(w);
-    for (unsigned i = 0; i < 4; i++) {
-        if (putting[i] >= 0) {
+    for (unsigned i = 0; i < 4; i++)
+        if (putting[i] >= 0)
             tuples_close(w->space[i], putting[i]);
-        }
-    }
     for (unsigned i = 0; i < 5; i++) {
         const struct tuples_statistics *s = tuples_statistics(w->space[i]);
         refused += (uint32_t)s->held_up;
@@ -259,9 +248,8 @@ static void push_back(uint64_t seed) {
 
 static void pushes_back(void **state) {
     (void)state;
-    for (uint64_t seed = 0; seed < seeds(20); seed++) {
+    for (uint64_t seed = 0; seed < seeds(20); seed++)
         push_back(seed);
-    }
 }
 
 /* A large tuple is not overtaken for ever by small ones: who asked for room
@@ -300,11 +288,9 @@ static void room_in_order(void **state) {
 /* --- generations */
 
 static void drop_messages(struct world *w) {
-    for (unsigned i = 0; i < w->places; i++) {
-        for (unsigned j = 0; j < w->places; j++) {
+    for (unsigned i = 0; i < w->places; i++)
+        for (unsigned j = 0; j < w->places; j++)
             w->way[i][j].count = 0;
-        }
-    }
 }
 
 /* At any moment: all is empty, what was pending has ended, and the space is as
@@ -324,9 +310,8 @@ static void begins_anew(void **state) {
             assert_true(n >= 0 || n == TUPLES_BUSY);
             turn(w);
         }
-        if (seed % 2) {
+        if (seed % 2)
             drop_messages(w);
-        }
         for (unsigned i = 0; i < 4; i++) {
             tuples_renew(w->space[i], 2);
             while (tuples_in(w->space[i], &pattern) != TUPLES_BUSY) {
@@ -362,9 +347,8 @@ static void gives_up(void **state) {
         int number = tuples_in(w->space[3], &pattern);
         t = pair_of((uint32_t)(seed % 5), 7, seed % 2);
         int out = tuples_out(w->space[1], &t);
-        for (unsigned turns = draw(w, 12); turns > 0; turns--) {
+        for (unsigned turns = draw(w, 12); turns > 0; turns--)
             turn(w);
-        }
         uint32_t before = tuples_poll(w->space[3], number, &t) == TUPLES_DONE;
         tuples_close(w->space[3], number);
         finish(w, 1, out, &t);
@@ -406,11 +390,10 @@ static void evaluates(void **state) {
             t.field[1] = TUPLE_UINT32(30 - 2 * i);
             t.field[2] = TUPLE_UINT32(99);
             int number = tuples_eval(w->space[0], 1, &t);
-            if (number == TUPLES_BUSY) {
+            if (number == TUPLES_BUSY)
                 i--;
-            } else {
+            else
                 tuples_close(w->space[0], number);
-            }
             turn(w);
         }
         pattern = t;
@@ -419,16 +402,14 @@ static void evaluates(void **state) {
         for (uint32_t i = 0; i < 12; i++) {
             pattern.field[0] = TUPLE_UINT32(i);
             int number;
-            while ((number = tuples_in(w->space[places - 1], &pattern)) < 0) {
+            while ((number = tuples_in(w->space[places - 1], &pattern)) < 0)
                 turn(w);
-            }
             assert_int_equal(finish(w, places - 1, number, &t), TUPLES_DONE);
             at[t.field[2].as.uint32]++;
         }
         assert_int_equal(at[0], places == 1 ? 12 : 0);
-        for (unsigned i = 1; i < places; i++) {
+        for (unsigned i = 1; i < places; i++)
             assert_true(at[i] * (places - 1) > 12 - places);
-        }
         settle(w);
         assert_int_equal(held(w), 0);
         free_world(w);
@@ -455,9 +436,8 @@ static void keeps_limits(void **state) {
     assert_int_equal(finish(w, 0, tuples_out(w->space[0], &t), &t),
                      TUPLES_DONE);
     t.field[0] = TUPLE_FORMAL(TUPLE_TYPE_BYTES);
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < 3; i++)
         assert_true(tuples_rd(w->space[0], &t) >= 0);
-    }
     assert_int_equal(tuples_rd(w->space[0], &t), TUPLES_BUSY);
     free_world(w);
     config.places = 1;

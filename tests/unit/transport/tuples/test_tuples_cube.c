@@ -52,16 +52,14 @@ static bool work(void *context, struct tuple *tuple) {
         worker->putting = -1;
     }
     if (worker->putting >= 0) {
-        if (tuples_poll(space, worker->putting, &t) != TUPLES_DONE) {
+        if (tuples_poll(space, worker->putting, &t) != TUPLES_DONE)
             return false;
-        }
         tuples_close(space, worker->putting);
         worker->putting = -1;
         worker->taking = tuples_in(space, &pattern);
     }
-    if (tuples_poll(space, worker->taking, &t) != TUPLES_DONE) {
+    if (tuples_poll(space, worker->taking, &t) != TUPLES_DONE)
         return false;
-    }
     if (t.field[2].size == 0) {
         tuples_close(space, worker->taking);
         tuple->field[1] = TUPLE_UINT32(worker->done);
@@ -111,9 +109,8 @@ static void turn(struct party *p) {
                                     message.size));
             cube_release(cube);
         }
-        if (i < m->nodes) {
+        if (i < m->nodes)
             tuples_step(p->space[i]);
-        }
     }
 }
 
@@ -170,9 +167,8 @@ static void master(struct party *p, unsigned workers) {
     }
     pattern.count = 2;
     pattern.field[0] = TUPLE_UINT32('w');
-    for (unsigned i = 0; i < workers; i++) {
+    for (unsigned i = 0; i < workers; i++)
         put(p, i, NULL, 0);
-    }
     for (unsigned i = 0; i < workers; i++) {
         int in = tuples_in(p->space[0], &pattern);
         assert_int_equal(wait_for(p, in, &t), TUPLES_DONE);
@@ -196,9 +192,8 @@ static void triangulates(void **state) {
                 build(dimension, &usual, seed == 2 ? &bad : &perfect, seed);
             open_party(p, m);
             master(p, m->nodes == 1 ? 1 : m->nodes - 1);
-            for (unsigned i = 0; i < 2000; i++) {
+            for (unsigned i = 0; i < 2000; i++)
                 turn(p);
-            }
             for (unsigned i = 0; i < m->nodes; i++) {
                 assert_int_equal(tuples_held(p->space[i]), 0);
                 free(p->space[i]);

@@ -69,9 +69,8 @@ static inline bool end_call(struct world *w, unsigned place, int number,
                             struct call *c, uint32_t now) {
     struct tuple t;
     enum tuples_status status = tuples_poll(w->space[place], number, &t);
-    if (status == TUPLES_PENDING) {
+    if (status == TUPLES_PENDING)
         return false;
-    }
     c->ended = now;
     c->none = status == TUPLES_NO;
     if (status == TUPLES_DONE && c->verb != CALL_OUT) {
@@ -102,9 +101,8 @@ static inline void play(struct history *h, uint64_t seed) {
         for (unsigned i = 0; i < h->callers; i++) {
             struct call *c = &h->call[i][next[i]];
             unsigned place = i % w->places;
-            if (next[i] == h->calls) {
+            if (next[i] == h->calls)
                 continue;
-            }
             if (number[i] < 0 && draw(w, 4) == 0) {
                 number[i] = begin_call(w, place, c);
                 c->began = number[i] < 0 ? NEVER : now + 1;
@@ -136,24 +134,20 @@ struct explainer {
 
 static inline bool is_there(const struct explainer *e, const struct call *c) {
     for (uint32_t a = 0; a < VALUES; a++) {
-        for (uint32_t b = 0; b < VALUES; b++) {
+        for (uint32_t b = 0; b < VALUES; b++)
             if (e->there[a][b] > 0 && (c->a == OPEN || c->a == a) &&
-                (c->b == OPEN || c->b == b)) {
+                (c->b == OPEN || c->b == b))
                 return true;
-            }
-        }
     }
     return false;
 }
 
 /* Whether the call, made now, has the result that was seen. */
 static inline bool fits(const struct explainer *e, const struct call *c) {
-    if (c->verb == CALL_OUT) {
+    if (c->verb == CALL_OUT)
         return true;
-    }
-    if (c->none) {
+    if (c->none)
         return (c->verb == CALL_INP || c->verb == CALL_RDP) && !is_there(e, c);
-    }
     return c->has[0] < VALUES && c->has[1] < VALUES &&
            (c->a == OPEN || c->a == c->has[0]) &&
            (c->b == OPEN || c->b == c->has[1]) &&
@@ -162,11 +156,10 @@ static inline bool fits(const struct explainer *e, const struct call *c) {
 
 static inline void make_call(struct explainer *e, const struct call *c,
                              int sign) {
-    if (c->verb == CALL_OUT) {
+    if (c->verb == CALL_OUT)
         e->there[c->a][c->b] += sign;
-    } else if (!c->none && (c->verb == CALL_IN || c->verb == CALL_INP)) {
+    else if (!c->none && (c->verb == CALL_IN || c->verb == CALL_INP))
         e->there[c->has[0]][c->has[1]] -= sign;
-    }
 }
 
 /* The next of a caller that has ended, or NULL. */
@@ -182,25 +175,21 @@ static inline bool ends_well(const struct explainer *e) {
     int count = 0;
     for (unsigned i = 0; i < e->h->callers; i++) {
         const struct call *c = &e->h->call[i][e->done[i]];
-        if (next_of(e, i) != NULL || (e->done[i] < e->h->calls &&
-                                      c->verb != CALL_OUT && is_there(e, c))) {
+        if (next_of(e, i) != NULL ||
+            (e->done[i] < e->h->calls && c->verb != CALL_OUT && is_there(e, c)))
             return false;
-        }
     }
-    for (unsigned i = 0; i < VALUES * VALUES; i++) {
+    for (unsigned i = 0; i < VALUES * VALUES; i++)
         count += e->there[i / VALUES][i % VALUES];
-    }
     return count == (int)e->h->stored;
 }
 
 static inline bool explain(struct explainer *e) {
     unsigned set = 0;
-    for (unsigned i = 0; i < CALLERS_MAX; i++) {
+    for (unsigned i = 0; i < CALLERS_MAX; i++)
         set = set * (CALLS_MAX + 1) + e->done[i];
-    }
-    if (e->seen[set]) {
+    if (e->seen[set])
         return false;
-    }
     e->seen[set] = 1;
     for (unsigned i = 0; i < e->h->callers; i++) {
         const struct call *c = next_of(e, i);
@@ -209,14 +198,12 @@ static inline bool explain(struct explainer *e) {
             const struct call *other = next_of(e, j);
             first = j == i || other == NULL || other->ended > c->began;
         }
-        if (!first) {
+        if (!first)
             continue;
-        }
         make_call(e, c, 1);
         e->done[i]++;
-        if (explain(e)) {
+        if (explain(e))
             return true;
-        }
         e->done[i]--;
         make_call(e, c, -1);
     }

@@ -53,10 +53,8 @@ static inline int world_write(void *context, uint16_t place, const void *data,
     struct world *w = from->world;
     assert_true(place < w->places && place != from->self);
     assert_true(size <= sizeof w->way[0][0].messages[0].data);
-    if (w->way[from->self][place].count == WORLD_QUEUE ||
-        draw(w, 8) < w->busy) {
+    if (w->way[from->self][place].count == WORLD_QUEUE || draw(w, 8) < w->busy)
         return -1;
-    }
     unsigned at =
         (w->way[from->self][place].first + w->way[from->self][place].count++) %
         WORLD_QUEUE;
@@ -104,9 +102,8 @@ new_world(unsigned places, const struct tuples_config *usual, uint64_t seed) {
 }
 
 static inline void free_world(struct world *w) {
-    for (unsigned i = 0; i < w->places; i++) {
+    for (unsigned i = 0; i < w->places; i++)
         free(w->space[i]);
-    }
     free(w);
 }
 
@@ -125,19 +122,16 @@ static inline void deliver(struct world *w, unsigned from, unsigned to) {
 static inline void turn(struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
         tuples_step(w->space[draw(w, w->places)]);
-        for (unsigned k = draw(w, 4); k > 0; k--) {
+        for (unsigned k = draw(w, 4); k > 0; k--)
             deliver(w, draw(w, w->places), draw(w, w->places));
-        }
     }
 }
 
 static inline bool under_way(const struct world *w) {
     for (unsigned i = 0; i < w->places; i++) {
-        for (unsigned j = 0; j < w->places; j++) {
-            if (w->way[i][j].count > 0) {
+        for (unsigned j = 0; j < w->places; j++)
+            if (w->way[i][j].count > 0)
                 return true;
-            }
-        }
     }
     return false;
 }
@@ -149,9 +143,8 @@ static inline void settle(struct world *w) {
     for (unsigned turns = 0; quiet < 40; turns++) {
         assert_true(turns < WORLD_TURNS);
         unsigned moved = 0;
-        for (unsigned i = 0; i < w->places; i++) {
+        for (unsigned i = 0; i < w->places; i++)
             moved += tuples_step(w->space[i]);
-        }
         moved += under_way(w);
         turn(w);
         quiet = moved > 0 ? 0 : quiet + 1;
@@ -161,9 +154,8 @@ static inline void settle(struct world *w) {
 
 static inline uint32_t held(const struct world *w) {
     uint32_t count = 0;
-    for (unsigned i = 0; i < w->places; i++) {
+    for (unsigned i = 0; i < w->places; i++)
         count += tuples_held(w->space[i]);
-    }
     return count;
 }
 

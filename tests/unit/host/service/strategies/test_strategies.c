@@ -12,17 +12,15 @@ static void check_box(const struct incode_job *job) {
          v < job->last * INCODE_BRICK_POINTS; v++) {
         double p[3];
         host_vertex(&order, v, p);
-        for (int k = 0; k < 3; k++) {
+        for (int k = 0; k < 3; k++)
             assert_true(job->lo[k] <= p[k] && p[k] <= job->hi[k]);
-        }
     }
 }
 
 static void commit_all(const struct host_strategy *strategy, unsigned node,
                        const struct incode_job *job) {
-    for (uint32_t b = job->first; b < job->last; b++) {
+    for (uint32_t b = job->first; b < job->last; b++)
         assert_int_equal(strategy->commit(&work, node, b), 0);
-    }
     assert_int_equal(host_ledger_finish(&ledger, node), 0);
 }
 
@@ -39,22 +37,18 @@ static void test_sequential(void **unused) {
     assert_int_equal(job.last, order.bricks);
     check_box(&job);
     (void)give(0, &job);
-    for (unsigned i = 1; i < NODES; i++) {
+    for (unsigned i = 1; i < NODES; i++)
         assert_false(s->first(&work, i, &none));
-    }
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         assert_false(s->next(&work, i, &none));
-    }
     /* Bricks 0 to 4 are done when node 0 is lost: the rest is node 1's, whole,
      * and no node holds pages any more. */
-    for (uint32_t b = 0; b < 5; b++) {
+    for (uint32_t b = 0; b < 5; b++)
         assert_int_equal(s->commit(&work, 0, b), 0);
-    }
     lose(s, 0);
     assert_string_equal(roles(s), "wwww");
-    for (unsigned i = 1; i < NODES; i++) {
+    for (unsigned i = 1; i < NODES; i++)
         assert_false(s->first(&work, i, &none));
-    }
     assert_false(s->next(&work, 2, &none));
     assert_false(s->next(&work, 3, &none));
     assert_true(s->next(&work, 1, &job));
@@ -85,9 +79,8 @@ static void test_spatial_first(void **unused) {
         check_box(&job);
         (void)give(i, &job);
     }
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         assert_false(s->next(&work, i, &none));
-    }
     /* A brick is for its own node to commit, once. */
     assert_int_equal(s->commit(&work, 1, 0), -1);
     assert_int_equal(s->commit(&work, 0, 0), 0);
@@ -109,9 +102,8 @@ static void test_spatial_loss(void **unused) {
             (void)give(i, &job);
         }
         assert_int_equal(s->commit(&work, 2, order.region[2].first), 0);
-        for (unsigned i = 0; i < gone; i++) {
+        for (unsigned i = 0; i < gone; i++)
             lose(s, i);
-        }
         assert_string_equal(roles(s), "wwww");
         assert_false(s->first(&work, NODES - 1, &job));
         unsigned turn = gone;
@@ -239,9 +231,8 @@ static void test_hybrid(void **unused) {
         (void)give(i, &job);
         assert_false(s->first(&work, i + 1, &none));
     }
-    for (unsigned i = 0; i < NODES; i++) {
+    for (unsigned i = 0; i < NODES; i++)
         assert_false(s->next(&work, i, &none));
-    }
     assert_int_equal(s->commit(&work, 0, 0), 0);
     /* Nodes only start again: the managers share what is left. */
     s->lose(&work);
@@ -315,9 +306,8 @@ static unsigned first_with_bricks(const struct host_strategy *s,
                                   struct incode_job *job) {
     unsigned node = 0;
     while (node < NODES &&
-           !(s->first(&work, node, job) && job->first + 2 <= job->last)) {
+           !(s->first(&work, node, job) && job->first + 2 <= job->last))
         node++;
-    }
     return node;
 }
 

@@ -17,9 +17,8 @@ static bool write_to_all(void *context, uint8_t type, const void *data,
     struct node_regions_message head;
     struct node_page_message page;
     (void)context;
-    if (told.refuse) {
+    if (told.refuse)
         return false;
-    }
     if (type == NODE_PAGE_TO_ALL) {
         assert_int_equal(told.known, NODES + 1);
         memcpy(&told.page, data, sizeof told.page);
@@ -64,9 +63,8 @@ static void goes_to_all(uint32_t frames, uint32_t first) {
     }
     assert_false(s->send(&work, 0));
     assert_int_equal(told.known, NODES + 1);
-    for (unsigned k = 0; k < NODES; k++) {
+    for (unsigned k = 0; k < NODES; k++)
         assert_int_equal(told.first[k], order.region[k].first);
-    }
     assert_int_equal(told.first[NODES], order.bricks);
 }
 
