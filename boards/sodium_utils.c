@@ -1,7 +1,5 @@
 /* What libsodium's primitives call in its utils.c, which would bring an
- * allocator into a node or a loader with it.
- *
- * Memory, work: none to speak of. */
+ * allocator into a node or a loader with it. */
 #include <stdint.h>
 
 #include "transport/secure_wipe.h"

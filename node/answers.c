@@ -29,8 +29,7 @@ bool node_answers_is_for(const struct cube_message *message) {
            message->type == NODE_ECHO || message->type == NODE_ECHOED;
 }
 
-/* --- what comes ------------------------------------------------------------
- */
+/* --- what comes ----------------------------------------------------------- */
 
 static void begin_probe(struct node_answers *a,
                         const struct node_question_message *question) {
@@ -101,8 +100,7 @@ void node_answers_take(struct node_answers *answers,
         take_echo(answers, message, now_us);
 }
 
-/* --- what is answered ------------------------------------------------------
- */
+/* --- what is answered ----------------------------------------------------- */
 
 static uint32_t least(uint64_t value) {
     return value < UINT32_MAX ? (uint32_t)value : UINT32_MAX;

@@ -302,8 +302,7 @@ static void follow_wiring(struct node *n) {
     node_answers_forget(&n->answers);
 }
 
-/* --- what it tells who asks ------------------------------------------------
- */
+/* --- what it tells who asks ----------------------------------------------- */
 
 static void tell_who(void *context, struct node_who *who) {
     const struct node *n = context;

@@ -1,6 +1,4 @@
-/* The version of the programs: the host's and the nodes' are built together.
- *
- * Memory, work: none. */
+/* The version of the programs: the host's and the nodes' are built together. */
 #ifndef NODE_VERSION_H
 #define NODE_VERSION_H
 

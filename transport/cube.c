@@ -11,7 +11,7 @@ enum { HEAD = CUBE_HEAD, STAMP = 6 };
 enum { HOPS_MAX = 255 };         /* off the e-cube paths */
 enum { LOCAL = CUBE_LINKS_MAX }; /* bit of this node among the ways */
 
-/* --- which way ----------------------------------------------------------- */
+/* --- which way ------------------------------------------------------------ */
 
 static bool is_host(const struct cube *cube) {
     return cube->config.self == CUBE_HOST;
@@ -105,7 +105,7 @@ static uint32_t ways_of(const struct cube *cube, unsigned d, unsigned source,
     return dest == CUBE_ALL ? ways_to_all(cube, source) : way_to(cube, dest);
 }
 
-/* --- memory -------------------------------------------------------------- */
+/* --- memory --------------------------------------------------------------- */
 
 static size_t up64(size_t bytes) {
     return (bytes + 63) / 64 * 64;
@@ -147,7 +147,7 @@ struct cube *cube_init(void *arena, size_t bytes,
     return cube;
 }
 
-/* --- passing on ---------------------------------------------------------- */
+/* --- passing on ----------------------------------------------------------- */
 
 /* Whether a message of another generation is to be dropped: the neighbour sent
  * it, and was in our generation afterwards.  If not, it is of a generation that
@@ -313,7 +313,7 @@ int cube_tend(struct cube *cube, uint64_t now_us) {
     return count;
 }
 
-/* --- messages of this node ----------------------------------------------- */
+/* --- messages of this node ------------------------------------------------ */
 
 static uint32_t ways_out(const struct cube *cube, uint16_t dest) {
     LINK_ASSERT(dest != cube->config.self);
@@ -405,7 +405,7 @@ void cube_release(struct cube *cube) {
         done_with(cube, d);
 }
 
-/* --- state --------------------------------------------------------------- */
+/* --- state ---------------------------------------------------------------- */
 
 unsigned cube_links(const struct cube *cube) {
     return cube->count;

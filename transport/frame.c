@@ -35,7 +35,7 @@ static inline word zero_marks(word w) {
     return ~(((w & low) + low) | w | low);
 }
 
-/* --- checks -------------------------------------------------------------- */
+/* --- checks --------------------------------------------------------------- */
 
 /* remainders[c][k][n]: what check c makes of four bits n that 4 k zero bits
  * follow.  A check is linear, so a row holds the sums of what its four bits
@@ -144,7 +144,7 @@ size_t frame_find_zero(const uint8_t *bytes, size_t size) {
     return i;
 }
 
-/* --- encoding ------------------------------------------------------------ */
+/* --- encoding ------------------------------------------------------------- */
 
 /* out == code + 1 + run: the code of the open run is written when it ends. */
 struct writer {
@@ -256,7 +256,7 @@ size_t frame_encode(uint8_t *out, const struct frame_header *header,
     return (size_t)(w.out - out);
 }
 
-/* --- decoding ------------------------------------------------------------ */
+/* --- decoding ------------------------------------------------------------- */
 
 enum { BLOCK = 16 };
 

@@ -115,7 +115,7 @@ static void take_datagram(struct cube *cube, unsigned d,
         tell(cube, d, now_us, false);
 }
 
-/* --- what this end finds itself ------------------------------------------ */
+/* --- what this end finds itself ------------------------------------------- */
 
 /* Link d of this end as others know it. */
 static struct cube_dead name_of(const struct cube *cube, unsigned d) {
@@ -187,7 +187,7 @@ bool cube_reaches(const struct cube *cube, uint16_t node) {
     return routes_reach(&cube->routes, node);
 }
 
-/* --- each poll ----------------------------------------------------------- */
+/* --- each poll ------------------------------------------------------------ */
 
 /* Whether a neighbour who listens has not said the same yet. */
 static bool lags(const struct cube *cube, unsigned d) {

@@ -5,7 +5,7 @@
 #include "check.h"
 #include "link_internal.h"
 
-/* --- memory -------------------------------------------------------------- */
+/* --- memory --------------------------------------------------------------- */
 
 enum { TIMEOUT_FIRST_US = 200000 };
 
@@ -72,7 +72,7 @@ struct link *link_init(void *memory, size_t bytes,
     return link;
 }
 
-/* --- messages ------------------------------------------------------------ */
+/* --- messages ------------------------------------------------------------- */
 
 static unsigned frames_free(const struct link *link) {
     return link->closing || link->closed
@@ -223,7 +223,7 @@ bool link_take_datagram(struct link *link, struct link_message *datagram,
     return true;
 }
 
-/* --- joining session, sender and receiver -------------------------------- */
+/* --- joining session, sender and receiver --------------------------------- */
 
 /* What a frame's session means for the two windows. */
 static void enter(struct link *link, enum link_session session) {
@@ -375,7 +375,7 @@ int link_poll(struct link *link, uint64_t now_us) {
     return count + link_poll_send(link, now_us);
 }
 
-/* --- state --------------------------------------------------------------- */
+/* --- state ---------------------------------------------------------------- */
 
 void link_close(struct link *link, uint64_t deadline_us) {
     link->closing = true;

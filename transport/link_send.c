@@ -21,7 +21,7 @@ uint32_t link_timeout_us(const struct link *link) {
     return us < most ? (uint32_t)us : most;
 }
 
-/* --- what acknowledgements say ------------------------------------------- */
+/* --- what acknowledgements say -------------------------------------------- */
 
 /* Smoothed round trip and its variation (Jacobson, 1988; RFC 6298). */
 static void measure(struct link *link, uint32_t rtt) {
@@ -155,7 +155,7 @@ void link_send_resume(struct link *link) {
     mark_lost(link, link->send.order);
 }
 
-/* --- frames -------------------------------------------------------------- */
+/* --- frames --------------------------------------------------------------- */
 
 static bool may_send_next(const struct link *link) {
     const struct link_sender *s = &link->send;
@@ -292,7 +292,7 @@ static void stage_bye(struct link *link, unsigned flags) {
     link->bye_us = link->now_us;
 }
 
-/* --- timers -------------------------------------------------------------- */
+/* --- timers --------------------------------------------------------------- */
 
 static void timeout(struct link *link) {
     struct link_sender *s = &link->send;
@@ -332,7 +332,7 @@ void link_run_timer(struct link *link) {
         s->backoff++;
 }
 
-/* --- bytes --------------------------------------------------------------- */
+/* --- bytes ---------------------------------------------------------------- */
 
 void link_forget_staged(struct link *link) {
     link->stalled = false;

@@ -10,7 +10,7 @@
 static_assert(WIRING_BYTES_MAX <= (int)LINK_DATAGRAM_MAX,
               "the wiring fits a datagram");
 
-/* --- bytes --------------------------------------------------------------- */
+/* --- bytes ---------------------------------------------------------------- */
 
 static void put(uint8_t **at, uint32_t value, unsigned bytes) {
     for (unsigned i = 0; i < bytes; i++)
@@ -48,7 +48,7 @@ size_t wiring_pack(const struct cube_wiring *wiring, uint8_t *bytes) {
     return (size_t)(at - bytes);
 }
 
-/* --- sets ---------------------------------------------------------------- */
+/* --- sets ----------------------------------------------------------------- */
 
 /* The order in which entries are kept. */
 static uint32_t rank_of_dead(const struct cube_dead *dead) {
@@ -174,7 +174,7 @@ bool wiring_merge(struct cube_wiring *mine, const struct cube_wiring *theirs,
     return changed;
 }
 
-/* --- from afar ----------------------------------------------------------- */
+/* --- from afar ------------------------------------------------------------ */
 
 static bool sound(const struct cube_wiring *wiring, unsigned dimension) {
     unsigned nodes = 1u << dimension;
@@ -240,7 +240,7 @@ bool wiring_unpack(struct cube_wiring *wiring, const uint8_t *bytes,
     return sound(wiring, dimension) && in_order(wiring, dimension);
 }
 
-/* --- a new generation ---------------------------------------------------- */
+/* --- a new generation ----------------------------------------------------- */
 
 /* The gateway lives while its host's wire does. */
 static bool all_links_dead(const struct cube_wiring *wiring, unsigned node,
@@ -275,7 +275,7 @@ void wiring_settle(struct cube_wiring *wiring, unsigned dimension) {
 
 /* --- routes --------------------------------------------------------------- */
 
-/* --- the table of altered parents ---------------------------------------- */
+/* --- the table of altered parents ----------------------------------------- */
 
 static unsigned lowest_bit(unsigned bits) {
     return (unsigned)__builtin_ctz(bits);
@@ -354,7 +354,7 @@ static unsigned root_of(const struct routes *routes, unsigned node) {
     return node;
 }
 
-/* --- what is dead -------------------------------------------------------- */
+/* --- what is dead --------------------------------------------------------- */
 
 static bool link_is_dead(const struct routes *routes, unsigned node,
                          unsigned link) {
@@ -379,7 +379,7 @@ static void set_free(struct routes *routes, unsigned node, unsigned link) {
         set_parent(routes, other, ROUTES_NONE);
 }
 
-/* --- the tree ------------------------------------------------------------ */
+/* --- the tree ------------------------------------------------------------- */
 
 /* Ties the subtree of a node to `parent` by that node. */
 static void tie(struct routes *routes, unsigned node, unsigned parent) {
@@ -452,7 +452,7 @@ void routes_find(struct routes *routes, const struct cube_wiring *wiring) {
     tie_all(routes);
 }
 
-/* --- ways ---------------------------------------------------------------- */
+/* --- ways ----------------------------------------------------------------- */
 
 bool routes_reach(const struct routes *routes, unsigned node) {
     return !routes->tree || root_of(routes, node) == routes->wiring.gateway;

@@ -89,7 +89,7 @@ static uint32_t head_ahead(const uint8_t head[SECURE_HEAD_BYTES],
     return bytes_get32(head + 4) - (uint32_t)expected;
 }
 
-/* --- proving ------------------------------------------------------------- */
+/* --- proving -------------------------------------------------------------- */
 
 static void put_ends(uint8_t *greeting, const struct secure_ends *ends) {
     greeting[PORT] = ends->self.port;
@@ -292,7 +292,7 @@ bool secure_greets(const uint8_t *bytes, size_t size) {
     return size >= sizeof mark && memcmp(bytes, mark, sizeof mark - 1) == 0;
 }
 
-/* --- records ------------------------------------------------------------- */
+/* --- records -------------------------------------------------------------- */
 
 void secure_records_start(struct secure_records *records,
                           struct secure_shake *shake,

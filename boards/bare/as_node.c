@@ -18,8 +18,7 @@ enum {
     SAID = 600           /* bytes of a record, at most */
 };
 
-/* --- what it says ----------------------------------------------------------
- */
+/* --- what it says --------------------------------------------------------- */
 
 static void tell(struct cube_text *text, const char *what, size_t number) {
     cube_text_put(text, what);
@@ -161,8 +160,7 @@ static uint32_t lost(void *context, unsigned d) {
     return bare_uart[host ? 0 : d + 1].overruns;
 }
 
-/* --- its start -------------------------------------------------------------
- */
+/* --- its start ------------------------------------------------------------ */
 
 static struct loader_budget kept __attribute__((section(".noinit.budget")));
 
@@ -258,8 +256,7 @@ void bare_node_learn(struct bare_node *bare) {
         bare_uart_leave(0);
 }
 
-/* --- what it is asked ------------------------------------------------------
- */
+/* --- what it is asked ----------------------------------------------------- */
 
 static void answer_help(const struct bare_node *bare, struct cube_text *text) {
     (void)bare;

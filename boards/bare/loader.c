@@ -11,10 +11,8 @@
 #include "fault_text.h"
 #include "node/loader/incoming.h"
 #include "node/version.h"
-#include "transport/sign_suite.h"
+#include "sign_key.h"
 #include "transport/drivers/sign_sodium.h"
-
-extern const uint8_t bare_sign_key[SIGN_PUBLIC_BYTES];
 
 static struct bare_node bare;
 static struct loader_rules rules;
@@ -25,8 +23,7 @@ static unsigned links(struct node_link_state state[CUBE_LINKS_MAX]) {
     return loader_links(loader, state);
 }
 
-/* --- the image -------------------------------------------------------------
- */
+/* --- the image ------------------------------------------------------------ */
 
 /* What the image is told, and the host where the loader stays. */
 static void describe(unsigned slot) {
@@ -63,8 +60,7 @@ static void start(unsigned slot) {
     board_launch(board_facts.image_at);
 }
 
-/* --- its start -------------------------------------------------------------
- */
+/* --- its start ------------------------------------------------------------ */
 
 static void begin(void) {
     bare_node_begin(&bare, true);

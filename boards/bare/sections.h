@@ -1,6 +1,4 @@
-/* Where start.ld has laid things.
- *
- * Memory, work: none. */
+/* Where start.ld has laid things. */
 #ifndef BOARDS_BARE_SECTIONS_H
 #define BOARDS_BARE_SECTIONS_H
 

@@ -10,8 +10,7 @@ void bare_shell_init(struct bare_shell *shell, struct link_pipe beneath) {
     shell->beneath = beneath;
 }
 
-/* --- what comes ------------------------------------------------------------
- */
+/* --- what comes ----------------------------------------------------------- */
 
 static bool is_letter(uint8_t byte) {
     uint8_t small = byte | 0x20;
@@ -123,8 +122,7 @@ void bare_shell_alone(struct bare_shell *shell) {
     shell->within = false; /* no link ends what was begun */
 }
 
-/* --- what goes -------------------------------------------------------------
- */
+/* --- what goes ------------------------------------------------------------ */
 
 static void say_on(struct bare_shell *s) {
     size_t left = s->said_size - s->said_sent;

@@ -1,7 +1,5 @@
 /* Registers of Arm's Cortex-M System Design Kit, as on the MPS2 boards, and of
- * the Cortex-M processor itself.
- *
- * Memory, work: none. */
+ * the Cortex-M processor itself. */
 #ifndef BOARDS_CMSDK_REGISTERS_H
 #define BOARDS_CMSDK_REGISTERS_H
 

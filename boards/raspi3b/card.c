@@ -94,8 +94,7 @@ static struct {
     bool ready, large;
 } it;
 
-/* --- the controller --------------------------------------------------------
- */
+/* --- the controller ------------------------------------------------------- */
 
 static uint32_t get(unsigned word) {
     return raspi3b_at(RASPI3B_CARD)[word];
@@ -166,8 +165,7 @@ static bool ask(uint32_t command, uint32_t argument, uint32_t *answer) {
     return true;
 }
 
-/* --- the card --------------------------------------------------------------
- */
+/* --- the card ------------------------------------------------------------- */
 
 /* Its own command of that number. */
 static bool ask_own(uint32_t command, uint32_t argument, uint32_t *answer) {
@@ -280,8 +278,7 @@ static bool raspi3b_card_write(void *device, uint32_t block,
     return try_to(block, NULL, bytes);
 }
 
-/* --- as a flash ------------------------------------------------------------
- */
+/* --- as a flash ----------------------------------------------------------- */
 
 static struct loader_card card = {.read = raspi3b_card_read,
                                   .write = raspi3b_card_write};

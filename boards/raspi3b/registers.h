@@ -1,7 +1,5 @@
 /* Registers of the Raspberry Pi 3 (Broadcom, BCM2835 ARM Peripherals, and
- * QA7 for those of the processors), and what C cannot say (start.S).
- *
- * Memory, work: none. */
+ * QA7 for those of the processors), and what C cannot say (start.S). */
 #ifndef BOARDS_RASPI3B_REGISTERS_H
 #define BOARDS_RASPI3B_REGISTERS_H
 
@@ -25,8 +23,7 @@ static inline volatile uint32_t *raspi3b_at(uint32_t address) {
     return (volatile uint32_t *)(uintptr_t)address;
 }
 
-/* --- in start.S ------------------------------------------------------------
- */
+/* --- in start.S ----------------------------------------------------------- */
 
 /* The timers' counter, and its beats a second. */
 uint64_t raspi3b_count(void);
@@ -48,34 +45,33 @@ void raspi3b_barrier(void);
 /* Lets the guard's interrupt through, for good. */
 void raspi3b_guard_on(void);
 
-/* --- what start.S calls ----------------------------------------------------
- */
+/* --- what start.S calls --------------------------------------------------- */
 
 void raspi3b_tables(void);
 void raspi3b_interrupt(void);
 
-/* --- in what starts before main --------------------------------------------
- */
+/* --- in what starts before main ------------------------------------------- */
 
 void raspi3b_uarts_start(void);
 void raspi3b_time_start(void);
 
-/* --- the pins --------------------------------------------------------------
- */
+/* --- the pins ------------------------------------------------------------- */
 
 enum { RASPI3B_FUNCTION_0 = 4, RASPI3B_FUNCTION_3 = 7, RASPI3B_FUNCTION_5 = 2 };
 void raspi3b_pin(unsigned number, uint32_t function);
 void raspi3b_pull_up(uint64_t pins); /* a bit each */
 
-/* --- the card --------------------------------------------------------------
- */
+/* --- the card ------------------------------------------------------------- */
 
 extern const struct loader_flash raspi3b_flash;
 
-/* --- handlers ---------------------------------------------------------------
- */
+/* --- handlers ------------------------------------------------------------- */
 
 void raspi3b_pl011(void);
+void raspi3b_pl011_receive(void);
+void raspi3b_pl011_send(void);
 void raspi3b_mini(void);
+void raspi3b_mini_receive(void);
+void raspi3b_mini_send(void);
 
 #endif

@@ -5,8 +5,7 @@
 
 enum { CONSOLE_US = 100000 };
 
-/* --- the PL011: words behind RASPI3B_PL011 ----------------------------------
- */
+/* --- the PL011: words behind RASPI3B_PL011 -------------------------------- */
 
 enum {
     DR = 0,
@@ -30,8 +29,7 @@ enum {
 enum { EIGHT_BITS_BUFFERED = 0x70, ON_BOTH_WAYS = 0x301 };
 enum { PL011_HZ = 48000000 };
 
-/* --- the mini UART: words behind RASPI3B_AUX ---------------------------------
- */
+/* --- the mini UART: words behind RASPI3B_AUX ------------------------------ */
 
 enum {
     ENABLES = 0x04 / 4,
@@ -51,7 +49,7 @@ enum { CORE_HZ = 250000000 }; /* enable_uart=1 in config.txt holds it there */
 
 /* Bytes that come leave the interrupt when they are taken; it is never cleared,
  * as that would hide those that are left. */
-static RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
+RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[FR] & FR_NOTHING_CAME) == 0;
          n++) {
@@ -63,7 +61,7 @@ static RASPI3B_HANDLER void raspi3b_pl011_receive(void) {
 
 /* The interrupt comes when no more than 2 bytes are left; as long as there are
  * others to send, 4 are put at least, so that it comes again. */
-static RASPI3B_HANDLER void raspi3b_pl011_send(void) {
+RASPI3B_HANDLER void raspi3b_pl011_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_PL011);
     uint8_t byte;
     uart[ICR] = INT_SEND;
@@ -73,7 +71,7 @@ static RASPI3B_HANDLER void raspi3b_pl011_send(void) {
         uart[DR] = byte;
 }
 
-static RASPI3B_HANDLER void raspi3b_mini_receive(void) {
+RASPI3B_HANDLER void raspi3b_mini_receive(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint32_t state = LSR_CAME;
     for (int n = 0; n < BARE_BYTES_A_CALL && (state & LSR_CAME) != 0; n++) {
@@ -85,7 +83,7 @@ static RASPI3B_HANDLER void raspi3b_mini_receive(void) {
 
 /* Its interrupt comes as long as it has nothing to send: so it is asked for
  * while there is. */
-static RASPI3B_HANDLER void raspi3b_mini_send(void) {
+RASPI3B_HANDLER void raspi3b_mini_send(void) {
     volatile uint32_t *uart = raspi3b_at(RASPI3B_AUX);
     uint8_t byte;
     for (int n = 0; n < BARE_BYTES_A_CALL && (uart[LSR] & LSR_ROOM) != 0 &&

@@ -84,8 +84,7 @@ int host_text_quote(char *out, size_t size, const char *text) {
     return fits ? 0 : -1;
 }
 
-/* --- what was meant ---------------------------------------------------------
- */
+/* --- what was meant ------------------------------------------------------- */
 
 enum { WORD_MAX = 40 };
 
@@ -129,8 +128,7 @@ const char *host_text_nearest(const char *word,
     return nearest;
 }
 
-/* --- for a terminal --------------------------------------------------------
- */
+/* --- for a terminal ------------------------------------------------------- */
 
 void host_say(FILE *stream, const char *format, ...) {
     char raw[HOST_SAY_BYTES], line[HOST_SAY_BYTES];

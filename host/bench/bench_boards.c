@@ -285,8 +285,7 @@ struct bench {
     unsigned rows;
 };
 
-/* --- the emulator, with what counts -----------------------------------------
- */
+/* --- the emulator, with what counts --------------------------------------- */
 
 /* A program of its name, which is found before it and becomes it. */
 static int stand_in(const struct bench *b, const struct host_bare *bare,

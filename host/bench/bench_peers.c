@@ -266,8 +266,7 @@ struct bench {
     bool left_out;               /* the set at hand has no triangulation */
 };
 
-/* --- one set ---------------------------------------------------------------
- */
+/* --- one set -------------------------------------------------------------- */
 
 /* The command of a turn; false: it has none in this class. */
 static bool command(struct bench *b, unsigned turn,
@@ -420,8 +419,7 @@ static int measure(struct bench *b, const struct host_bench_set *set,
     return 0;
 }
 
-/* --- files -----------------------------------------------------------------
- */
+/* --- files ---------------------------------------------------------------- */
 
 static int add_file(struct bench *b, char *path, struct host_error *error) {
     if (path == NULL || b->files == HOST_BENCH_ROWS_MAX) {
@@ -477,8 +475,7 @@ static int find_files(struct bench *b, struct host_error *error) {
     return error->code;
 }
 
-/* --- classes ---------------------------------------------------------------
- */
+/* --- classes -------------------------------------------------------------- */
 
 /* Those of the files that are of this class. */
 static int measure_files(struct bench *b, struct host_error *error) {

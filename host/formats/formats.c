@@ -83,7 +83,7 @@ const struct host_format *host_format_of(const char *path, enum host_use use) {
                : f;
 }
 
-/* --- for people ------------------------------------------------------- */
+/* --- for people ----------------------------------------------------------- */
 
 struct text {
     char *at;

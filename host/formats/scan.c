@@ -103,7 +103,7 @@ int host_scan_end(struct host_scan *s, struct host_error *error,
                                          : 0;
 }
 
-/* --- Numbers ---------------------------------------------------------- */
+/* --- Numbers -------------------------------------------------------------- */
 
 static const uint64_t power10[20] = {1,
                                      10,
@@ -343,7 +343,7 @@ int host_scan_unsigned(struct host_scan *s, uint64_t most, uint64_t *value,
     return 0;
 }
 
-/* --- Words ------------------------------------------------------------ */
+/* --- Words ---------------------------------------------------------------- */
 
 static size_t word_length(struct host_scan *s) {
     if (!host_scan_more(s))

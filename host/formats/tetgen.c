@@ -8,7 +8,7 @@
 #include "rows.h"
 #include "scan.h"
 
-/* --- .node ------------------------------------------------------------ */
+/* --- .node ---------------------------------------------------------------- */
 
 static int read_node(const struct host_source *source, struct host_mesh *mesh,
                      struct host_error *error) {
@@ -64,7 +64,7 @@ static void write_node_beside(struct host_output *out,
     }
 }
 
-/* --- .neigh and .face ------------------------------------------------- */
+/* --- .neigh and .face ----------------------------------------------------- */
 
 /* Neighbours opposite the corners, from the groups of lowest vertices.  The
  * one opposite a tetrahedron's own lowest vertex is of a later group, so a
@@ -179,7 +179,7 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
     return error->code;
 }
 
-/* --- .ele ------------------------------------------------------------- */
+/* --- .ele ----------------------------------------------------------------- */
 
 static int read_ele(const struct host_source *source, struct host_mesh *mesh,
                     struct host_error *error) {

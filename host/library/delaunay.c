@@ -59,7 +59,7 @@ static void fail(struct direct *run, enum host_direct outcome,
         atomic_store(&run->why, why);
 }
 
-/* --- what a triangulator asks for --------------------------------------- */
+/* --- what a triangulator asks for ----------------------------------------- */
 
 static bool request(void *context, uint32_t page) {
     struct worker *w = context;
@@ -117,7 +117,7 @@ static bool unspill(void *context, uint32_t brick) {
     return true;
 }
 
-/* --- what it gets -------------------------------------------------------- */
+/* --- what it gets --------------------------------------------------------- */
 
 static bool deliver_faces(struct worker *w) {
     uint32_t brick = w->wanted, count;
@@ -173,7 +173,7 @@ static void do_region(struct worker *w, uint32_t number) {
     }
 }
 
-/* --- threads ------------------------------------------------------------- */
+/* --- threads -------------------------------------------------------------- */
 
 static double used_s(clockid_t clock) {
     struct timespec t;

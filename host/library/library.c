@@ -42,7 +42,7 @@ struct work {
     bool finished;
 };
 
-/* --- points -------------------------------------------------------------- */
+/* --- points --------------------------------------------------------------- */
 
 struct scan {
     const double *xyz;
@@ -84,8 +84,7 @@ static uint64_t find_infinite(const double *xyz, uint64_t rows) {
     return rows;
 }
 
-/* --- what else is wanted ---------------------------------------------------
- */
+/* --- what else is wanted -------------------------------------------------- */
 
 /* A share of the facets, by their lowest vertices. */
 struct facets {
@@ -227,7 +226,7 @@ static enum incode_status list_duplicates(struct work *w) {
     return enough ? INCODE_OK : INCODE_NO_MEMORY;
 }
 
-/* --- all together ------------------------------------------------------- */
+/* --- all together --------------------------------------------------------- */
 
 static enum incode_status make_order(struct work *w) {
     static const enum incode_status status[] = {

@@ -125,7 +125,7 @@ static bool run_search(struct search *s) {
     return enough;
 }
 
-/* --- Records ---------------------------------------------------------- */
+/* --- Records -------------------------------------------------------------- */
 
 static uint64_t part_start(const struct search *s, unsigned part) {
     return s->rows / s->parts * part +

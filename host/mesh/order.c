@@ -18,7 +18,7 @@ enum { FORK_POINTS = 1 << 13 };
 /* Vertex numbers of all bricks must stay below INCODE_NONE. */
 static const uint64_t bricks_max = (UINT64_C(1) << 26) - 1024;
 
-/* --- Regions ---------------------------------------------------------- */
+/* --- Regions -------------------------------------------------------------- */
 
 struct cut {
     struct host_order *order;
@@ -108,7 +108,7 @@ static void cut_regions(void *argument) {
     }
 }
 
-/* --- Bricks ----------------------------------------------------------- */
+/* --- Bricks --------------------------------------------------------------- */
 
 struct spread {
     struct host_order *order;
@@ -177,7 +177,7 @@ static uint64_t number_bricks(struct host_order *order) {
     return bricks;
 }
 
-/* --- Box pages -------------------------------------------------------- */
+/* --- Box pages ------------------------------------------------------------ */
 
 /* A level of box pages, a share of it for each thread. */
 struct level {
@@ -244,7 +244,7 @@ static void make_boxes(struct host_order *order, struct host_lump *lump) {
     }
 }
 
-/* --- The uniform grid ------------------------------------------------- */
+/* --- The uniform grid ----------------------------------------------------- */
 
 static uint32_t cells_along(double extent, double side) {
     double cells = extent / side;
@@ -308,7 +308,7 @@ static int make_grid(struct host_order *order, struct host_error *error) {
     return 0;
 }
 
-/* --- Dimension -------------------------------------------------------- */
+/* --- Dimension ------------------------------------------------------------ */
 
 /* Points that span the space: the first that is off the first two's line, the
  * first that is off that plane.  Neighbours in this order are close, so
@@ -339,7 +339,7 @@ static int check_dimension(struct host_order *order, const char *where,
                      where, order->points, plane ? "plane" : "line");
 }
 
-/* --- All together ----------------------------------------------------- */
+/* --- All together --------------------------------------------------------- */
 
 static int allocate(struct host_order *order, struct host_error *error) {
     size_t bricks = order->bricks;

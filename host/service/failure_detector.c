@@ -23,7 +23,7 @@ unsigned host_detector_wire(const struct host_service *service) {
     return gateway != 0 && gateway == s->machine->spare_node ? 1 : 0;
 }
 
-/* --- the beginning ------------------------------------------------------- */
+/* --- the beginning -------------------------------------------------------- */
 
 /* A start of a node is over.  Of what it did and no statistics tell, this much
  * is known: it built the tetrahedra that it sent. */

@@ -19,7 +19,7 @@ enum {
     RESTART_US = 20000 /* of a node that was told to */
 };
 
-/* --- the nodes in the order of their clocks ------------------------------ */
+/* --- the nodes in the order of their clocks ------------------------------- */
 
 static bool before(const struct host_world *w, uint32_t a, uint32_t b) {
     uint64_t s = w->node[a].wake_us, t = w->node[b].wake_us;
@@ -119,7 +119,7 @@ void host_world_second_host(struct host_world *world, bool comes) {
     world->second_us = comes ? world->now_us : UINT64_MAX;
 }
 
-/* --- nodes --------------------------------------------------------------- */
+/* --- nodes ---------------------------------------------------------------- */
 
 /* Nanoseconds of this step so far. */
 static uint64_t spent_ns(const struct host_world_node *node) {
@@ -356,7 +356,7 @@ static void step(struct host_world *w, unsigned i) {
         rouse(w, i, next_duty(w, n));
 }
 
-/* --- time ---------------------------------------------------------------- */
+/* --- time ----------------------------------------------------------------- */
 
 uint64_t host_world_host_due(const struct host_world *world, unsigned host) {
     uint64_t due = UINT64_MAX;
@@ -431,7 +431,7 @@ void host_world_halt(struct host_world *world) {
         wake_at(world, i, UINT64_MAX);
 }
 
-/* --- from nothing, and back ---------------------------------------------- */
+/* --- from nothing, and back ----------------------------------------------- */
 
 static int open_node(struct host_world *w, unsigned i) {
     struct host_world_node *n = &w->node[i];

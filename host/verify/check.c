@@ -31,7 +31,7 @@
 
 enum { NAMED_MAX = 8 }; /* faults in the report's text */
 
-/* --- Faults ----------------------------------------------------------- */
+/* --- Faults --------------------------------------------------------------- */
 
 static bool make_fault_room(struct check *c) {
     uint64_t room = c->faults_room + c->faults_room / 2 + NAMED_MAX;
@@ -121,7 +121,7 @@ static void verdict(const struct check *c) {
     }
 }
 
-/* --- The boundary ----------------------------------------------------- */
+/* --- The boundary --------------------------------------------------------- */
 
 static void hull_fault(void *context, const uint64_t *tets, int tet_count,
                        const uint32_t *vertices, int count, const char *what) {
@@ -176,7 +176,7 @@ static int check_boundary(struct check *c) {
     return c->error->code;
 }
 
-/* --- All together ----------------------------------------------------- */
+/* --- All together --------------------------------------------------------- */
 
 /* Ranges of whole words of `bad`, whose entries have 32 bits. */
 static int cut_parts(struct check *c) {
@@ -272,7 +272,7 @@ int host_verify(const struct host_points *points,
 
 enum { BATCH = 64, TABLE_MIN = 64 };
 
-/* --- The lists -------------------------------------------------------- */
+/* --- The lists ------------------------------------------------------------ */
 
 static uint64_t size_of(const struct check_part *part) {
     return part->list == NULL ? part->last - part->first : part->listed;
@@ -312,7 +312,7 @@ static void list_entries(void *context, unsigned number) {
     }
 }
 
-/* --- Spheres ---------------------------------------------------------- */
+/* --- Spheres -------------------------------------------------------------- */
 
 /* Pairs of tetrahedra: the apex of the second and the sphere of the first. */
 struct spheres {
@@ -392,7 +392,7 @@ static void check_spheres(struct check *c, struct spheres *s,
     s->n = 0;
 }
 
-/* --- Facets of a vertex ----------------------------------------------- */
+/* --- Facets of a vertex --------------------------------------------------- */
 
 /* A facet that waits: its other vertices, ascending; tetrahedron, corner
  * opposite, side.  PAIRED once its twin was there. */
@@ -547,7 +547,7 @@ static void walk_vertices(void *context, unsigned number) {
     check_fail(c, &w.error);
 }
 
-/* --- All together ----------------------------------------------------- */
+/* --- All together --------------------------------------------------------- */
 
 /* twins.c: pairs the facets of all tetrahedra, or of those that are listed, and
  * adds the facets without a twin to the hull. */

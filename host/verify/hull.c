@@ -122,7 +122,7 @@ static void for_all(struct hull_check *c, uint64_t count,
     host_fork_all(count > TURN ? host_threads() : 1, run_some, &all);
 }
 
-/* --- Edges ------------------------------------------------------------ */
+/* --- Edges ---------------------------------------------------------------- */
 
 /* No dent: the other facet's third vertex is not above this one.  Where it is
  * level, both must face the same way, or the surface folds back. */
@@ -251,7 +251,7 @@ static int check_edges(struct hull_check *c, struct host_error *error) {
     return error->code;
 }
 
-/* --- Wound once ------------------------------------------------------- */
+/* --- Wound once ----------------------------------------------------------- */
 
 static uint64_t mix(uint64_t z) {
     z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);

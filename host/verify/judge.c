@@ -12,7 +12,7 @@ enum { GROUP = INCODE_BRICK_POINTS }; /* bricks a group, points a brick */
  * and `least` for all underflows together. */
 static const double rounding = 64 * 0x1p-53, least = 1e-290;
 
-/* --- Boxes ------------------------------------------------------------ */
+/* --- Boxes ---------------------------------------------------------------- */
 
 static void cover(const struct host_judge *j, uint64_t box, const double lo[3],
                   const double hi[3]) {
@@ -60,7 +60,7 @@ void host_judge_free(struct host_judge *judge) {
     *judge = (struct host_judge){0};
 }
 
-/* --- The query ---------------------------------------------------- */
+/* --- The query ------------------------------------------------------------ */
 
 /* A half-space n . X > 0, and a ball volume |X|^2 < g . X inside it, where X =
  * x - a; each coefficient with the sum of the sizes of its terms. */

@@ -31,7 +31,7 @@ static inline uint64_t mark_of(uint32_t vertex, const uint64_t key[2]) {
     return (x ^ x >> 31) | 1;
 }
 
-/* --- A block of tetrahedra -------------------------------------------- */
+/* --- A block of tetrahedra ------------------------------------------------ */
 
 struct block {
     const struct check *c;
@@ -245,7 +245,7 @@ static void sum_part(void *context, unsigned number) {
     }
 }
 
-/* --- Hot vertices, and their tetrahedra ------------------------------- */
+/* --- Hot vertices, and their tetrahedra ----------------------------------- */
 
 static void find_hot(void *context, unsigned number) {
     (void)number;
@@ -299,7 +299,7 @@ static void list_part(void *context, unsigned number) {
     part->listed = listed;
 }
 
-/* --- All together ----------------------------------------------------- */
+/* --- All together --------------------------------------------------------- */
 
 static bool make_room(struct check *c) {
     size_t count = (size_t)c->sites->count;

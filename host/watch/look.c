@@ -123,8 +123,7 @@ static bool host_holder_of(struct host_holder *holder, int file) {
     return true;
 }
 
-/* --- whether a process has a wire open -------------------------------------
- */
+/* --- whether a process has a wire open ------------------------------------ */
 
 /* Whether the process still has the user that took the meeting place. */
 static bool is_of_user(const struct host_holder *holder) {
@@ -227,8 +226,7 @@ static bool host_holder_believed(const struct host_holder *holder,
            (geteuid() == 0 && has_open(holder, wire));
 }
 
-/* --- who has it ------------------------------------------------------------
- */
+/* --- who has it ----------------------------------------------------------- */
 
 /* One that takes no calls for so long that its queue is full has the wire, and
  * nobody is told who it is. */

@@ -10,8 +10,7 @@ enum {
     BYTES = LOADER_CARD_SECTORS * LOADER_CARD_SECTOR
 };
 
-/* --- the table: the card's first block -------------------------------------
- */
+/* --- the table: the card's first block ------------------------------------ */
 
 enum {
     PARTITIONS = 4,
@@ -53,8 +52,7 @@ bool loader_card_format(struct loader_card *card) {
     return card->write(card->device, 0, card->bytes) && loader_card_open(card);
 }
 
-/* --- blocks of the partition -----------------------------------------------
- */
+/* --- blocks of the partition ---------------------------------------------- */
 
 /* Into card->bytes. */
 static bool fetch(struct loader_card *card, uint32_t number) {
@@ -132,8 +130,7 @@ bool loader_card_erase(void *context, uint32_t sector) {
     return true;
 }
 
-/* --- in memory -------------------------------------------------------------
- */
+/* --- in memory ------------------------------------------------------------ */
 
 bool loader_card_fetch(void *memory, uint32_t block, uint8_t *bytes) {
     memcpy(bytes, (const uint8_t *)memory + (size_t)block * BLOCK, BLOCK);

@@ -98,8 +98,7 @@ void loader_incoming_init(struct loader_incoming *incoming,
     incoming->phase = LOADER_WAITS;
 }
 
-/* --- it begins -------------------------------------------------------------
- */
+/* --- it begins ------------------------------------------------------------ */
 
 void loader_incoming_begin(struct loader_incoming *incoming,
                            const uint8_t header[LOADER_HEADER_BYTES],
@@ -266,8 +265,7 @@ static void count(struct loader_incoming *in) {
     }
 }
 
-/* --- blocks ----------------------------------------------------------------
- */
+/* --- blocks --------------------------------------------------------------- */
 
 void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
                            const uint8_t *bytes, uint32_t size, uint32_t crc) {
@@ -359,8 +357,7 @@ static void write(struct loader_incoming *in) {
     program(in);
 }
 
-/* --- the end ---------------------------------------------------------------
- */
+/* --- the end -------------------------------------------------------------- */
 
 void loader_incoming_verify(struct loader_incoming *incoming) {
     struct loader_incoming *in = incoming;

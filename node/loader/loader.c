@@ -60,8 +60,7 @@ struct loader *loader_start(const struct node_board *board,
     return loader;
 }
 
-/* --- what comes ------------------------------------------------------------
- */
+/* --- what comes ----------------------------------------------------------- */
 
 static void take_ping(struct loader *l, const struct cube_message *message) {
     struct node_ping_message ping;
@@ -210,8 +209,7 @@ static void follow_wiring(struct loader *l) {
     node_answers_forget(&l->answers);
 }
 
-/* --- what it says ----------------------------------------------------------
- */
+/* --- what it says --------------------------------------------------------- */
 
 static bool say(struct loader *l, uint8_t type, const void *data, size_t size) {
     return node_counted_write(&l->counted, CUBE_HOST, type, data, size) == 0;
@@ -301,8 +299,7 @@ static void send(struct loader *l) {
     (void)node_answers_send(&l->answers, &teller, l->now_us);
 }
 
-/* --- a step ----------------------------------------------------------------
- */
+/* --- a step --------------------------------------------------------------- */
 
 /* What the host waits for to go on is said unasked. */
 static void look_at_phase(struct loader *l) {

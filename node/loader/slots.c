@@ -15,8 +15,7 @@ enum {
     SERIAL_BYTES = 32
 };
 
-/* --- the state -------------------------------------------------------------
- */
+/* --- the state ------------------------------------------------------------ */
 
 static struct loader_records state_records(const struct loader_flash *flash) {
     return (struct loader_records){flash, LOADER_STATE_SECTOR, STATE_MARK,
@@ -73,8 +72,7 @@ bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial) {
     return true;
 }
 
-/* --- images ----------------------------------------------------------------
- */
+/* --- images --------------------------------------------------------------- */
 
 /* A board has no C library. */
 static bool same_name(const char *a, const char *b) {
@@ -117,8 +115,7 @@ static bool is_good(struct loader_slots *slots, unsigned slot) {
     return slots->fault[slot] == LOADER_GOOD;
 }
 
-/* --- which is started ------------------------------------------------------
- */
+/* --- which is started ----------------------------------------------------- */
 
 /* To the one before, or to none.  The old one has come up once. */
 static void fall_back(struct loader_slots *slots) {
@@ -213,8 +210,7 @@ bool loader_slots_install(const struct loader_flash *flash,
            write_state(flash, &state);
 }
 
-/* --- the serial number -----------------------------------------------------
- */
+/* --- the serial number ---------------------------------------------------- */
 
 static bool blank(const uint8_t *bytes, uint32_t size) {
     for (uint32_t i = 0; i < size; i++)

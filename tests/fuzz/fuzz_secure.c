@@ -80,8 +80,7 @@ static bool open(uint8_t *out, const uint8_t *in, size_t size,
     return good;
 }
 
-/* --- pipes -----------------------------------------------------------------
- */
+/* --- pipes ---------------------------------------------------------------- */
 
 static void put(struct lane *lane, const uint8_t *bytes, size_t size) {
     size = size < LANE - lane->count ? size : LANE - lane->count;
@@ -116,8 +115,7 @@ static int pipe_receive(void *context, uint8_t *bytes, size_t size) {
     return (int)size;
 }
 
-/* --- ends ------------------------------------------------------------------
- */
+/* --- ends ----------------------------------------------------------------- */
 
 static void open_end(unsigned who, uint8_t salt, uint8_t key_salt,
                      const struct secure_ends *wire) {
@@ -217,8 +215,7 @@ static bool hear(struct end *end, const struct end *peer, size_t size) {
     return got > 0;
 }
 
-/* --- the wire --------------------------------------------------------------
- */
+/* --- the wire ------------------------------------------------------------- */
 
 /* What both have said in an earlier connection, under the same key. */
 static struct lane earlier[2];

@@ -57,8 +57,7 @@ static void read_points(const char *path) {
     demand(fclose(f) == 0);
 }
 
-/* --- mappings and threads that fail ----------------------------------------
- */
+/* --- mappings and threads that fail --------------------------------------- */
 
 static _Atomic long calls, failing; /* of 1 on; 0: none */
 static _Atomic long mapped;         /* bytes */
@@ -112,8 +111,7 @@ int __wrap_pthread_create(pthread_t *thread, const pthread_attr_t *attributes,
                    : __real_pthread_create(thread, attributes, start, argument);
 }
 
-/* --- checks of a result ------------------------------------------------------
- */
+/* --- checks of a result --------------------------------------------------- */
 
 static void check(const struct incode_tetrahedra *t) {
     uint64_t open = 0;

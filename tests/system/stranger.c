@@ -234,8 +234,7 @@ static void look(void) {
     look_into("/proc/net/unix", look_at_unix);
 }
 
-/* --- what it says ----------------------------------------------------------
- */
+/* --- what it says --------------------------------------------------------- */
 
 static void say(const struct call *c, const void *bytes, size_t size) {
     (void)!send(c->fd, bytes, size, MSG_NOSIGNAL | MSG_DONTWAIT);

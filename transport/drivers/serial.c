@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* --- the pipe ------------------------------------------------------------ */
+/* --- the pipe ------------------------------------------------------------- */
 
 static uint64_t clock_us(void) {
     struct timespec now;
@@ -120,7 +120,7 @@ uint64_t serial_wait_us(const struct serial_pipe *pipe) {
     return (uint64_t)ahead_most(pipe) / 2 * 10000000 / pipe->baud;
 }
 
-/* --- terminals ----------------------------------------------------------- */
+/* --- terminals ------------------------------------------------------------ */
 
 int serial_raw(int fd) {
     struct termios t;

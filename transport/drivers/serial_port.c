@@ -21,7 +21,7 @@
  * what every master is opened by. */
 enum { PSEUDO_FIRST = 136, PSEUDO_LAST = 143, PTMX_MAJOR = 5, PTMX_MINOR = 2 };
 
-/* --- who has it ---------------------------------------------------------- */
+/* --- who has it ----------------------------------------------------------- */
 
 static bool is_pseudo_terminal(dev_t device) {
     return major(device) >= PSEUDO_FIRST && major(device) <= PSEUDO_LAST;
@@ -113,7 +113,7 @@ static int serial_port_holder(const char *device, char *name, size_t size) {
     return holder;
 }
 
-/* --- which it is --------------------------------------------------------- */
+/* --- which it is ---------------------------------------------------------- */
 
 /* Whether a terminal is plugged in at "1-1.3", by the path that /sys gives. */
 static bool is_at(const char *device, const char *position) {
@@ -165,7 +165,7 @@ static int find(struct serial_port *port) {
     return count == 1 ? 0 : -1;
 }
 
-/* --- opening ------------------------------------------------------------- */
+/* --- opening -------------------------------------------------------------- */
 
 #define PLUG_IN "plug it in, or give another: ls /dev/serial/by-id"
 

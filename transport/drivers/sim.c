@@ -4,7 +4,7 @@
 
 enum { SPOILED_BYTE = 6, LATE_STALLS = 3 };
 
-/* --- chance -------------------------------------------------------------- */
+/* --- chance --------------------------------------------------------------- */
 
 uint64_t sim_draw(uint64_t *state) {
     *state ^= *state << 13;
@@ -166,7 +166,7 @@ static void put_again(struct sim_direction *direction) {
     }
 }
 
-/* --- what goes wrong ----------------------------------------------------- */
+/* --- what goes wrong ------------------------------------------------------ */
 
 /* Bytes that pass before the next strike. */
 static uint64_t untouched(const struct sim_direction *direction) {
@@ -259,7 +259,7 @@ static void send_piece(struct sim_direction *direction, const uint8_t *bytes,
     }
 }
 
-/* --- the pipe ------------------------------------------------------------ */
+/* --- the pipe ------------------------------------------------------------- */
 
 static int sim_send(void *context, const uint8_t *bytes, size_t size) {
     struct sim_end *end = context;
@@ -342,7 +342,7 @@ uint64_t sim_room_us(const struct sim_direction *direction) {
                                      : 0;
 }
 
-/* --- the wire ------------------------------------------------------------ */
+/* --- the wire ------------------------------------------------------------- */
 
 void sim_direction_faults(struct sim_direction *direction,
                           const struct sim_faults *faults) {

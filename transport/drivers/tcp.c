@@ -14,7 +14,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-/* --- the pipe ------------------------------------------------------------ */
+/* --- the pipe ------------------------------------------------------------- */
 
 /* Bytes moved, 0 for the present, or closed. */
 static int result(struct tcp_pipe *pipe, ssize_t moved) {
@@ -71,7 +71,7 @@ void tcp_heard(struct tcp_pipe *pipe, short revents) {
     pipe->quiet = (revents & ~POLLOUT) == 0;
 }
 
-/* --- sockets ------------------------------------------------------------- */
+/* --- sockets -------------------------------------------------------------- */
 
 /* Fixed before the connection is made, when the window's scale is agreed. */
 static int fix_buffers(int fd) {

@@ -22,7 +22,7 @@ static bool is_local(const struct tcp_wire *wire) {
     return tcp_address_path(&wire->config.address) != NULL;
 }
 
-/* --- connections that are not proven ------------------------------------- */
+/* --- connections that are not proven -------------------------------------- */
 
 static void drop(struct tcp_candidate *c) {
     if (c->fd >= 0) {
@@ -320,7 +320,7 @@ static void tick(struct tcp_wire *wire) {
         wire->admit_us = !in_use && crowded(wire) ? now_us + TCP_CROWD_US : 0;
 }
 
-/* --- the pipe ------------------------------------------------------------ */
+/* --- the pipe ------------------------------------------------------------- */
 
 static void leave(struct tcp_wire *wire) {
     if (wire->tcp.fd >= 0) {
@@ -413,7 +413,7 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire) {
     return (struct link_pipe){wire, wire_send, wire_receive};
 }
 
-/* --- opening ------------------------------------------------------------- */
+/* --- opening -------------------------------------------------------------- */
 
 static int bind_there(const struct tcp_wire *wire, int fd) {
     const struct tcp_address *at = &wire->config.address;

@@ -29,7 +29,7 @@ static void free_if_over(struct tuples_operation *op) {
         op->phase = TUPLES_FREE;
 }
 
-/* --- the calls */
+/* --- the calls ------------------------------------------------------------ */
 
 static void begin(struct tuples *space, struct tuples_operation *op,
                   enum tuples_verb verb) {
@@ -193,7 +193,7 @@ enum tuples_status tuples_poll(const struct tuples *space, int operation,
     return (enum tuples_status)op->status;
 }
 
-/* --- its end */
+/* --- its end -------------------------------------------------------------- */
 
 /* All places but that whose tuple is taken are told that nothing is wanted of
  * them any more. */
@@ -236,7 +236,7 @@ void tuples_operations_end(struct tuples *space) {
     }
 }
 
-/* --- answers */
+/* --- answers -------------------------------------------------------------- */
 
 /* The oldest by their makers' clocks, then the lowest place's. */
 static bool is_better(const struct tuples_operation *op, uint32_t age,
@@ -348,7 +348,7 @@ bool tuples_operation_take(struct tuples *space, uint16_t source,
     return sound;
 }
 
-/* --- sending */
+/* --- sending -------------------------------------------------------------- */
 
 static bool send_owed(struct tuples *space, struct tuples_operation *op,
                       uint16_t place) {

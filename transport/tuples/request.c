@@ -16,7 +16,7 @@ static bool asks(const struct tuples_request *r) {
     return r->wish == TUPLES_TAKE || r->wish == TUPLES_READ;
 }
 
-/* --- the line */
+/* --- the line ------------------------------------------------------------- */
 
 static void join(struct tuples *space, uint32_t row) {
     struct tuples_request *r = row_at(space, row);
@@ -48,7 +48,7 @@ static void leave(struct tuples *space, uint32_t row) {
     r->waits = r->last = false;
 }
 
-/* --- replies */
+/* --- replies -------------------------------------------------------------- */
 
 static void reply(struct tuples *space, uint32_t row, enum tuples_kind kind) {
     struct tuples_request *r = row_at(space, row);
@@ -111,7 +111,7 @@ static void tell_all_none(struct tuples *space) {
     }
 }
 
-/* --- room */
+/* --- room ----------------------------------------------------------------- */
 
 static bool may_promise(const struct tuples *space,
                         const struct tuples_request *r) {
@@ -165,7 +165,7 @@ static void decide(struct tuples *space, uint32_t row, bool taken) {
     tell_all_none(space);
 }
 
-/* --- messages */
+/* --- messages ------------------------------------------------------------- */
 
 static bool take_ask(struct tuples *space, uint32_t row,
                      const struct tuples_header *header, const uint8_t *data,
@@ -291,7 +291,7 @@ bool tuples_request_take(struct tuples *space, uint16_t source,
     return take_release(space, row, header->flags & TUPLES_ACCEPTED);
 }
 
-/* --- sending */
+/* --- sending -------------------------------------------------------------- */
 
 /* What follows when a reply has left. */
 static void has_sent(struct tuples *space, uint32_t row) {

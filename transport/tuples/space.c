@@ -95,7 +95,7 @@ static bool is_sound(const struct tuples_config *c) {
 static_assert(TUPLES_HEADER_BYTES + TUPLES_TUPLE_MAX <= CUBE_PAYLOAD_MAX,
               "a tuple fits a message");
 
-/* --- the arena */
+/* --- the arena ------------------------------------------------------------ */
 
 /* Cuts the arena, or measures it where it is NULL. */
 struct cut {
@@ -189,7 +189,7 @@ void tuples_renew(struct tuples *space, uint32_t generation) {
     empty(space, generation);
 }
 
-/* --- messages */
+/* --- messages ------------------------------------------------------------- */
 
 static void put_header(uint8_t *p, const struct tuples_header *header) {
     p[0] = header->kind;

@@ -194,13 +194,13 @@ struct tuples {
     uint8_t message[TUPLES_HEADER_BYTES + TUPLES_TUPLE_MAX];
 };
 
-/* --- space.c: writes or delivers; false: not now */
+/* --- space.c: writes or delivers; false: not now -------------------------- */
 
 bool tuples_send(struct tuples *space, uint16_t place,
                  const struct tuples_header *header, const uint8_t *data,
                  size_t size);
 
-/* --- operation.c */
+/* --- operation.c ---------------------------------------------------------- */
 
 /* The process's own out. */
 bool tuples_operation_take(struct tuples *space, uint16_t source,
@@ -213,7 +213,7 @@ unsigned tuples_operation_send(struct tuples *space,
                                struct tuples_operation *op, unsigned *tries);
 void tuples_operations_end(struct tuples *space);
 
-/* --- request.c */
+/* --- request.c ------------------------------------------------------------ */
 
 bool tuples_request_take(struct tuples *space, uint16_t source,
                          const struct tuples_header *header,
@@ -223,7 +223,7 @@ unsigned tuples_request_send(struct tuples *space, unsigned tries);
 /* A process has ended: another may start. */
 void tuples_request_promise(struct tuples *space);
 
-/* --- process.c */
+/* --- process.c ------------------------------------------------------------ */
 
 unsigned tuples_processes_free(const struct tuples *space);
 void tuples_process_start(struct tuples *space, uint32_t function,

@@ -120,7 +120,7 @@ static inline void destroy(struct machine *m) {
     free(m);
 }
 
-/* --- traffic ------------------------------------------------------------- */
+/* --- traffic -------------------------------------------------------------- */
 
 static inline unsigned content(const struct machine *m, uint8_t *bytes,
                                unsigned from, uint32_t number, bool broadcast) {
@@ -252,7 +252,7 @@ static inline void run(struct machine *m, uint32_t each, uint64_t most_us) {
     }
 }
 
-/* --- generations */
+/* --- generations ---------------------------------------------------------- */
 
 enum { WRITTEN = 0, READ = 1 };
 

@@ -2,7 +2,7 @@
  * order and whole; broadcasts; hosts that are slow; wires that are wrong. */
 #include "cube_machine.h"
 
-/* --- tests --------------------------------------------------------------- */
+/* --- tests ---------------------------------------------------------------- */
 
 static void every_pair_at_once_with_windows_of_one(void **unused) {
     (void)unused;

@@ -29,8 +29,7 @@ static uint32_t draw_sparse(void) {
     return mask & draw();
 }
 
-/* --- checks, bit by bit ----------------------------------------------------
- */
+/* --- checks, bit by bit --------------------------------------------------- */
 
 static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
                          uint32_t start) {
@@ -99,7 +98,7 @@ static void zeros_are_found(void **unused) {
     }
 }
 
-/* --- encoding ------------------------------------------------------------ */
+/* --- encoding ------------------------------------------------------------- */
 
 /* COBS as its authors define it, a byte at a time. */
 static size_t slow_cobs(uint8_t *out, const uint8_t *in, size_t size) {
@@ -280,7 +279,7 @@ static void both_ends_of_a_full_run(void **unused) {
     assert_int_equal(seen, 20);
 }
 
-/* --- damage -------------------------------------------------------------- */
+/* --- damage --------------------------------------------------------------- */
 
 static void each_wrong_bit_is_found(void **unused) {
     static struct sample s;

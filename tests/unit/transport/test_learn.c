@@ -142,8 +142,7 @@ static void noise_teaches_nothing(void **unused) {
     host_sim_cube_close(&cube);
 }
 
-/* --- asking ---------------------------------------------------------------
- */
+/* --- asking --------------------------------------------------------------- */
 
 enum { SOCKETS = 4, TICK_US = 500 };
 

@@ -4,7 +4,7 @@
 #include "link_pair.h"
 #include "tests/unit/emulated.h"
 
-/* --- clean wires --------------------------------------------------------- */
+/* --- clean wires ---------------------------------------------------------- */
 
 static void messages_of_every_size(void **unused) {
     (void)unused;
@@ -104,7 +104,7 @@ static void lost_credits_are_asked_for(void **unused) {
     free_pair(p);
 }
 
-/* --- bad wires ----------------------------------------------------------- */
+/* --- bad wires ------------------------------------------------------------ */
 
 /* Everything at once, each seed another mix. */
 static void every_kind_of_damage(void **unused) {
@@ -167,7 +167,7 @@ static void garbage_between_frames(void **unused) {
     free_pair(p);
 }
 
-/* --- time ---------------------------------------------------------------- */
+/* --- time ----------------------------------------------------------------- */
 
 /* An end that sleeps until its next due time, or a byte, misses nothing. */
 static void sleeping_until_due_is_enough(void **unused) {
@@ -231,7 +231,7 @@ static void throughput_on_serial_wires(void **unused) {
     }
 }
 
-/* --- limits -------------------------------------------------------------- */
+/* --- limits --------------------------------------------------------------- */
 
 static bool starts(const struct link_config *config) {
     size_t bytes = link_bytes(config), room = 1 << 20;

@@ -35,8 +35,7 @@ static void a_wipe_stays(void **unused) {
     assert_false(holds(stack, sizeof stack, secret, sizeof secret));
 }
 
-/* --- a connection ----------------------------------------------------------
- */
+/* --- a connection --------------------------------------------------------- */
 
 enum { FOUND_MAX = 32 };
 

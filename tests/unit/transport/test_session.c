@@ -2,7 +2,7 @@
  * farewell, and the bytes that PROTOCOL.md promises. */
 #include "link_pair.h"
 
-/* --- peers that come, go and come again ---------------------------------- */
+/* --- peers that come, go and come again ----------------------------------- */
 
 static void a_cut_wire_goes_on_where_it_was(void **unused) {
     (void)unused;
@@ -309,7 +309,7 @@ static void farewell_to_the_dead_ends_in_time(void **unused) {
     }
 }
 
-/* --- what is not sent yet ------------------------------------------------ */
+/* --- what is not sent yet ------------------------------------------------- */
 
 /* End 0 forgets what it has not begun to send; what arrives is whole, and the
  * count is right. */
@@ -349,7 +349,7 @@ static void what_is_unsent_is_forgotten(void **unused) {
     }
 }
 
-/* --- test vectors -------------------------------------------------------- */
+/* --- test vectors --------------------------------------------------------- */
 
 /* What one end hears is written by hand; what it says is looked at. */
 struct script {

@@ -70,8 +70,7 @@ static uint32_t draw(uint32_t below) {
     return (uint32_t)(sim_draw(&chance) >> 32) % below;
 }
 
-/* --- boards ----------------------------------------------------------------
- */
+/* --- boards --------------------------------------------------------------- */
 
 static uint64_t tell_time(void *unused) {
     (void)unused;
@@ -223,8 +222,7 @@ static void look(unsigned i) {
     b->busy_us = b->busy_us > now_us ? b->busy_us : now_us + us;
 }
 
-/* --- the machine -----------------------------------------------------------
- */
+/* --- the machine ---------------------------------------------------------- */
 
 static void idle(void *unused, uint64_t wait_us) {
     struct sim_end *end = host_sim_cube_port(&wires, machine.nodes, 0)->end;
@@ -255,8 +253,7 @@ static void wires_are(uint32_t said, uint32_t carried, uint32_t ahead) {
     room = ahead;
 }
 
-/* --- the transfer ----------------------------------------------------------
- */
+/* --- the transfer --------------------------------------------------------- */
 
 static void open_world(unsigned dimension, uint64_t seed) {
     const struct host_sim_cube_options options = {

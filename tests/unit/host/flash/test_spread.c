@@ -3,8 +3,7 @@
  * refuse and fall back. */
 #include "played_boards.h"
 
-/* --- a transfer ------------------------------------------------------------
- */
+/* --- a transfer ----------------------------------------------------------- */
 
 static uint8_t image[BYTES];
 static struct host_spread spread;

@@ -77,8 +77,7 @@ static void erasing_goes_beside_the_wire(void **unused) {
     close_world();
 }
 
-/* --- a run that finds a loader ---------------------------------------------
- */
+/* --- a run that finds a loader -------------------------------------------- */
 
 static char told[NODE_FAULT_TEXT_MAX + 1];
 
@@ -207,8 +206,7 @@ static void a_board_with_a_worn_flash_waits_and_says_so(void **unused) {
     close_world();
 }
 
-/* --- what befalls them -----------------------------------------------------
- */
+/* --- what befalls them ---------------------------------------------------- */
 
 enum { CUTS_MAX = 3 };
 static uint64_t strike_us;

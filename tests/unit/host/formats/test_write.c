@@ -375,7 +375,7 @@ static void conversion(void **unused) {
     assert_int_equal(remove_folder(&folder), 11);
 }
 
-/* --- coordinates as text ------------------------------------------------- */
+/* --- coordinates as text -------------------------------------------------- */
 
 /* What a point with this x has in an .xyz for it. */
 static const char *printed(const char *path, const double *x, unsigned n,

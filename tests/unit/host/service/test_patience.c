@@ -101,8 +101,7 @@ static void test_idle_in_each_strategy(void **unused) {
     }
 }
 
-/* --- nodes that do not answer ----------------------------------------------
- */
+/* --- nodes that do not answer --------------------------------------------- */
 
 static void cut_off(unsigned node) {
     for (unsigned d = 0; d < DIMENSION; d++)
@@ -185,8 +184,7 @@ static void test_silent_gateway(void **unused) {
     }
 }
 
-/* --- nodes that never come -------------------------------------------------
- */
+/* --- nodes that never come ------------------------------------------------ */
 
 static void test_never_started(void **unused) {
     (void)unused;
@@ -261,8 +259,7 @@ static void test_late(void **unused) {
     assert_int_equal(world.told_count, 3);
 }
 
-/* --- nodes that do nothing, again ------------------------------------------
- */
+/* --- nodes that do nothing, again ----------------------------------------- */
 
 /* Where nobody works, the run ends; of the last one nobody says that others do
  * its work. */

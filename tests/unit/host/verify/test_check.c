@@ -4,7 +4,7 @@
  * tetrahedra are missing. */
 #include "tests/unit/host/verify/check_world.h"
 
-/* --- Checking --------------------------------------------------------- */
+/* --- Checking ------------------------------------------------------------- */
 
 /* Whether no point is beyond a facet, by trying all. */
 static bool is_of_hull(const struct fixture *f, const uint32_t p[3]) {
@@ -55,7 +55,7 @@ static void expect_found(struct fixture *f, const char *damage,
     restore(f);
 }
 
-/* --- The sets --------------------------------------------------------- */
+/* --- The sets ------------------------------------------------------------- */
 
 static void passes(struct fixture *f) {
     for (int round = 0; round < 4; round++) {
@@ -106,7 +106,7 @@ static void at_each_place(struct fixture *f,
     }
 }
 
-/* --- Damage to one tetrahedron ---------------------------------------- */
+/* --- Damage to one tetrahedron -------------------------------------------- */
 
 static void drop(struct fixture *f, uint64_t i) {
     uint32_t t[1][4];
@@ -205,7 +205,7 @@ static void damage_is_found(void **unused) {
     for_each_set(single);
 }
 
-/* --- Damage to more --------------------------------------------------- */
+/* --- Damage to more ------------------------------------------------------- */
 
 static void drop_all_at(struct fixture *f, uint32_t first, uint32_t last) {
     struct host_tetrahedra missing = {0};
@@ -292,7 +292,7 @@ static void nothing_is_found(void **unused) {
     close_set(&f);
 }
 
-/* --- Garbage ---------------------------------------------------------- */
+/* --- Garbage -------------------------------------------------------------- */
 
 static void garbage_is_refused(void **unused) {
     (void)unused;

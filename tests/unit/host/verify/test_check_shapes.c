@@ -42,7 +42,7 @@ static void a_left_out_point_is_found(void **unused) {
     close_set(&f);
 }
 
-/* --- Tilings that are wrong ------------------------------------------- */
+/* --- Tilings that are wrong ----------------------------------------------- */
 
 /* Two tetrahedra on a facet to three about the edge of their apexes: false
  * where their union is not convex. */
@@ -177,7 +177,7 @@ static void flat_ones_are_found(void **unused) {
     close_set(&f);
 }
 
-/* --- Surfaces --------------------------------------------------------- */
+/* --- Surfaces ------------------------------------------------------------- */
 
 /* Five tetrahedra about an axis, from each corner of a pentagon to the next but
  * one: positive, closed, of Euler characteristic 2 and convex at every edge,

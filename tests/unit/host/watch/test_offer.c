@@ -34,8 +34,7 @@ static int end; /* closed: the holder ends */
 static struct host_error error;
 static struct host_node_set all;
 
-/* --- who has the cube ------------------------------------------------------
- */
+/* --- who has the cube ----------------------------------------------------- */
 
 /* Its time passes faster than the watcher's.  clock: both wait for minutes.
  */
@@ -126,8 +125,7 @@ static void look_at(struct host_look *look) {
         fail_msg("%s", error.text);
 }
 
-/* --- looks -----------------------------------------------------------------
- */
+/* --- looks ---------------------------------------------------------------- */
 
 static void test_nobody(void **unused) {
     struct host_look look;
@@ -293,8 +291,7 @@ static void test_queue(void **unused) {
     end_holder();
 }
 
-/* --- who says what is no question ------------------------------------------
- */
+/* --- who says what is no question ----------------------------------------- */
 
 static int call(void) {
     struct sockaddr_un address;
@@ -392,8 +389,7 @@ static void test_next(void **unused) {
     end_holder();
 }
 
-/* --- what root believes ----------------------------------------------------
- */
+/* --- what root believes --------------------------------------------------- */
 
 enum { OTHER_USER = 65534 };
 

@@ -19,8 +19,7 @@
 
 enum { CHIP_BYTES = 512 * 1024, CHIP_IMAGE_MAX = 256 * 1024 };
 
-/* --- a chip ----------------------------------------------------------------
- */
+/* --- a chip --------------------------------------------------------------- */
 
 struct chip {
     struct loader_flash flash; /* its context is the chip */
@@ -164,8 +163,7 @@ static void chip_make(struct chip *c, uint32_t sector, uint32_t page,
     c->random = 1;
 }
 
-/* --- a suite ---------------------------------------------------------------
- */
+/* --- a suite -------------------------------------------------------------- */
 
 struct quick_hash {
     uint32_t lane[SIGN_DIGEST_BYTES / 4], count;
@@ -214,8 +212,7 @@ static const struct loader_rules chip_rules = {
     &chip.flash, &quick,         quick_key, "mps2-an385",
     0x10000,     CHIP_IMAGE_MAX, NULL,      NULL};
 
-/* --- images ----------------------------------------------------------------
- */
+/* --- images --------------------------------------------------------------- */
 
 struct made {
     uint32_t bytes; /* header included */
@@ -261,8 +258,7 @@ static inline bool chip_confirm(const struct chip *c, unsigned slot) {
            loader_slots_confirm(&c->flash, &up);
 }
 
-/* --- a transfer ------------------------------------------------------------
- */
+/* --- a transfer ----------------------------------------------------------- */
 
 static inline void chip_work(struct loader_incoming *in) {
     for (int i = 0; loader_incoming_busy(in); i++) {

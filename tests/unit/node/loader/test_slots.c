@@ -226,8 +226,7 @@ static void test_slots_serial(void **state) {
     assert_memory_equal(serial, one, sizeof serial);
 }
 
-/* --- what is refused: nothing in the flash changes then --------------------
- */
+/* --- what is refused: nothing in the flash changes then ------------------- */
 
 static void refuses(const struct made *made, enum loader_fault fault) {
     static uint8_t before[CHIP_BYTES];
@@ -306,8 +305,7 @@ static void test_slots_have_no_way_back(void **state) {
     assert_int_equal(starts(false), 1 - slot); /* 7 after 6 */
 }
 
-/* --- blocks ----------------------------------------------------------------
- */
+/* --- blocks --------------------------------------------------------------- */
 
 static void test_slots_take_blocks_in_any_order(void **state) {
     (void)state;

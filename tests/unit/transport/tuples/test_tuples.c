@@ -8,7 +8,7 @@ static uint64_t seeds(uint64_t all) {
     return emulated() ? all / 5 : all;
 }
 
-/* --- the plain model: tuples in the order of their outs */
+/* --- the plain model: tuples in the order of their outs ------------------- */
 
 enum { MODEL_MAX = 400 };
 
@@ -138,7 +138,7 @@ static void equals_model(void **state) {
     }
 }
 
-/* --- fairness */
+/* --- fairness ------------------------------------------------------------- */
 
 /* Callers that wait get what comes in the order in which they asked; copies
  * hold nobody up. */
@@ -176,7 +176,7 @@ static void first_come(void **state) {
     }
 }
 
-/* --- a full space */
+/* --- a full space --------------------------------------------------------- */
 
 enum { EACH = 60 };
 
@@ -285,7 +285,7 @@ static void room_in_order(void **state) {
     free_world(w);
 }
 
-/* --- generations */
+/* --- generations ---------------------------------------------------------- */
 
 static void drop_messages(struct world *w) {
     for (unsigned i = 0; i < w->places; i++)
@@ -361,7 +361,7 @@ static void gives_up(void **state) {
     }
 }
 
-/* --- eval */
+/* --- eval ----------------------------------------------------------------- */
 
 /* Counts its number down, a step each, and says where it ran. */
 static bool count_down(void *context, struct tuple *tuple) {
@@ -416,7 +416,7 @@ static void evaluates(void **state) {
     }
 }
 
-/* --- limits, and what no place sends */
+/* --- limits, and what no place sends -------------------------------------- */
 
 static void keeps_limits(void **state) {
     struct tuples_config config = usual_config();

@@ -36,7 +36,7 @@ struct history {
     uint32_t stored; /* tuples at the end, in all places */
 };
 
-/* --- playing */
+/* --- playing -------------------------------------------------------------- */
 
 static inline int begin_call(struct world *w, unsigned place,
                              const struct call *c) {
@@ -122,7 +122,7 @@ static inline void play(struct history *h, uint64_t seed) {
     free_world(w);
 }
 
-/* --- explaining */
+/* --- explaining ----------------------------------------------------------- */
 
 struct explainer {
     const struct history *h;
