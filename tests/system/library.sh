@@ -73,7 +73,7 @@ for threads in 1 3; do
 done
 for option in '--nodes 2' '--strategy spatial' '--link tcp' '--memory 4M' \
     '--board linux' '--index kd' '--partition uniform' '--face-rule own' \
-    '--build points' '--patience 60'; do
+    '--build points' '--patience 600'; do
     # shellcheck disable=SC2086
     refuses "direct/--threads with ${option% *}" 2 \
         "^incode: --threads: .* ${option% *} " "$INCODE" run "$direct" \
@@ -81,7 +81,7 @@ for option in '--nodes 2' '--strategy spatial' '--link tcp' '--memory 4M' \
 done
 refuses 'direct/no threads' 2 '^incode: --threads 0: ' "$INCODE" run "$direct" \
     --threads 0 -o "$scratch/left/o.npy"
-incode run "$direct" -q --patience 60 --stats "$scratch/stats.json"
+incode run "$direct" -q --patience 600 --stats "$scratch/stats.json"
 check 'direct/an option of a cube' "$(head -30 "$scratch/stats.json")" \
     jq -e '.strategy != "direct" and .link == "tcp"' \
     "$scratch/stats.json" > /dev/null

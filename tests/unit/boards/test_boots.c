@@ -1,14 +1,11 @@
 /* A flash's rules, and the number of a start: it comes once only, whenever
  * power is lost. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/loader/slots.h"
 #include "node/loader/flash.h"
+#include "tests/unit/test.h"
 
 enum { SECTORS = 4, BYTES = LOADER_RAM_SECTOR * SECTORS };
 
@@ -76,8 +73,7 @@ static uint32_t start(long until_loss) {
     return 0;
 }
 
-static void test_boots_count(void **state) {
-    (void)state;
+TEST(test_boots_count) {
     for (int blank = 0; blank < 256; blank += 0x55) {
         memset(chip.bytes, blank, BYTES);
         for (uint32_t i = 1; i < 3000; i++) /* five sectors */
@@ -88,10 +84,9 @@ static void test_boots_count(void **state) {
 /* At every byte of the starts that matter, but for the midst of an erasure: the
  * first, one in the midst of a
  * sector, those that begin one; and of those behind the first loss. */
-static void test_boots_outlive_every_loss(void **state) {
+TEST(test_boots_outlive_every_loss) {
     static uint8_t before[BYTES];
     static const uint32_t starts[] = {0, 1, 17, 255, 256, 257, 511, 512, 700};
-    (void)state;
     srand(3);
     for (size_t s = 0; s < sizeof starts / sizeof starts[0]; s++) {
         memset(chip.bytes, 0xff, BYTES);
@@ -119,8 +114,7 @@ static void test_boots_outlive_every_loss(void **state) {
 
 /* A record that was torn may read as whole later: as if its last bits had
  * settled. */
-static void test_boots_pass_over_what_settles(void **state) {
-    (void)state;
+TEST(test_boots_pass_over_what_settles) {
     for (long loss = 0; loss < LOADER_BOOT_BYTES; loss++) {
         memset(chip.bytes, 0xff, BYTES);
         assert_int_equal(start(-1), 1);
@@ -139,9 +133,8 @@ static void test_boots_pass_over_what_settles(void **state) {
     }
 }
 
-static void test_boots_at_random(void **state) {
+TEST(test_boots_at_random) {
     uint32_t last = 0;
-    (void)state;
     srand(11);
     memset(chip.bytes, 0xff, BYTES);
     for (int i = 0; i < 20000; i++) {
@@ -152,9 +145,8 @@ static void test_boots_at_random(void **state) {
     assert_true(last < 60000);
 }
 
-static void test_boots_tell_of_a_worn_flash(void **state) {
+TEST(test_boots_tell_of_a_worn_flash) {
     uint32_t boot = 5;
-    (void)state;
     memset(chip.bytes, 0xff, BYTES);
     assert_int_equal(start(-1), 1);
     chip.worn = true;
@@ -164,13 +156,12 @@ static void test_boots_tell_of_a_worn_flash(void **state) {
     assert_true(start(-1) > 1);
 }
 
-static void test_flash_ram_has_a_flash_s_rules(void **state) {
+TEST(test_flash_ram_has_a_flash_s_rules) {
     enum { ALL = LOADER_RAM_SECTOR * LOADER_RAM_SECTORS };
     static uint8_t memory[ALL];
     const struct loader_flash ram = LOADER_RAM(memory);
     uint8_t out[4], in[4] = {0x0f, 0xf0, 0x55, 0xff};
     uint8_t wide[LOADER_RAM_PAGE + 1] = {0};
-    (void)state;
     assert_true(ram.erase(ram.context, 1));
     assert_int_equal(memory[LOADER_RAM_SECTOR - 1], 0);
     assert_int_equal(memory[2 * LOADER_RAM_SECTOR - 1], 0xff);
@@ -195,14 +186,9 @@ static void test_flash_ram_has_a_flash_s_rules(void **state) {
     assert_int_equal(out[1], 0xff);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_boots_count),
-        cmocka_unit_test(test_boots_outlive_every_loss),
-        cmocka_unit_test(test_boots_pass_over_what_settles),
-        cmocka_unit_test(test_boots_at_random),
-        cmocka_unit_test(test_boots_tell_of_a_worn_flash),
-        cmocka_unit_test(test_flash_ram_has_a_flash_s_rules),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_boots_count),
+          cmocka_unit_test(test_boots_outlive_every_loss),
+          cmocka_unit_test(test_boots_pass_over_what_settles),
+          cmocka_unit_test(test_boots_at_random),
+          cmocka_unit_test(test_boots_tell_of_a_worn_flash),
+          cmocka_unit_test(test_flash_ram_has_a_flash_s_rules))

@@ -1,10 +1,6 @@
 /* What a board says: records that no link takes for a frame, registers in
  * words, why it was restarted, how deep its stack was. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "boards/bare/bare.h"
 #include "boards/bare/console.h"
@@ -13,6 +9,7 @@
 #include "boards/bare/stack.h"
 #include "transport/frame.h"
 #include "transport/link.h"
+#include "tests/unit/test.h"
 
 static uint8_t said[300];
 static size_t said_size, said_max;
@@ -48,9 +45,8 @@ static int listen(void **state) {
     return 0;
 }
 
-static void test_console_record(void **state) {
+TEST(test_console_record) {
     static const uint8_t record[] = {0, 0xff, 'a', ' ', 'b', 0};
-    (void)state;
     bare_console_begin();
     bare_console_put("a ");
     bare_console_put("b");
@@ -60,10 +56,9 @@ static void test_console_record(void **state) {
 }
 
 /* Between the two zeros. */
-static void test_console_record_is_no_frame(void **state) {
+TEST(test_console_record_is_no_frame) {
     struct frame_reader reader;
     struct frame_header header;
-    (void)state;
     for (size_t size = 0; size < 250; size++) {
         char text[251];
         (void)listen(NULL);
@@ -80,8 +75,7 @@ static void test_console_record_is_no_frame(void **state) {
 }
 
 /* Its end says at least that it ends. */
-static void test_console_gives_up(void **state) {
-    (void)state;
+TEST(test_console_gives_up) {
     said_max = 5;
     bare_console_begin();
     bare_console_put("abcdef");
@@ -90,12 +84,11 @@ static void test_console_gives_up(void **state) {
     assert_memory_equal(said + 2, "abc", 3);
 }
 
-static void test_hex(void **state) {
+TEST(test_hex) {
     char room[80];
     struct cube_text text = cube_text_in(room, sizeof room);
     struct bare_register registers[] = {{"pc", 0x1234},
                                         {"x0", UINT64_C(0xfedcba9876543210)}};
-    (void)state;
     bare_text_hex(&text, 0, 1);
     cube_text_put(&text, " ");
     bare_text_hex(&text, 0x5af, 2);
@@ -103,8 +96,7 @@ static void test_hex(void **state) {
     assert_string_equal(room, "0x0 0x5af pc 0x00001234 x0 0xfedcba9876543210");
 }
 
-static void test_reason_is_kept(void **state) {
-    (void)state;
+TEST(test_reason_is_kept) {
     struct bare_reason reason = bare_reason_take();
     assert_int_equal(reason.kind, BARE_POWER_ON);
     assert_int_equal(reason.starts, 1);
@@ -125,9 +117,8 @@ static void test_reason_is_kept(void **state) {
         assert_true(strlen(bare_reason_name((enum bare_reason_kind)kind)) > 4);
 }
 
-static void test_fault_is_told_and_kept(void **state) {
+TEST(test_fault_is_told_and_kept) {
     struct bare_register pc = {"pc", 0x10};
-    (void)state;
     (void)bare_reason_take();
     locked = false;
     if (setjmp(restarted) == 0)
@@ -142,9 +133,8 @@ static void test_fault_is_told_and_kept(void **state) {
     assert_string_equal(reason.text, "a thing");
 }
 
-static void test_stack_s_paint(void **state) {
+TEST(test_stack_s_paint) {
     uint32_t words[16];
-    (void)state;
     for (size_t used = 0; used <= 16; used++) {
         for (size_t i = 0; i < 16; i++)
             words[i] = i < 16 - used ? BARE_PAINT : (uint32_t)i;
@@ -154,15 +144,10 @@ static void test_stack_s_paint(void **state) {
     assert_int_equal(bare_stack_high_water(), BARE_STACK_BYTES);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_reason_is_kept, listen),
-        cmocka_unit_test_setup(test_console_record, listen),
-        cmocka_unit_test_setup(test_console_record_is_no_frame, listen),
-        cmocka_unit_test_setup(test_console_gives_up, listen),
-        cmocka_unit_test_setup(test_hex, listen),
-        cmocka_unit_test_setup(test_fault_is_told_and_kept, listen),
-        cmocka_unit_test_setup(test_stack_s_paint, listen),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(test_reason_is_kept, listen),
+          cmocka_unit_test_setup(test_console_record, listen),
+          cmocka_unit_test_setup(test_console_record_is_no_frame, listen),
+          cmocka_unit_test_setup(test_console_gives_up, listen),
+          cmocka_unit_test_setup(test_hex, listen),
+          cmocka_unit_test_setup(test_fault_is_told_and_kept, listen),
+          cmocka_unit_test_setup(test_stack_s_paint, listen))

@@ -1,16 +1,12 @@
 /* What a loader leaves for its image, in memory that a restart keeps. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "boards/bare/handover.h"
+#include "tests/unit/test.h"
 
-static void test_handover_is_taken_once(void **state) {
+TEST(test_handover_is_taken_once) {
     struct bare_handover given = {.boot = 7, .slot = 1, .number = 3}, taken;
-    (void)state;
     assert_false(bare_handover_take(&taken)); /* power on */
     assert_false(bare_handover_drop());
     memset(given.digest, 0x5a, sizeof given.digest);
@@ -28,8 +24,7 @@ static void test_handover_is_taken_once(void **state) {
     assert_false(bare_handover_take(&taken));
 }
 
-static void test_reason_is_the_loader_s(void **state) {
-    (void)state;
+TEST(test_reason_is_the_loader_s) {
     struct bare_reason reason = bare_reason_take();
     assert_int_equal(reason.kind, BARE_POWER_ON);
     assert_int_equal(reason.starts, 1);
@@ -50,10 +45,5 @@ static void test_reason_is_the_loader_s(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_handover_is_taken_once),
-        cmocka_unit_test(test_reason_is_the_loader_s),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_handover_is_taken_once),
+          cmocka_unit_test(test_reason_is_the_loader_s))

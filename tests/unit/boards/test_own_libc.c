@@ -1,15 +1,11 @@
 /* What boards have instead of a C library, against this machine's: under other
  * names, as it is here as well. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include <math.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 
 double own_sqrt(double x);
 void *own_memcpy(void *to, const void *from, size_t size);
@@ -39,11 +35,10 @@ static void check_root(double x) {
         assert_int_equal(bits_of(own), bits_of(theirs));
 }
 
-static void test_own_sqrt_of_what_is_special(void **state) {
+TEST(test_own_sqrt_of_what_is_special) {
     static const double xs[] = {0.0,       -0.0,      1,        -1,
                                 INFINITY,  -INFINITY, NAN,      0x1p-1074,
                                 0x1p-1073, 0x1p-1022, 0x1p1023, 0x1.fp-1023};
-    (void)state;
     for (size_t i = 0; i < sizeof xs / sizeof xs[0]; i++) {
         check_root(xs[i]);
         check_root(nextafter(xs[i], INFINITY));
@@ -56,8 +51,7 @@ static void test_own_sqrt_of_what_is_special(void **state) {
     }
 }
 
-static void test_own_sqrt_of_squares_and_their_neighbours(void **state) {
-    (void)state;
+TEST(test_own_sqrt_of_squares_and_their_neighbours) {
     for (int i = 0; i < 100000; i++) {
         double root = (double)(random_bits() >> 38), square = root * root;
         check_root(square);
@@ -66,8 +60,7 @@ static void test_own_sqrt_of_squares_and_their_neighbours(void **state) {
     }
 }
 
-static void test_own_sqrt_of_anything(void **state) {
-    (void)state;
+TEST(test_own_sqrt_of_anything) {
     for (int i = 0; i < 1000000; i++) {
         uint64_t bits = random_bits();
         double x;
@@ -85,9 +78,8 @@ static void fill(uint8_t bytes[ROOM]) {
         bytes[i] = (uint8_t)random_bits();
 }
 
-static void test_own_memory_moves(void **state) {
+TEST(test_own_memory_moves) {
     uint8_t own[ROOM], theirs[ROOM], other[ROOM];
-    (void)state;
     for (size_t to = 0; to < 20; to++) {
         for (size_t from = 0; from < 20; from++) {
             for (size_t size = 0; size < ROOM - 20; size++) {
@@ -107,9 +99,8 @@ static void test_own_memory_moves(void **state) {
     }
 }
 
-static void test_own_memory_is_set(void **state) {
+TEST(test_own_memory_is_set) {
     uint8_t own[ROOM], theirs[ROOM];
-    (void)state;
     for (size_t at = 0; at < 20; at++) {
         for (size_t size = 0; size < ROOM - 20; size++) {
             int value = (int)(random_bits() % 1024) - 512;
@@ -126,9 +117,8 @@ static int sign(int x) {
     return (x > 0) - (x < 0);
 }
 
-static void test_own_memory_is_compared(void **state) {
+TEST(test_own_memory_is_compared) {
     uint8_t a[ROOM], b[ROOM];
-    (void)state;
     for (size_t at = 0; at < 20; at++) {
         for (size_t size = 1; size < ROOM - 20; size++) {
             fill(a);
@@ -144,14 +134,9 @@ static void test_own_memory_is_compared(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_own_sqrt_of_what_is_special),
-        cmocka_unit_test(test_own_sqrt_of_squares_and_their_neighbours),
-        cmocka_unit_test(test_own_sqrt_of_anything),
-        cmocka_unit_test(test_own_memory_moves),
-        cmocka_unit_test(test_own_memory_is_set),
-        cmocka_unit_test(test_own_memory_is_compared),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_own_sqrt_of_what_is_special),
+          cmocka_unit_test(test_own_sqrt_of_squares_and_their_neighbours),
+          cmocka_unit_test(test_own_sqrt_of_anything),
+          cmocka_unit_test(test_own_memory_moves),
+          cmocka_unit_test(test_own_memory_is_set),
+          cmocka_unit_test(test_own_memory_is_compared))

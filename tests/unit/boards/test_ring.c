@@ -1,12 +1,9 @@
 /* A UART between its handler and its link: rings, and what is lost. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "boards/bare/bare.h"
+#include "tests/unit/test.h"
 
 static uint64_t clock_us;
 static unsigned kicked;
@@ -36,10 +33,9 @@ void board_wait(uint64_t wait_us) {
     (void)bare_ring_take(&bare_uart[2].send, &byte);
 }
 
-static void test_ring_is_a_queue(void **state) {
+TEST(test_ring_is_a_queue) {
     uint8_t room[8], byte;
     struct bare_ring ring = BARE_RING(room);
-    (void)state;
     ring.put = ring.taken = UINT32_MAX - 20; /* the counts begin anew */
     for (uint8_t n = 0; n < 100; n = (uint8_t)(n + 5)) {
         for (uint8_t i = 0; i < 8; i++) {
@@ -59,11 +55,10 @@ static void test_ring_is_a_queue(void **state) {
 }
 
 /* Against a queue that is shifted. */
-static void test_ring_takes_pieces(void **state) {
+TEST(test_ring_takes_pieces) {
     uint8_t room[16], queue[16], piece[24], next = 0;
     struct bare_ring ring = BARE_RING(room);
     size_t held = 0;
-    (void)state;
     srand(7);
     for (int i = 0; i < 20000; i++) {
         size_t size = (size_t)rand() % sizeof piece;
@@ -86,9 +81,8 @@ static void test_ring_takes_pieces(void **state) {
     }
 }
 
-static void test_uart_counts_what_is_lost(void **state) {
+TEST(test_uart_counts_what_is_lost) {
     uint8_t bytes[BARE_RECEIVE_BYTES];
-    (void)state;
     bare_uarts_init();
     struct link_pipe pipe = bare_uart_pipe(1);
     assert_false(bare_uart_ready(&bare_uart[1]));
@@ -105,9 +99,8 @@ static void test_uart_counts_what_is_lost(void **state) {
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 0);
 }
 
-static void test_uart_wakes_who_has_more_to_send(void **state) {
+TEST(test_uart_wakes_who_has_more_to_send) {
     uint8_t bytes[BARE_SEND_BYTES + 1] = {1, 2, 3}, byte = 0;
-    (void)state;
     bare_uarts_init();
     kicked = 0;
     struct link_pipe pipe = bare_uart_pipe(3);
@@ -124,9 +117,8 @@ static void test_uart_wakes_who_has_more_to_send(void **state) {
 }
 
 /* Bytes of a frame wake nobody before its end, unless they are many. */
-static void test_uart_wakes_at_the_end_of_a_frame(void **state) {
+TEST(test_uart_wakes_at_the_end_of_a_frame) {
     uint8_t bytes[64];
-    (void)state;
     bare_uarts_init();
     struct link_pipe pipe = bare_uart_pipe(2);
     struct bare_uart *uart = &bare_uart[2];
@@ -149,8 +141,7 @@ static void test_uart_wakes_at_the_end_of_a_frame(void **state) {
 }
 
 /* A wire that leads nowhere: noise on it keeps no board awake. */
-static void test_uart_without_a_link_wakes_nobody(void **state) {
-    (void)state;
+TEST(test_uart_without_a_link_wakes_nobody) {
     bare_uarts_init();
     bare_uart_leave(4);
     uint32_t before = bare_uarts_overruns();
@@ -166,9 +157,8 @@ static void test_uart_without_a_link_wakes_nobody(void **state) {
     assert_true(bare_uart_ready(&bare_uart[4]));
 }
 
-static void test_uart_flushes(void **state) {
+TEST(test_uart_flushes) {
     uint8_t bytes[40] = {0};
-    (void)state;
     bare_uarts_init();
     struct link_pipe pipe = bare_uart_pipe(2);
     clock_us = 0;
@@ -183,15 +173,10 @@ static void test_uart_flushes(void **state) {
     assert_int_equal(clock_us, 1000000);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ring_is_a_queue),
-        cmocka_unit_test(test_ring_takes_pieces),
-        cmocka_unit_test(test_uart_counts_what_is_lost),
-        cmocka_unit_test(test_uart_wakes_who_has_more_to_send),
-        cmocka_unit_test(test_uart_wakes_at_the_end_of_a_frame),
-        cmocka_unit_test(test_uart_without_a_link_wakes_nobody),
-        cmocka_unit_test(test_uart_flushes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_ring_is_a_queue),
+          cmocka_unit_test(test_ring_takes_pieces),
+          cmocka_unit_test(test_uart_counts_what_is_lost),
+          cmocka_unit_test(test_uart_wakes_who_has_more_to_send),
+          cmocka_unit_test(test_uart_wakes_at_the_end_of_a_frame),
+          cmocka_unit_test(test_uart_without_a_link_wakes_nobody),
+          cmocka_unit_test(test_uart_flushes))

@@ -1,15 +1,12 @@
 /* Text and frames on one wire: neither harms the other. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "boards/bare/bare.h"
 #include "boards/bare/shell.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 enum { WIRE_BYTES = 1 << 20, PAYLOAD_MAX = 500 };
 
@@ -98,14 +95,13 @@ static size_t read_all(struct bare_shell *shell, uint8_t *bytes) {
     return size;
 }
 
-static void test_frames_pass_and_lines_are_taken(void **state) {
+TEST(test_frames_pass_and_lines_are_taken) {
     static const char *const words[] = {"who", "links", "help me", "Fault 3"};
     static uint8_t frames[WIRE_BYTES], got[WIRE_BYTES];
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
     size_t size = 0, read = 0;
-    (void)state;
     srand(1);
     for (unsigned turn = 0; turn < 2000; turn++) {
         const char *word = words[rand() % 4];
@@ -131,13 +127,12 @@ static void test_frames_pass_and_lines_are_taken(void **state) {
     assert_memory_equal(got, frames, size);
 }
 
-static void test_a_frame_in_pieces_is_no_line(void **state) {
+TEST(test_a_frame_in_pieces_is_no_line) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[2 * sizeof frame];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
     struct link_pipe pipe = bare_shell_pipe(&shell);
-    (void)state;
     srand(2);
     for (unsigned turn = 0; turn < 500; turn++) {
         size_t size = make_frame(frame), read = 0;
@@ -154,11 +149,10 @@ static void test_a_frame_in_pieces_is_no_line(void **state) {
     }
 }
 
-static void test_enter_alone_is_a_line(void **state) {
+TEST(test_enter_alone_is_a_line) {
     uint8_t bytes[8];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
-    (void)state;
     type("\r");
     assert_int_equal(read_all(&shell, bytes), 0);
     assert_false(bare_shell_line(&shell, line, clock_us));
@@ -170,11 +164,10 @@ static void test_enter_alone_is_a_line(void **state) {
 }
 
 /* After noise without an end: a silence ends it. */
-static void test_noise_is_passed_on(void **state) {
+TEST(test_noise_is_passed_on) {
     uint8_t bytes[100];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
-    (void)state;
     type("\x81\x92 noise");
     assert_int_equal(read_all(&shell, bytes), 8);
     clock_us += BARE_SHELL_SILENCE_US;
@@ -189,14 +182,13 @@ static void test_noise_is_passed_on(void **state) {
 }
 
 /* What is said stands between two frames, whole. */
-static void test_text_goes_between_frames(void **state) {
+TEST(test_text_goes_between_frames) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     static const char said[] = "\0\xff"
                                "incode: here\0";
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
     struct link_pipe pipe = bare_shell_pipe(&shell);
-    (void)state;
     srand(3);
     for (unsigned turn = 0; turn < 500; turn++) {
         size_t size = make_frame(frame), sent = 0;
@@ -226,14 +218,13 @@ static void test_text_goes_between_frames(void **state) {
 }
 
 /* Who types sees no frames; who sends one has them again. */
-static void test_frames_are_kept_back_for_who_types(void **state) {
+TEST(test_frames_are_kept_back_for_who_types) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[sizeof frame];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
     struct link_pipe pipe = bare_shell_pipe(&shell);
     size_t size = make_frame(frame);
-    (void)state;
     type("who\r");
     (void)read_all(&shell, got);
     assert_true(bare_shell_line(&shell, line, clock_us));
@@ -253,12 +244,11 @@ static void test_frames_are_kept_back_for_who_types(void **state) {
 
 /* After a restart nobody is known to type: one key, and frames cease; a frame's
  * first byte, with the rest behind it, is no key. */
-static void test_one_key_keeps_frames_back(void **state) {
+TEST(test_one_key_keeps_frames_back) {
     static uint8_t frame[FRAME_ENCODED(PAYLOAD_MAX) + FRAME_SLACK];
     uint8_t got[sizeof frame];
     char line[BARE_SHELL_LINE + 1];
     size_t size = make_frame(frame);
-    (void)state;
     for (unsigned i = 0; i < 2; i++) {
         struct bare_shell shell = begin();
         struct link_pipe pipe = bare_shell_pipe(&shell);
@@ -279,12 +269,11 @@ static void test_one_key_keeps_frames_back(void **state) {
     }
 }
 
-static void test_lines_wait_for_each_other(void **state) {
+TEST(test_lines_wait_for_each_other) {
     static const char *const words[] = {"who", "links", "", "memory"};
     uint8_t bytes[8];
     char line[BARE_SHELL_LINE + 1];
     struct bare_shell shell = begin();
-    (void)state;
     type("who\r\nlinks\r\n\r\nmemory\r\n");
     assert_int_equal(read_all(&shell, bytes), 0);
     for (unsigned i = 0; i < 4; i++) {
@@ -303,9 +292,8 @@ static void test_lines_wait_for_each_other(void **state) {
     assert_false(bare_shell_line(&shell, line, clock_us));
 }
 
-static void test_a_uart_without_a_link_is_read(void **state) {
+TEST(test_a_uart_without_a_link_is_read) {
     struct bare_shell shell = begin();
-    (void)state;
     for (unsigned i = 0; i < 1000; i++) {
         type("\x81 some noise\r");
         wire.in[wire.in_size++] = 0;
@@ -315,17 +303,12 @@ static void test_a_uart_without_a_link_is_read(void **state) {
     takes(&shell, "links");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_frames_pass_and_lines_are_taken),
-        cmocka_unit_test(test_a_frame_in_pieces_is_no_line),
-        cmocka_unit_test(test_enter_alone_is_a_line),
-        cmocka_unit_test(test_noise_is_passed_on),
-        cmocka_unit_test(test_text_goes_between_frames),
-        cmocka_unit_test(test_frames_are_kept_back_for_who_types),
-        cmocka_unit_test(test_one_key_keeps_frames_back),
-        cmocka_unit_test(test_lines_wait_for_each_other),
-        cmocka_unit_test(test_a_uart_without_a_link_is_read),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_frames_pass_and_lines_are_taken),
+          cmocka_unit_test(test_a_frame_in_pieces_is_no_line),
+          cmocka_unit_test(test_enter_alone_is_a_line),
+          cmocka_unit_test(test_noise_is_passed_on),
+          cmocka_unit_test(test_text_goes_between_frames),
+          cmocka_unit_test(test_frames_are_kept_back_for_who_types),
+          cmocka_unit_test(test_one_key_keeps_frames_back),
+          cmocka_unit_test(test_lines_wait_for_each_other),
+          cmocka_unit_test(test_a_uart_without_a_link_is_read))

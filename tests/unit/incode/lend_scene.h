@@ -5,19 +5,14 @@
 #ifndef TESTS_UNIT_LEND_SCENE_H
 #define TESTS_UNIT_LEND_SCENE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/tetrahedra.h"
 #include "host/mesh/order.h"
 #include "incode/paper/builder.h"
 #include "incode/paper/manager.h"
+#include "tests/unit/test.h"
 
 enum {
     LEND_BUILDERS = 8,

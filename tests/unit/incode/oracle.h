@@ -4,17 +4,12 @@
 #ifndef TESTS_UNIT_ORACLE_H
 #define TESTS_UNIT_ORACLE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/tetrahedra.h"
 #include "incode/pages/bricks.h"
+#include "tests/unit/test.h"
 
 struct oracle {
     const struct host_tetrahedra *tets;

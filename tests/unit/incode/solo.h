@@ -5,18 +5,13 @@
 #ifndef TESTS_UNIT_SOLO_H
 #define TESTS_UNIT_SOLO_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/order.h"
 #include "host/mesh/tetrahedra.h"
 #include "incode/state.h"
+#include "tests/unit/test.h"
 
 enum {
     SOLO_QUEUE = 65536,

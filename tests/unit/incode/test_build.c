@@ -1,17 +1,12 @@
 /* Which way a triangulator goes, and what stays of a job when the next one goes
  * another way: memory, pages, spilled faces, counts. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "solo.h"
 #include "tests/unit/emulated.h"
+#include "tests/unit/test.h"
 
 static void made(const char *kind, uint64_t n, struct host_points *points) {
     struct host_error error = {0};
@@ -34,7 +29,7 @@ static struct host_digest right(const struct host_points *points) {
 
 /* ---- the choice ---- */
 
-static void what_is_chosen(void **unused) {
+TEST(what_is_chosen) {
     static const struct {
         const char *kind;
         unsigned points;
@@ -70,7 +65,6 @@ static void what_is_chosen(void **unused) {
         {"uniform", 500, INCODE_BUILD_POINTS, INCODE_NAIVE, 0, 1, 4096, 0, 0},
         {"uniform", 500, INCODE_BUILD_POINTS, INCODE_GRID, 0, 1, 4096, 0, 0},
         {"uniform", 500, INCODE_BUILD_AUTO, INCODE_KD, 1, 1, 4096, 0, 0}};
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         struct host_points points = {0};
         made(cases[i].kind, cases[i].points, &points);
@@ -96,9 +90,8 @@ static void what_is_chosen(void **unused) {
 }
 
 /* Any memory, with everything else left to chance. */
-static void each_memory(void **unused) {
+TEST(each_memory) {
     struct host_points points = {0};
-    (void)unused;
     made("bubbles", 2200, &points);
     struct host_digest expected = right(&points);
     unsigned by[2] = {0, 0};
@@ -158,7 +151,7 @@ static bool in_room(const struct host_points *points, size_t room, uint32_t k,
 }
 
 /* Memory of each size, so that it ends at any moment. */
-static void handed_over(void **unused) {
+TEST(handed_over) {
     static const struct {
         const char *kind;
         uint32_t points, step, most;
@@ -167,7 +160,6 @@ static void handed_over(void **unused) {
                 {"terrain", 900, 4000, 60000}, {"shell", 400, 3000, 25000},
                 {"torus", 900, 4000, 75000},   {"bubbles", 900, 4000, 60000}};
     unsigned handovers = 0;
-    (void)unused;
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         struct host_points points = {0};
         made(sets[i].kind, sets[i].points, &points);
@@ -202,9 +194,8 @@ static void leave(struct solo *s, uint32_t first, uint32_t last,
 /* A third goes by faces, all that there is by points; whichever is left, at
  * whatever step, with pages and spilled faces on their way, the next comes to
  * the right result. */
-static void job_after_job(void **unused) {
+TEST(job_after_job) {
     struct host_points points = {0};
-    (void)unused;
     made("uniform", 3000, &points);
     struct host_digest expected = right(&points);
     uint64_t spilled = 0;
@@ -254,11 +245,10 @@ static void job_after_job(void **unused) {
 
 /* A spilled list that comes after its job was left is none that was asked for,
  * and what was the list's is another's. */
-static void late_spilled_faces(void **unused) {
+TEST(late_spilled_faces) {
     struct host_points points = {0};
     struct solo s = {
         .index = INCODE_KD, .regions = 1, .memory = 4 << 20, .pressure = 350};
-    (void)unused;
     made("uniform", 3000, &points);
     struct host_digest expected = right(&points), digest;
     solo_open(&s, points.xyz, points.count);
@@ -292,11 +282,10 @@ static void late_spilled_faces(void **unused) {
 /* ---- memory ---- */
 
 /* As much as the points take, and not what faces would. */
-static void high_water(void **unused) {
+TEST(high_water) {
     struct incode_statistics before, after;
     struct host_points points = {0};
     struct solo s = {.index = INCODE_KD, .regions = 1, .memory = 32 << 20};
-    (void)unused;
     made("uniform", 2000, &points);
     solo_open(&s, points.xyz, points.count);
     solo_region(&s, 0);
@@ -320,11 +309,6 @@ static void high_water(void **unused) {
     host_points_free(&points);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_chosen),     cmocka_unit_test(each_memory),
-        cmocka_unit_test(handed_over),        cmocka_unit_test(job_after_job),
-        cmocka_unit_test(late_spilled_faces), cmocka_unit_test(high_water),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(what_is_chosen), cmocka_unit_test(each_memory),
+          cmocka_unit_test(handed_over), cmocka_unit_test(job_after_job),
+          cmocka_unit_test(late_spilled_faces), cmocka_unit_test(high_water))

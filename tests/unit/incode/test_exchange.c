@@ -1,18 +1,13 @@
 /* Triangulators that share one active face list: whatever the order in which
  * they hear of each other, the triangulation is the same, each tetrahedron is
  * built once, and each brick is committed once. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "several.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 static void expect(const struct several *start, const struct host_points *p,
                    const char *digest, const char *name) {
@@ -56,8 +51,7 @@ static void expect_all(const struct host_points *points, const char *name) {
     }
 }
 
-static void made_sets(void **unused) {
-    (void)unused;
+TEST(made_sets) {
     static const char *const kinds[] = {
         "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -70,8 +64,7 @@ static void made_sets(void **unused) {
     }
 }
 
-static void degenerate_sets(void **unused) {
-    (void)unused;
+TEST(degenerate_sets) {
     static const char *const names[] = {
         "deg_cgal_T3_1",           "deg_cgal_grid5",
         "deg_cgal_nested_cubes",   "deg_mourner_orient3d_denormal",
@@ -92,8 +85,7 @@ static void degenerate_sets(void **unused) {
 
 /* A share of what is built in vain, and how evenly it is spread: what the paper
  * repeated 1.34 times at 32 nodes, for 20,000 points. */
-static void little_in_vain(void **unused) {
-    (void)unused;
+TEST(little_in_vain) {
     struct host_points points = {0};
     struct host_error error = {0};
     static struct several all;
@@ -114,8 +106,7 @@ static void little_in_vain(void **unused) {
 }
 
 /* What cannot come of another is told so, and changes nothing. */
-static void refusals(void **unused) {
-    (void)unused;
+TEST(refusals) {
     struct host_points points = {0};
     struct host_error error = {0};
     static struct several all;
@@ -144,8 +135,7 @@ static void refusals(void **unused) {
 }
 
 /* A tetrahedron that comes twice is noticed. */
-static void twice(void **unused) {
-    (void)unused;
+TEST(twice) {
     struct host_points points = {0};
     struct host_error error = {0};
     static struct several all;
@@ -176,8 +166,7 @@ static bool no_room(void *context, const struct incode_face *faces,
 /* Where spilled faces have no room outside, what others send has to wait: it
  * may come later, and who sends it all the same is told that memory is not what
  * is wanting. */
-static void waits_for_room(void **unused) {
-    (void)unused;
+TEST(waits_for_room) {
     struct host_points points = {0};
     struct host_error error = {0};
     static struct several all;
@@ -216,8 +205,7 @@ static bool not_now(void *context, uint32_t brick) {
 }
 
 /* A node that cannot ask for what is spilled, however long, is not quiet. */
-static void waits_to_ask(void **unused) {
-    (void)unused;
+TEST(waits_to_ask) {
     struct host_points points = {0};
     struct host_error error = {0};
     static struct several all;
@@ -268,7 +256,7 @@ static void tell_last(struct several *all, uint32_t vertex, uint32_t faces) {
 /* A lattice of a plane and a point beside it, which the last node hears of from
  * lower ones.  What they send opens more faces than there is room for, all in
  * bricks before the one at work: those are spilled, too. */
-static void spills_before_work(void **unused) {
+TEST(spills_before_work) {
     enum { SIDE = 72, POINTS = SIDE * SIDE + 1, PRESSURE = 300 };
     static double xyz[POINTS][3];
     static struct several all;
@@ -276,7 +264,6 @@ static void spills_before_work(void **unused) {
                         .build = INCODE_BUILD_POINTS,
                         .regions = 1,
                         .memory = 16 << 20};
-    (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
         const int row = i / SIDE, column = i % SIDE;
         xyz[i][0] = row;
@@ -307,12 +294,7 @@ static void spills_before_work(void **unused) {
     solo_close(&solo);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(made_sets),      cmocka_unit_test(degenerate_sets),
-        cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
-        cmocka_unit_test(twice),          cmocka_unit_test(waits_for_room),
-        cmocka_unit_test(waits_to_ask),   cmocka_unit_test(spills_before_work),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(made_sets), cmocka_unit_test(degenerate_sets),
+          cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
+          cmocka_unit_test(twice), cmocka_unit_test(waits_for_room),
+          cmocka_unit_test(waits_to_ask), cmocka_unit_test(spills_before_work))

@@ -1,16 +1,11 @@
 /* Stars that are lent: the triangulation is the same whoever finds their
  * tetrahedra and whenever these come, and each is built once. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/gen.h"
 #include "several.h"
+#include "tests/unit/test.h"
 
 /* One region, or more, of points of that kind. */
 static void open_set(struct several *all, const char *kind, uint64_t points,
@@ -51,8 +46,7 @@ static void find(struct several *all, uint32_t helper,
 }
 
 /* All kinds of answers come, most of them in time. */
-static void all_kinds(void **unused) {
-    (void)unused;
+TEST(all_kinds) {
     static struct several with, without;
     static const char *const kinds[] = {"uniform", "sphere", "bluntfin"};
     uint64_t hulls = 0, elsewhere = 0, late = 0;
@@ -78,8 +72,7 @@ static void all_kinds(void **unused) {
 }
 
 /* What comes a second time builds nothing. */
-static void too_late(void **unused) {
-    (void)unused;
+TEST(too_late) {
     static struct several all;
     static struct incode_borrower b;
     struct incode_loan loan;
@@ -129,8 +122,7 @@ static void work_on(struct solo *solo) {
 
 /* Vertices that are lent hold their bricks up, and no longer than they are: not
  * even if nothing is left to do when they come back. */
-static void held_up(void **unused) {
-    (void)unused;
+TEST(held_up) {
     static struct several all;
     static struct incode_borrower b;
     struct incode_loan loan, again;
@@ -159,8 +151,7 @@ static void held_up(void **unused) {
 
 /* A star with more faces than a loan holds: as many as fit are lent, and the
  * rest is closed at home. */
-static void large_star(void **unused) {
-    (void)unused;
+TEST(large_star) {
     static struct several all, plain;
     open_set(&plain, "hub", 3000, 2);
     several_work(&plain);
@@ -175,8 +166,7 @@ static void large_star(void **unused) {
 }
 
 /* What is no loan, and no answer to one. */
-static void unsound(void **unused) {
-    (void)unused;
+TEST(unsound) {
     struct incode_loan loan = {4, 8, 1, {{256, 300, 9}}};
     assert_true(incode_loan_is_sound(&loan, 8));
     assert_false(incode_loan_is_sound(&loan, 7));
@@ -208,11 +198,6 @@ static void unsound(void **unused) {
     assert_false(incode_found_is_sound(&found, 2));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_kinds), cmocka_unit_test(too_late),
-        cmocka_unit_test(held_up),   cmocka_unit_test(large_star),
-        cmocka_unit_test(unsound),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(all_kinds), cmocka_unit_test(too_late),
+          cmocka_unit_test(held_up), cmocka_unit_test(large_star),
+          cmocka_unit_test(unsound))

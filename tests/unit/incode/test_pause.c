@@ -1,16 +1,11 @@
 /* How much a triangulator works between two calls of who looks after other
  * things, on sets that are hard for one part of it or another. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "solo.h"
 #include "tests/unit/incode/work_clock.h"
+#include "tests/unit/test.h"
 
 enum {
     ASKED = 64,  /* units, and INCODE_PAUSE_OVER more: 25,600 instructions of a
@@ -64,10 +59,9 @@ static uint32_t ask(void *context) {
     return ++*asked;
 }
 
-static void test_pause_asks(void **state) {
+TEST(test_pause_asks) {
     uint32_t asked = 0;
     struct incode_pause pause = {ask, &asked, 0}, none = {0};
-    (void)state;
     incode_breathe(&pause, 1); /* nothing was allowed yet */
     assert_int_equal(asked, 1);
     incode_breathe(&pause, 1);
@@ -78,8 +72,7 @@ static void test_pause_asks(void **state) {
         incode_breathe(&none, INCODE_PAUSE_OVER);
 }
 
-static void test_pause_in_points(void **state) {
-    (void)state;
+TEST(test_pause_in_points) {
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_POINTS);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_POINTS);
     holds("sphere", 1000, INCODE_KD, INCODE_BUILD_POINTS);
@@ -88,27 +81,20 @@ static void test_pause_in_points(void **state) {
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_POINTS);
 }
 
-static void test_pause_in_faces(void **state) {
-    (void)state;
+TEST(test_pause_in_faces) {
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_FACES);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_FACES);
     holds("sphere", 500, INCODE_KD, INCODE_BUILD_FACES);
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_FACES);
 }
 
-static void test_pause_in_searches(void **state) {
-    (void)state;
+TEST(test_pause_in_searches) {
     holds("uniform", 1000, INCODE_NAIVE, INCODE_BUILD_FACES);
     holds("uniform", 2000, INCODE_GRID, INCODE_BUILD_FACES);
     holds("grid", 1000, INCODE_GRID, INCODE_BUILD_FACES);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pause_asks),
-        cmocka_unit_test(test_pause_in_points),
-        cmocka_unit_test(test_pause_in_faces),
-        cmocka_unit_test(test_pause_in_searches),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_pause_asks),
+          cmocka_unit_test(test_pause_in_points),
+          cmocka_unit_test(test_pause_in_faces),
+          cmocka_unit_test(test_pause_in_searches))

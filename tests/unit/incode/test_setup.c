@@ -1,18 +1,12 @@
 /* What a triangulator's setup may say, and the memory that it needs. */
 #include <math.h>
-#include <setjmp.h>
 #include <stdalign.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
-
 #include "incode/triangulator.h"
+#include "tests/unit/test.h"
 
-static void too_little_memory(void **unused) {
-    (void)unused;
+TEST(too_little_memory) {
     struct incode_setup setup = {.bricks = 10, .index = INCODE_KD};
     struct incode_outside outside = {0};
     size_t least = incode_arena_min(&setup);
@@ -33,8 +27,7 @@ static void too_little_memory(void **unused) {
 }
 
 /* Each field of a setup, at its limits and past them. */
-static void setup_limits(void **unused) {
-    (void)unused;
+TEST(setup_limits) {
     const struct incode_setup good = {
         .bricks = 10, .index = INCODE_KD, .hi = {1, 1, 1}};
     struct incode_setup grid = good;
@@ -93,10 +86,4 @@ static void setup_limits(void **unused) {
     assert_memory_equal(arena, untouched, sizeof arena);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(too_little_memory),
-        cmocka_unit_test(setup_limits),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(too_little_memory), cmocka_unit_test(setup_limits))

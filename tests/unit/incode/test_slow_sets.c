@@ -58,9 +58,8 @@ static struct incode_statistics run(const double (*xyz)[3], uint64_t points,
     return s;
 }
 
-static void plane_and_a_point(void **unused) {
+TEST(plane_and_a_point) {
     static double xyz[PLANE][3];
-    (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
         const int row = i / SIDE, column = i % SIDE;
         xyz[i][0] = row;
@@ -93,9 +92,8 @@ static void make_mixed(double (*xyz)[3], int points) {
 
 /* 66 pages, and 48 frames: a walk over all of them that always went up would
  * find none of them there. */
-static void mixed_exponents(void **unused) {
+TEST(mixed_exponents) {
     static double xyz[MIXED][3];
-    (void)unused;
     make_mixed(xyz, MIXED);
     struct incode_statistics s = run((const double(*)[3])xyz, MIXED, 1, 0, 0);
     assert_int_equal(s.tetrahedra_kept,
@@ -105,9 +103,8 @@ static void mixed_exponents(void **unused) {
 
 /* 147 pages: with what the active face list and the bricks would take of a
  * larger set, there were 92 frames, and more than 10 requests a tetrahedron. */
-static void frames_before_faces(void **unused) {
+TEST(frames_before_faces) {
     static double xyz[MORE_MIXED][3];
-    (void)unused;
     make_mixed(xyz, MORE_MIXED);
     struct incode_statistics s =
         run((const double(*)[3])xyz, MORE_MIXED, 4, 0, 376 << 10);
@@ -117,13 +114,12 @@ static void frames_before_faces(void **unused) {
 /* Points of others' bricks are inserted, released, and visited again each time
  * that memory is short: only a look at all cells would tell that no cell holds
  * such a point. */
-static void released_vertices(void **unused) {
+TEST(released_vertices) {
     static double xyz[PLANE][3];
     struct solo solo = {.index = INCODE_KD,
                         .build = INCODE_BUILD_POINTS,
                         .regions = 4,
                         .memory = 320 << 10};
-    (void)unused;
     for (int i = 0; i < SIDE * SIDE; i++) {
         const int row = i / SIDE, column = i % SIDE;
         xyz[i][0] = row;
@@ -142,12 +138,7 @@ static void released_vertices(void **unused) {
     solo_close(&solo);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(plane_and_a_point),
-        cmocka_unit_test(mixed_exponents),
-        cmocka_unit_test(frames_before_faces),
-        cmocka_unit_test(released_vertices),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(plane_and_a_point),
+          cmocka_unit_test(mixed_exponents),
+          cmocka_unit_test(frames_before_faces),
+          cmocka_unit_test(released_vertices))

@@ -3,20 +3,15 @@
  * pages that come at random, spilled faces, hubs, extreme coordinates. */
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
 #include "tests/unit/emulated.h"
 #include "tests/unit/reference.h"
 #include "solo.h"
+#include "tests/unit/test.h"
 
 static const char *const index_names[] = {"naive", "grid", "kd"};
 static const char *const build_names[] = {"auto", "faces", "points"};
@@ -106,8 +101,7 @@ static void read_set(const char *name, const char *suffix,
     }
 }
 
-static void degenerate_sets(void **unused) {
-    (void)unused;
+TEST(degenerate_sets) {
     for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
         struct host_points points = {0};
         struct host_digest digest;
@@ -119,8 +113,7 @@ static void degenerate_sets(void **unused) {
 }
 
 /* Scaling by a power of two changes no sign, so the digest stays. */
-static void scaled_sets(void **unused) {
-    (void)unused;
+TEST(scaled_sets) {
     static const int powers[] = {500, -500};
     for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++) {
         if (strstr(degenerate[i], "denormal") != NULL)
@@ -143,8 +136,7 @@ static void scaled_sets(void **unused) {
 }
 
 /* Coordinates of 2^1000 beside coordinates of 2^-1074. */
-static void both_ends(void **unused) {
-    (void)unused;
+TEST(both_ends) {
     uint64_t seed = 3;
     for (int round = 0; round < 8; round += SANITIZED ? 2 : 1) {
         struct host_points points = {0};
@@ -181,8 +173,7 @@ static double anywhere(int kind, uint64_t *seed) {
 
 /* Points over the whole range of doubles, where differences, boxes and their
  * sums overflow: they lie as the same points a little nearer. */
-static void whole_range(void **unused) {
-    (void)unused;
+TEST(whole_range) {
     uint64_t seed = 5;
     for (int round = 0; round < (SANITIZED ? 3 : 9); round++) {
         struct host_points points = {0}, nearer = {0};
@@ -220,8 +211,7 @@ static void whole_range(void **unused) {
  * expense but kd's.  Under the sanitizers as many rounds as take each kind of
  * size, far point and count of them: they look for wrong accesses, not for
  * wrong digests. */
-static void mixed_scales(void **unused) {
-    (void)unused;
+TEST(mixed_scales) {
     uint64_t seed = 11;
     for (int round = 0; round < (SANITIZED ? 3 : 24); round++) {
         struct host_points points = {0};
@@ -262,8 +252,7 @@ static void mixed_scales(void **unused) {
 
 /* Points so near each other that products of what lies between them underflow,
  * beside faces of size 1: found by chance, 9 of 2,040 sets of this kind. */
-static void denormal_neighbours(void **unused) {
-    (void)unused;
+TEST(denormal_neighbours) {
     static const double p[11][3] = {
         {0.34022349259302698, 0.064774195303455739, 0.2596715618713743},
         {0.27378745413338423, 0.29629881961085613, 0.087738947188406802},
@@ -292,8 +281,7 @@ static void made(const char *kind, uint64_t n, struct host_points *points) {
         fail_msg("%s", error.text);
 }
 
-static void made_sets(void **unused) {
-    (void)unused;
+TEST(made_sets) {
     static const char *const kinds[] = {
         "uniform", "bubbles", "bluntfin", "sphere", "grid", "rotated", "hub"};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -321,8 +309,7 @@ static void made_sets(void **unused) {
 /* Two lines, and a curve of the third degree: a tetrahedron for each pair of
  * their segments, and searches in which nearly every point beats the one
  * before. */
-static void curves(void **unused) {
-    (void)unused;
+TEST(curves) {
     enum { HALF = 30 };
     static double xyz[2][2 * HALF][3];
     for (int i = 0; i < 2 * HALF; i++) {
@@ -359,24 +346,21 @@ static struct solo taken_by(const char *kind, uint64_t n) {
 /* Sides that are coplanar up to rounding, where every point is in doubt about
  * every face: hardly more than the facets of the hull may have to look at all.
  */
-static void rough_sides(void **unused) {
-    (void)unused;
+TEST(rough_sides) {
     struct solo s = taken_by("rotated", 27000);
     assert_in_range(s.far_calls, 1, s.hulls);
 }
 
 /* Points on a sphere up to rounding: not every search that goes through the
  * sphere may look at every point. */
-static void rough_sphere(void **unused) {
-    (void)unused;
+TEST(rough_sphere) {
     struct solo s = taken_by("sphere", 6000);
     assert_in_range(s.far_calls, 1, 1000);
 }
 
 /* Two grids up to rounding, the large one 2^1100 times the small one: what is
  * learned of one overflows where it is asked for the other. */
-static void rough_at_both_ends(void **unused) {
-    (void)unused;
+TEST(rough_at_both_ends) {
     struct host_points small = {0}, both = {0};
     struct host_error error = {0};
     made("rotated", SANITIZED ? 216 : 512, &small);
@@ -406,8 +390,7 @@ static void rough_at_both_ends(void **unused) {
 }
 
 /* A front at one vertex that is far longer than what is kept at hand. */
-static void hub(void **unused) {
-    (void)unused;
+TEST(hub) {
     struct host_points points = {0};
     struct host_digest digest[2];
     made("hub", 6000, &points);
@@ -461,8 +444,7 @@ struct real {
     uint32_t pressure;
 };
 
-static void real_sets(void **unused) {
-    (void)unused;
+TEST(real_sets) {
     static const struct real cases[] = {
         {"cactus", INCODE_NAIVE, 1, 0},  {"pdb_3GQP", INCODE_NAIVE, 8, 0},
         {"cactus", INCODE_GRID, 8, 600}, {"pdb_3GQP", INCODE_GRID, 2, 0},
@@ -498,8 +480,7 @@ static void real_sets(void **unused) {
 
 /* ---- memory and the interface's refusals ---- */
 
-static void smallest_memory(void **unused) {
-    (void)unused;
+TEST(smallest_memory) {
     struct host_points points = {0};
     made("uniform", 20000, &points);
     struct host_digest digest[2];
@@ -521,8 +502,7 @@ static void smallest_memory(void **unused) {
     host_points_free(&points);
 }
 
-static void refusals(void **unused) {
-    (void)unused;
+TEST(refusals) {
     struct host_points points = {0};
     made("uniform", 500, &points);
     struct solo s = {.index = INCODE_KD, .regions = 1};
@@ -550,23 +530,11 @@ static void refusals(void **unused) {
     host_points_free(&points);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(degenerate_sets),
-        cmocka_unit_test(scaled_sets),
-        cmocka_unit_test(both_ends),
-        cmocka_unit_test(whole_range),
-        cmocka_unit_test(mixed_scales),
-        cmocka_unit_test(denormal_neighbours),
-        cmocka_unit_test(made_sets),
-        cmocka_unit_test(curves),
-        cmocka_unit_test(rough_sides),
-        cmocka_unit_test(rough_sphere),
-        cmocka_unit_test(rough_at_both_ends),
-        cmocka_unit_test(hub),
-        cmocka_unit_test(real_sets),
-        cmocka_unit_test(smallest_memory),
-        cmocka_unit_test(refusals),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(degenerate_sets), cmocka_unit_test(scaled_sets),
+          cmocka_unit_test(both_ends), cmocka_unit_test(whole_range),
+          cmocka_unit_test(mixed_scales), cmocka_unit_test(denormal_neighbours),
+          cmocka_unit_test(made_sets), cmocka_unit_test(curves),
+          cmocka_unit_test(rough_sides), cmocka_unit_test(rough_sphere),
+          cmocka_unit_test(rough_at_both_ends), cmocka_unit_test(hub),
+          cmocka_unit_test(real_sets), cmocka_unit_test(smallest_memory),
+          cmocka_unit_test(refusals))

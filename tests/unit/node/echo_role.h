@@ -3,15 +3,10 @@
 #ifndef TESTS_ECHO_ROLE_H
 #define TESTS_ECHO_ROLE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/roles/roles.h"
+#include "tests/unit/test.h"
 
 enum {
     ECHO_FAILS = 13, /* a job's epoch: a fault in its third step */

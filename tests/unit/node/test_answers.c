@@ -1,14 +1,9 @@
 /* What a node answers, and that both sides count it; echoes of neighbours; the
  * order to restart. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "node/message.h"
 #include "node_talk.h"
+#include "tests/unit/test.h"
 
 enum { ALL = 16 };
 
@@ -57,12 +52,11 @@ static void ask(uint32_t tag, uint32_t what) {
     say(1, NODE_QUESTION, &question, sizeof question);
 }
 
-static void answers_are_counted(void **state) {
+TEST(answers_are_counted) {
     const struct node_ping_message ping = {3};
     struct node_answer_head head;
     struct node_pong_message pong;
     struct node_who who;
-    (void)state;
     begin();
     ask(70, NODE_WHO);
     ask(71, NODE_LINKS);
@@ -96,8 +90,7 @@ static void answers_are_counted(void **state) {
 }
 
 /* More than fit are dropped, and the node goes on. */
-static void questions_without_end(void **state) {
-    (void)state;
+TEST(questions_without_end) {
     begin();
     for (uint32_t i = 0; i < 100; i++)
         ask(i, NODE_TOTALS);
@@ -112,10 +105,9 @@ static void questions_without_end(void **state) {
     talk_end_all();
 }
 
-static void echoes_come_back(void **state) {
+TEST(echoes_come_back) {
     const struct node_echo_message echo = {1234};
     struct node_echo_message back;
-    (void)state;
     begin();
     say(0, NODE_ECHO, &echo, sizeof echo);
     assert_true(steps(0, 300));
@@ -130,9 +122,8 @@ static void echoes_come_back(void **state) {
     talk_end_all();
 }
 
-static void what_is_for_loaders_is_passed_over(void **state) {
+TEST(what_is_for_loaders_is_passed_over) {
     static const uint8_t nothing[300];
-    (void)state;
     begin();
     for (unsigned type = NODE_IMAGE_BEGIN; type <= NODE_IMAGE_DO; type++)
         say(1, (uint8_t)type, nothing, sizeof nothing);
@@ -141,11 +132,10 @@ static void what_is_for_loaders_is_passed_over(void **state) {
     talk_end_all();
 }
 
-static void an_order_to_restart(void **state) {
+TEST(an_order_to_restart) {
     const struct node_restart_message stay = {NODE_RESTART_STAY},
                                       plain = {NODE_RESTART_PLAIN},
                                       none = {.what = 77};
-    (void)state;
     begin();
     say(1, NODE_RESTART, &none, sizeof none);
     assert_true(steps(1, 1000));
@@ -161,13 +151,8 @@ static void an_order_to_restart(void **state) {
     talk_end_all();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(answers_are_counted),
-        cmocka_unit_test(questions_without_end),
-        cmocka_unit_test(echoes_come_back),
-        cmocka_unit_test(what_is_for_loaders_is_passed_over),
-        cmocka_unit_test(an_order_to_restart),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(answers_are_counted),
+          cmocka_unit_test(questions_without_end),
+          cmocka_unit_test(echoes_come_back),
+          cmocka_unit_test(what_is_for_loaders_is_passed_over),
+          cmocka_unit_test(an_order_to_restart))

@@ -1,15 +1,9 @@
 /* The windows that suit a node's memory and its wires. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "node/answers.h"
+#include "tests/unit/test.h"
 
-static void test_windows(void **unused) {
-    (void)unused;
+TEST(test_windows) {
     struct node_identity id = {.epoch = 1};
     struct cube_config config = node_configure(&id, 4u << 20);
     assert_int_equal(config.window, 8);
@@ -24,9 +18,4 @@ static void test_windows(void **unused) {
     assert_int_equal(config.host_window, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_windows),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_windows))

@@ -1,20 +1,14 @@
 /* Texts of faults: what a node tells its user. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/setup.h"
 #include "node/message.h"
+#include "tests/unit/test.h"
 
 /* A text that is too long is cut, and the first fault stays. */
-static void fault_texts(void **unused) {
+TEST(fault_texts) {
     static struct node_fault fault;
     char words[NODE_FAULT_TEXT_MAX + 11];
-    (void)unused;
     assert_false(node_fault_is_set(&fault));
     node_fault_set(&fault, "#, # and #", 0, UINT32_MAX);
     assert_string_equal(fault.text, "0, 4294967295 and 4294967295");
@@ -30,7 +24,4 @@ static void fault_texts(void **unused) {
     assert_string_equal(fault.text + NODE_FAULT_TEXT_MAX - 3, "x12");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(fault_texts)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(fault_texts))

@@ -1,15 +1,10 @@
 /* A holder by itself: what it sends, and to whom, where its links have room for
  * so many messages and no more. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/page_check.h"
 #include "node/roles/holder.h"
+#include "tests/unit/test.h"
 
 enum { SENT_MAX = 16, ARENA = 8192, PAGE_KEY = 0x5eed };
 
@@ -121,8 +116,7 @@ static struct node_finished_message totals(void) {
 }
 
 /* Each gets what it has asked for, of the host once. */
-static void two_sources(void **unused) {
-    (void)unused;
+TEST(two_sources) {
     begin(ARENA);
     asks(0, 4);
     asks(6, 4);
@@ -149,10 +143,9 @@ static void two_sources(void **unused) {
 
 /* A page that goes out takes the room of a request: what the request was to
  * displace stays there, and nothing is counted until it leaves. */
-static void no_room_for_a_request(void **unused) {
+TEST(no_room_for_a_request) {
     const struct node_setup_message setup = {.nodes = 2, .holders = 1};
     struct node_map map;
-    (void)unused;
     memset(&map, 0, sizeof map);
     begin(ARENA);
     role->map(world.arena, &map);
@@ -185,8 +178,7 @@ static void no_room_for_a_request(void **unused) {
 
 /* One that came altered is asked for again, and reported; so is a node that
  * sends one: only the host has any for a holder. */
-static void wrong_pages(void **unused) {
-    (void)unused;
+TEST(wrong_pages) {
     begin(ARENA);
     asks(0, 4);
     assert_int_equal(sends(8), 1);
@@ -208,11 +200,6 @@ static void wrong_pages(void **unused) {
     assert_int_equal(role->held(world.arena), 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(two_sources),
-        cmocka_unit_test(no_room_for_a_request),
-        cmocka_unit_test(wrong_pages),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(two_sources),
+          cmocka_unit_test(no_room_for_a_request),
+          cmocka_unit_test(wrong_pages))

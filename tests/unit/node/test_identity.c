@@ -1,16 +1,11 @@
 /* Who a node is, where its board is not told: an epoch of random bytes or of a
  * counter, a number from a neighbour's greeting. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/sim/sim_cube.h"
 #include "node/identity.h"
+#include "tests/unit/test.h"
 
 static uint32_t next; /* what the generator gives */
 static unsigned draws;
@@ -30,11 +25,10 @@ static bool fail_to(void *context, uint8_t *bytes, size_t size) {
     return false;
 }
 
-static void epochs(void **unused) {
+TEST(epochs) {
     struct node_identity id = {.self = 3};
     struct secure_source none = {.boot = 0}, counts = {.boot = 1},
                          random = {.random = generate};
-    (void)unused;
     assert_false(node_identity_epoch(&id, &none));
     none.random = fail_to;
     assert_false(node_identity_epoch(&id, &none));
@@ -63,7 +57,7 @@ static int deaf(void *context, uint8_t *bytes, size_t size) {
 }
 
 /* Node 1 of two hears node 0, whose wire may be in the wrong link first. */
-static void a_neighbour_says_it(void **unused) {
+TEST(a_neighbour_says_it) {
     uint64_t now_us = 0;
     struct host_sim_cube wires;
     const struct host_sim_cube_options options = {
@@ -74,7 +68,6 @@ static void a_neighbour_says_it(void **unused) {
     struct learner learner;
     struct node_identity id = {.window = 5};
     struct cube_config config;
-    (void)unused;
     memset(&board, 0, sizeof board);
     memset(&config, 0, sizeof config);
     assert_int_equal(host_sim_cube_open(&wires, &options, &now_us, &error), 0);
@@ -131,10 +124,9 @@ static void a_neighbour_says_it(void **unused) {
     host_sim_cube_close(&wires);
 }
 
-static void an_epoch_follows_what_neighbours_knew(void **unused) {
+TEST(an_epoch_follows_what_neighbours_knew) {
     struct learner learner = {.known = {.epoch = 0}};
     struct node_identity id = {.epoch = 0};
-    (void)unused;
     assert_false(node_identity_epoch_behind(&learner, &id));
     assert_int_equal(id.epoch, 1);
     learner.known.epoch = 17;
@@ -145,11 +137,5 @@ static void an_epoch_follows_what_neighbours_knew(void **unused) {
     assert_int_equal(id.epoch, 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(epochs),
-        cmocka_unit_test(a_neighbour_says_it),
-        cmocka_unit_test(an_epoch_follows_what_neighbours_knew),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(epochs), cmocka_unit_test(a_neighbour_says_it),
+          cmocka_unit_test(an_epoch_follows_what_neighbours_knew))

@@ -1,14 +1,9 @@
 /* Pages among the nodes of an exchange, by themselves: whom a page is asked of,
  * what is lent, waited for or left to the host, and what comes to all. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/roles/requests.h"
+#include "tests/unit/test.h"
 
 enum {
     SENT_MAX = 64,
@@ -178,11 +173,10 @@ static void expect_page(unsigned i, uint16_t dest, uint32_t page) {
 
 /* Bricks of who has them, boxes of who has the first brick below: of 40 bricks
  * there are two pages at 40, and the root at 42. */
-static void keepers(void **unused) {
+TEST(keepers) {
     static const uint32_t page[] = {0, 9, 10, 19, 20, 39, 40, 41, 42};
     static const uint16_t keeper[] = {0, 0, CUBE_HOST, CUBE_HOST, 2,
                                       3, 0, 3,         0};
-    (void)unused;
     begin();
     for (size_t i = 0; i < sizeof page / sizeof *page; i++) {
         assert_int_equal(node_lending_keeper(&world.lending, page[i]),
@@ -191,8 +185,7 @@ static void keepers(void **unused) {
 }
 
 /* A page that is there goes to who asks, as links have room. */
-static void lent(void **unused) {
-    (void)unused;
+TEST(lent) {
     begin();
     had.place[12] = had.place[13] = READY;
     had.label[12] = UINT64_C(0x0c0c0c0c0a0b0c0d);
@@ -212,8 +205,7 @@ static void lent(void **unused) {
 }
 
 /* One that the node has not had yet it gets itself, and it waits. */
-static void not_there_yet(void **unused) {
-    (void)unused;
+TEST(not_there_yet) {
     begin();
     had.place[14] = LOADING;
     asks(3, 14);
@@ -232,8 +224,7 @@ static void not_there_yet(void **unused) {
 }
 
 /* One that it has given up it leaves to the host, once. */
-static void given_up(void **unused) {
-    (void)unused;
+TEST(given_up) {
     begin();
     had.full = true;
     asks(2, 16);
@@ -256,8 +247,7 @@ static void refused(uint16_t source, uint32_t page, const char *why) {
 }
 
 /* What no sound node asks for. */
-static void wrong_requests(void **unused) {
-    (void)unused;
+TEST(wrong_requests) {
     begin();
     refused(2, 9, "request for page 9, which node 1 has not");
     refused(2, 40, "request for page 40, which node 1 has not");
@@ -300,8 +290,7 @@ static void comes(uint16_t source, uint32_t page) {
 
 /* A node is asked for so many at a time, and others meanwhile; whoever sends a
  * page makes room for another. */
-static void asked_for(void **unused) {
-    (void)unused;
+TEST(asked_for) {
     begin();
     for (uint32_t page = 0; page < 10; page++)
         assert_true(world.source.request(world.source.context, page));
@@ -338,9 +327,8 @@ static void expect_report(unsigned i, uint16_t sender, uint32_t page) {
 
 /* A page that its keeper has altered is asked of the host; the keeper is named,
  * and others go on as they were. */
-static void altered(void **unused) {
+TEST(altered) {
     struct node_page p;
-    (void)unused;
     begin();
     for (uint32_t page = 0; page < 9; page++)
         assert_true(world.source.request(world.source.context, page));
@@ -370,9 +358,8 @@ static void altered(void **unused) {
 
 /* A node sends what nobody has asked it for: it is named, nothing is used, and
  * nothing is asked for again. */
-static void not_its_to_send(void **unused) {
+TEST(not_its_to_send) {
     struct node_page p;
-    (void)unused;
     begin();
     assert_false(sent_by(0, 5, false, &p)); /* nothing is asked for */
     assert_int_equal(p.number, INCODE_NONE);
@@ -413,8 +400,7 @@ static void all_get(uint32_t page) {
 
 /* One that comes to all, and came altered, is asked of the host by who waits
  * for it. */
-static void to_all_altered(void **unused) {
-    (void)unused;
+TEST(to_all_altered) {
     begin();
     node_lending_to_all(&world.lending, 41);
     assert_int_equal(all_get_altered(42, true), 42);
@@ -433,8 +419,7 @@ static void to_all_altered(void **unused) {
 }
 
 /* What is to come to all is asked of nobody until it has passed. */
-static void to_all(void **unused) {
-    (void)unused;
+TEST(to_all) {
     begin();
     node_lending_to_all(&world.lending, 38);
     assert_int_equal(node_lending_keeper(&world.lending, 37), 3);
@@ -471,13 +456,8 @@ static void to_all(void **unused) {
     assert_true(node_fault_is_set(&world.fault));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keepers),         cmocka_unit_test(lent),
-        cmocka_unit_test(not_there_yet),   cmocka_unit_test(given_up),
-        cmocka_unit_test(wrong_requests),  cmocka_unit_test(asked_for),
-        cmocka_unit_test(to_all),          cmocka_unit_test(altered),
-        cmocka_unit_test(not_its_to_send), cmocka_unit_test(to_all_altered),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(keepers), cmocka_unit_test(lent),
+          cmocka_unit_test(not_there_yet), cmocka_unit_test(given_up),
+          cmocka_unit_test(wrong_requests), cmocka_unit_test(asked_for),
+          cmocka_unit_test(to_all), cmocka_unit_test(altered),
+          cmocka_unit_test(not_its_to_send), cmocka_unit_test(to_all_altered))

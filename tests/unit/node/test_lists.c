@@ -1,17 +1,12 @@
 /* A face manager and a tetrahedron builder by themselves: what they send, and
  * to whom, where links have room for so many messages and no more; and what
  * they refuse. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/page_check.h"
 #include "node/roles/builder.h"
 #include "node/roles/manager.h"
+#include "tests/unit/test.h"
 
 enum { SENT_MAX = 64, ARENA = 512 << 10, SELF = 1, NODES = 8 };
 
@@ -127,8 +122,7 @@ static void job(uint32_t last) {
 
 /* Bricks are counted before anything else, by one builder after the other, up
  * to the places for their answers. */
-static void lists_go_round(void **unused) {
-    (void)unused;
+TEST(lists_go_round) {
     begin(NODE_MANAGER);
     assert_int_equal(world.role->owing(world.arena), CUBE_HOST);
     job(70);
@@ -148,10 +142,9 @@ static void lists_go_round(void **unused) {
 }
 
 /* Answers come of builders that owe some, once. */
-static void answers_that_are_not_due(void **unused) {
+TEST(answers_that_are_not_due) {
     struct incode_answers answers = {INCODE_LIST_COUNT, 0, 1, {{0, 64, 0, 0}}};
     size_t size = incode_answers_bytes(1);
-    (void)unused;
     begin(NODE_MANAGER);
     job(1);
     say(0, NODE_ANSWERS, &answers, size);
@@ -179,10 +172,9 @@ static void answers_that_are_not_due(void **unused) {
 }
 
 /* A builder asks for pages, and has room for as many lists as it was told. */
-static void lists_that_are_too_many(void **unused) {
+TEST(lists_that_are_too_many) {
     const struct incode_list list = {INCODE_LIST_FACES, 1, {{1, 2, 3}}};
     size_t size = incode_list_bytes(1);
-    (void)unused;
     begin(NODE_BUILDER);
     say(0, NODE_LIST, &list, size);
     assert_int_equal(works(4), 1);
@@ -201,8 +193,7 @@ static void lists_that_are_too_many(void **unused) {
 }
 
 /* The tables of a role, and what they count, fill its arena. */
-static void maps(void **unused) {
-    (void)unused;
+TEST(maps) {
     static const uint8_t roles[] = {NODE_MANAGER, NODE_BUILDER};
     for (unsigned i = 0; i < 2; i++) {
         struct node_map map;
@@ -230,10 +221,9 @@ static void refuses(const struct node_setup_message *setup, const char *text) {
     expect_fault(text);
 }
 
-static void invalid_setups(void **unused) {
+TEST(invalid_setups) {
     struct node_setup_message manager = setup_of(NODE_MANAGER);
     struct node_setup_message builder = setup_of(NODE_BUILDER), s = manager;
-    (void)unused;
     s.builders[0] = 0;
     refuses(&s, "invalid setup: face manager 1 has no builders");
     s.builders[0] = 2; /* itself */
@@ -263,10 +253,9 @@ static void invalid_setups(void **unused) {
     refuses(&s, "invalid setup: 17 lists a builder, allowed are 1..16");
 }
 
-static void messages_of_others(void **unused) {
+TEST(messages_of_others) {
     struct node_page_message page = {.head.page = 1};
     const size_t size = node_page_seal(&page, 0, 24);
-    (void)unused;
     begin(NODE_MANAGER);
     say(CUBE_HOST, NODE_PAGE, &page, size);
     expect_fault("message of type 3 for a face manager");
@@ -284,14 +273,8 @@ static void messages_of_others(void **unused) {
     expect_fault("message of type 5 for a builder");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lists_go_round),
-        cmocka_unit_test(answers_that_are_not_due),
-        cmocka_unit_test(lists_that_are_too_many),
-        cmocka_unit_test(maps),
-        cmocka_unit_test(invalid_setups),
-        cmocka_unit_test(messages_of_others),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(lists_go_round),
+          cmocka_unit_test(answers_that_are_not_due),
+          cmocka_unit_test(lists_that_are_too_many), cmocka_unit_test(maps),
+          cmocka_unit_test(invalid_setups),
+          cmocka_unit_test(messages_of_others))

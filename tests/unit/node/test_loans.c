@@ -1,16 +1,11 @@
 /* Loans among nodes: who asks whom, what goes where on links that have room for
  * so many messages, and what is refused. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "node/roles/lending.h"
 #include "tests/unit/incode/several.h"
+#include "tests/unit/test.h"
 
 enum { SENT_MAX = 64, NODES = 8, LENDER = 0, HELPER = 1 };
 
@@ -138,8 +133,7 @@ static const struct sent *last_of(const struct one *n) {
 /* --- tests ---------------------------------------------------------------- */
 
 /* Neighbours first, each node once, as the links take it. */
-static void asks(void **unused) {
-    (void)unused;
+TEST(asks) {
     static const uint16_t order[] = {0, 3, 5, 2, 4, 7, 6};
     struct one *h = &one[HELPER];
     h->cube.room = 0;
@@ -157,8 +151,7 @@ static void asks(void **unused) {
 }
 
 /* Who has work of its own asks nobody, and lends to nobody unasked. */
-static void works_by_itself(void **unused) {
-    (void)unused;
+TEST(works_by_itself) {
     struct one *l = &one[LENDER];
     for (unsigned i = 0; i < 300; i++) {
         assert_false(solo_step(&all.node[0].solo, 1));
@@ -168,8 +161,7 @@ static void works_by_itself(void **unused) {
 }
 
 /* There and back, again and again, until nothing is left. */
-static void there_and_back(void **unused) {
-    (void)unused;
+TEST(there_and_back) {
     struct one *l = &one[LENDER], *h = &one[HELPER];
     unsigned loans = 0;
     send_all(h);
@@ -209,8 +201,7 @@ static void there_and_back(void **unused) {
 
 /* A loan for which there is no place goes back as it was, and may be asked for
  * again. */
-static void no_place(void **unused) {
-    (void)unused;
+TEST(no_place) {
     struct one *l = &one[LENDER], *h = &one[HELPER];
     send_all(h);
     say(l, HELPER, NODE_LOAN_ASK, NULL, 0);
@@ -238,8 +229,7 @@ static void no_place(void **unused) {
 }
 
 /* So many loans are out at most, each with another node. */
-static void so_many(void **unused) {
-    (void)unused;
+TEST(so_many) {
     struct one *l = &one[LENDER];
     uint32_t seen = 0;
     for (unsigned i = 1; i < NODES; i++)
@@ -262,8 +252,7 @@ static void expect_fault(uint16_t source, uint8_t type, const void *data,
     h->fault.size = 0;
 }
 
-static void refusals(void **unused) {
-    (void)unused;
+TEST(refusals) {
     const struct incode_loan loan = {0, 4, 1, {{70, 80, 90}}};
     struct incode_loan false_count = loan, no_run = loan;
     const struct node_found_message found = {0, {1, {{1, 2, 3, 4}}}};
@@ -284,16 +273,11 @@ static void refusals(void **unused) {
     expect_fault(0, NODE_LOAN, &loan, incode_loan_bytes(&loan));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(asks, open_nodes, close_nodes),
-        cmocka_unit_test_setup_teardown(works_by_itself, open_nodes,
-                                        close_nodes),
-        cmocka_unit_test_setup_teardown(there_and_back, open_nodes,
-                                        close_nodes),
-        cmocka_unit_test_setup_teardown(no_place, open_nodes, close_nodes),
-        cmocka_unit_test_setup_teardown(so_many, open_nodes, close_nodes),
-        cmocka_unit_test_setup_teardown(refusals, open_nodes, close_nodes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup_teardown(asks, open_nodes, close_nodes),
+          cmocka_unit_test_setup_teardown(works_by_itself, open_nodes,
+                                          close_nodes),
+          cmocka_unit_test_setup_teardown(there_and_back, open_nodes,
+                                          close_nodes),
+          cmocka_unit_test_setup_teardown(no_place, open_nodes, close_nodes),
+          cmocka_unit_test_setup_teardown(so_many, open_nodes, close_nodes),
+          cmocka_unit_test_setup_teardown(refusals, open_nodes, close_nodes))

@@ -1,16 +1,11 @@
 /* How often a node looks at its links while it works, on fast processors and
  * slow ones; what it tells of that and of its board. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/sim/sim_cube.h"
 #include "node/looks.h"
+#include "tests/unit/test.h"
 
 /* Node 0 looks, node 1 is a cube that is polled. */
 static struct {
@@ -93,7 +88,7 @@ static void work(uint32_t units, uint64_t unit_ns, uint32_t most) {
     }
 }
 
-static void looks_come_in_time(void **unused) {
+TEST(looks_come_in_time) {
     /* A unit of a workstation, of an M7 and of an M3 at 25 MHz. */
     static const struct {
         uint64_t unit_ns;
@@ -102,7 +97,6 @@ static void looks_come_in_time(void **unused) {
                       {8000, 100000, 64, 5000},
                       {240000, 20000, 16, 10000},
                       {240000, 20000, 64, 50000}};
-    (void)unused;
     for (unsigned i = 0; i < 4; i++) {
         set_up();
         world.looks.tends = true;
@@ -123,8 +117,7 @@ static void looks_come_in_time(void **unused) {
 
 /* Units that take next to nothing, and then long: the first of these is seen
  * late, the next in time. */
-static void work_that_gets_slower_is_seen(void **unused) {
-    (void)unused;
+TEST(work_that_gets_slower_is_seen) {
     set_up();
     world.looks.tends = true;
     node_looks_poll(&world.looks, now_us(NULL));
@@ -139,8 +132,7 @@ static void work_that_gets_slower_is_seen(void **unused) {
 
 /* Units are not alike: seven times as long as those before are seen in time,
  * as a Cortex-M7 of 25 MHz has them. */
-static void work_that_differs_is_seen_in_time(void **unused) {
-    (void)unused;
+TEST(work_that_differs_is_seen_in_time) {
     set_up();
     world.looks.tends = true;
     node_looks_poll(&world.looks, now_us(NULL));
@@ -154,8 +146,7 @@ static void work_that_differs_is_seen_in_time(void **unused) {
 }
 
 /* A window of messages, each of which takes a while. */
-static void many_messages_are_looked_between(void **unused) {
-    (void)unused;
+TEST(many_messages_are_looked_between) {
     set_up();
     world.looks.tends = true;
     node_looks_poll(&world.looks, now_us(NULL));
@@ -168,8 +159,7 @@ static void many_messages_are_looked_between(void **unused) {
 }
 
 /* Nobody's clock may go on: nothing is tended then. */
-static void who_steps_in_parts_is_not_tended(void **unused) {
-    (void)unused;
+TEST(who_steps_in_parts_is_not_tended) {
     set_up();
     node_looks_poll(&world.looks, now_us(NULL));
     world.asked = 0;
@@ -180,9 +170,8 @@ static void who_steps_in_parts_is_not_tended(void **unused) {
     tear_down();
 }
 
-static void what_is_told_of_it(void **unused) {
+TEST(what_is_told_of_it) {
     struct node_finished_message finished;
-    (void)unused;
     set_up();
     node_looks_poll(&world.looks, now_us(NULL));
     pass(4000000);
@@ -206,14 +195,9 @@ static void what_is_told_of_it(void **unused) {
     tear_down();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(looks_come_in_time),
-        cmocka_unit_test(work_that_gets_slower_is_seen),
-        cmocka_unit_test(work_that_differs_is_seen_in_time),
-        cmocka_unit_test(many_messages_are_looked_between),
-        cmocka_unit_test(who_steps_in_parts_is_not_tended),
-        cmocka_unit_test(what_is_told_of_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(looks_come_in_time),
+          cmocka_unit_test(work_that_gets_slower_is_seen),
+          cmocka_unit_test(work_that_differs_is_seen_in_time),
+          cmocka_unit_test(many_messages_are_looked_between),
+          cmocka_unit_test(who_steps_in_parts_is_not_tended),
+          cmocka_unit_test(what_is_told_of_it))

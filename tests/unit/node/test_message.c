@@ -1,17 +1,11 @@
 /* Messages have one layout on every processor, and fit what carries them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/message.h"
 #include "node/result.h"
+#include "tests/unit/test.h"
 
-static void test_layouts(void **unused) {
-    (void)unused;
+TEST(test_layouts) {
     assert_int_equal(offsetof(struct node_setup_message, role), 12);
     assert_int_equal(offsetof(struct node_setup_message, setup), 16);
     assert_int_equal(offsetof(struct node_setup_message, setup.shuffle_seed),
@@ -36,8 +30,7 @@ static void test_layouts(void **unused) {
     assert_int_equal(sizeof(struct node_ready_message) % 4, 0);
 }
 
-static void test_outbox(void **unused) {
-    (void)unused;
+TEST(test_outbox) {
     static struct node_outbox_slot slots[3];
     struct node_outbox box;
     uint32_t written = 0, read = 0;
@@ -66,10 +59,4 @@ static void test_outbox(void **unused) {
     assert_int_equal(written - read, box.used);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_layouts),
-        cmocka_unit_test(test_outbox),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_layouts), cmocka_unit_test(test_outbox))

@@ -2,15 +2,9 @@
  * at random, and a plain host beside it.  Whatever the
  * nodes, roles, windows and memories, the tetrahedra are the same, each brick
  * is committed once, and no node ever has more pages under way than agreed. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
@@ -22,6 +16,7 @@
 #include "node/node.h"
 #include "node/page_check.h"
 #include "node/result.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 8, QUEUE = 256 };
 
@@ -317,8 +312,7 @@ static void run(const struct host_points *points, struct shape shape,
     host_order_free(&world.order);
 }
 
-static void test_cubes(void **unused) {
-    (void)unused;
+TEST(test_cubes) {
     static const struct shape shapes[] = {
         {0, 8, false, 4u << 20, 0},  {1, 8, false, 4u << 20, 0},
         {3, 1, false, 1u << 20, 0},  {3, 2, false, 512u << 10, 5},
@@ -352,8 +346,7 @@ static void test_cubes(void **unused) {
 }
 
 /* What does not fit is said, not tried. */
-static void test_small(void **unused) {
-    (void)unused;
+TEST(test_small) {
     static _Alignas(64) uint8_t arena[4096];
     struct sim_end nowhere = {NULL, NULL, NULL};
     struct node_board board;
@@ -367,10 +360,4 @@ static void test_small(void **unused) {
     assert_non_null(strstr(why, "memory"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cubes),
-        cmocka_unit_test(test_small),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_cubes), cmocka_unit_test(test_small))

@@ -1,14 +1,9 @@
 /* Results that wait for more. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/setup.h"
 #include "node/roles/outlet.h"
+#include "tests/unit/test.h"
 
 enum { MEMORY = 1 << 20, SLOTS = MEMORY / 65536 };
 
@@ -32,8 +27,7 @@ static void emit(struct node_outlet *outlet, uint32_t batches) {
         outside.emit(outside.context, v, apexes, 2);
 }
 
-static void test_few_wait(void **unused) {
-    (void)unused;
+TEST(test_few_wait) {
     struct node_outlet outlet;
     begin(&outlet);
     assert_true(node_outlet_few(&outlet));
@@ -44,8 +38,7 @@ static void test_few_wait(void **unused) {
     assert_true(node_outlet_has_room(&outlet));
 }
 
-static void test_last_does_not(void **unused) {
-    (void)unused;
+TEST(test_last_does_not) {
     struct node_outlet outlet;
     begin(&outlet);
     emit(&outlet, 1);
@@ -54,8 +47,7 @@ static void test_last_does_not(void **unused) {
     assert_false(node_outlet_few(&outlet));
 }
 
-static void test_spilled_do_not(void **unused) {
-    (void)unused;
+TEST(test_spilled_do_not) {
     struct node_outlet outlet;
     const struct incode_face face = {{1, 2, 3}};
     begin(&outlet);
@@ -66,8 +58,7 @@ static void test_spilled_do_not(void **unused) {
 
 /* As many as it has room for, of the largest records, each found by another
  * node than the one before. */
-static void test_finders_fit(void **unused) {
-    (void)unused;
+TEST(test_finders_fit) {
     enum { FAR = INT32_MAX };
     static const uint32_t vertex[2] = {0, FAR};
     static const uint32_t apexes[2][1][3] = {{{FAR - 1, FAR - 2, FAR - 3}},
@@ -84,12 +75,6 @@ static void test_finders_fit(void **unused) {
     assert_false(node_fault_is_set(outlet.fault));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_few_wait),
-        cmocka_unit_test(test_last_does_not),
-        cmocka_unit_test(test_spilled_do_not),
-        cmocka_unit_test(test_finders_fit),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_few_wait), cmocka_unit_test(test_last_does_not),
+          cmocka_unit_test(test_spilled_do_not),
+          cmocka_unit_test(test_finders_fit))

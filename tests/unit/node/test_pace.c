@@ -2,20 +2,15 @@
  * which a unit of work takes long: the clock ticks with what the triangulator
  * has looked at and built.  Point by point, where nothing tells what was done,
  * it ticks with the basic blocks that incode/ has executed. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "host/mesh/order.h"
 #include "node/page_check.h"
 #include "node/roles/worker.h"
 #include "tests/unit/incode/work_clock.h"
+#include "tests/unit/test.h"
 
 enum { MEMORY = 4 << 20, WANTED = 512 };
 
@@ -151,12 +146,11 @@ static uint64_t longest(uint64_t tick_us) {
 }
 
 /* Where 64 points take 30 us, and where they take next to nothing. */
-static void no_index_works_for_long(void **unused) {
+TEST(no_index_works_for_long) {
     static const struct {
         enum incode_index index;
         unsigned points;
     } runs[] = {{INCODE_NAIVE, 1500}, {INCODE_GRID, 3000}, {INCODE_KD, 3000}};
-    (void)unused;
     for (unsigned i = 0; i < sizeof runs / sizeof runs[0]; i++) {
         uint64_t built[2];
         for (unsigned slow = 0; slow < 2; slow++) {
@@ -171,8 +165,7 @@ static void no_index_works_for_long(void **unused) {
 }
 
 /* Where it is quick, the clock is looked at once for many steps. */
-static void a_quick_processor_looks_seldom(void **unused) {
-    (void)unused;
+TEST(a_quick_processor_looks_seldom) {
     open_worker(INCODE_KD, INCODE_BUILD_FACES, 3000);
     (void)longest(0);
     assert_true(world.looks < totals().statistics.vertices / 10);
@@ -181,8 +174,7 @@ static void a_quick_processor_looks_seldom(void **unused) {
 
 /* Half of the tetrahedra of 9,000 points are a hundred milliseconds' work,
  * where a microsecond is as many blocks as it is on a processor of 2.5 GHz. */
-static void points_are_inserted_a_few_at_a_time(void **unused) {
-    (void)unused;
+TEST(points_are_inserted_a_few_at_a_time) {
     open_worker(INCODE_KD, INCODE_BUILD_POINTS, 9000);
     world.blocks_a_us = 500;
     uint64_t begun = now(), most = longest(0), all = now() - begun;
@@ -218,8 +210,7 @@ static bool slow_step(void *context, uint32_t units, uint32_t *spent) {
 
 /* However often a node has looked for work in vain, it does not take work for
  * quick. */
-static void looks_in_vain_teach_nothing(void **unused) {
-    (void)unused;
+TEST(looks_in_vain_teach_nothing) {
     struct slow slow = {.now_us = 1};
     struct node_pace pace;
     node_pace_init(&pace, slow_now_us, &slow);
@@ -231,12 +222,7 @@ static void looks_in_vain_teach_nothing(void **unused) {
     assert_int_equal(slow.most, NODE_PACE_UNITS_MIN);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_index_works_for_long),
-        cmocka_unit_test(a_quick_processor_looks_seldom),
-        cmocka_unit_test(points_are_inserted_a_few_at_a_time),
-        cmocka_unit_test(looks_in_vain_teach_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(no_index_works_for_long),
+          cmocka_unit_test(a_quick_processor_looks_seldom),
+          cmocka_unit_test(points_are_inserted_a_few_at_a_time),
+          cmocka_unit_test(looks_in_vain_teach_nothing))

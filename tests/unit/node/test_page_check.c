@@ -1,14 +1,9 @@
 /* A page's tag: the checksum is HalfSipHash, nothing of a page may change
  * without it, and a page that is not as it was made is reported. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/page_check.h"
+#include "tests/unit/test.h"
 
 /* --- a link, in the place of transport/cube.c ----------------------------- */
 
@@ -46,8 +41,7 @@ static const struct {
                {12, 0x99c7f5ae9f1fc77b}, {15, 0x02c9814ecb0b7d21},
                {16, 0xb5f37b5fd2aa3673}, {63, 0x876032bf713ca62e}};
 
-static void test_vectors(void **unused) {
-    (void)unused;
+TEST(test_vectors) {
     const uint64_t key = 0x0706050403020100;
     uint8_t bytes[64];
     uint32_t words[16];
@@ -109,8 +103,7 @@ static void expect_report(uint16_t sender, uint32_t page) {
     assert_int_equal(world.cube.wrong.page, page);
 }
 
-static void test_right(void **unused) {
-    (void)unused;
+TEST(test_right) {
     struct node_page_message page = page_of(9);
     size_t size = node_page_seal(&page, 77, BYTES);
     begin(77);
@@ -126,8 +119,7 @@ static void test_right(void **unused) {
 }
 
 /* The example of transport/PROTOCOL.md. */
-static void test_example(void **unused) {
-    (void)unused;
+TEST(test_example) {
     static const uint8_t expected[] = {
         0x05, 0x00, 0x00, 0x00, 0x2b, 0x47, 0x2f, 0x1e, 0xa6, 0x63, 0x80, 0x03,
         0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0xe0, 0x3f, 0x00, 0x00, 0x00, 0x00,
@@ -141,8 +133,7 @@ static void test_example(void **unused) {
 }
 
 /* Every bit, one more byte or less, another key. */
-static void test_altered(void **unused) {
-    (void)unused;
+TEST(test_altered) {
     struct node_page_message page = page_of(9);
     size_t size = node_page_seal(&page, 77, BYTES);
     for (size_t bit = 0; bit < 8 * size; bit++) {
@@ -165,8 +156,7 @@ static void test_altered(void **unused) {
 }
 
 /* The first report stays until it has left. */
-static void test_reports(void **unused) {
-    (void)unused;
+TEST(test_reports) {
     const struct node_page_message page = page_of(9);
     begin(77);
     assert_false(comes(KEEPER, &page, 11));
@@ -182,11 +172,6 @@ static void test_reports(void **unused) {
     assert_true(node_fault_is_set(&world.fault));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_vectors), cmocka_unit_test(test_right),
-        cmocka_unit_test(test_example), cmocka_unit_test(test_altered),
-        cmocka_unit_test(test_reports),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_vectors), cmocka_unit_test(test_right),
+          cmocka_unit_test(test_example), cmocka_unit_test(test_altered),
+          cmocka_unit_test(test_reports))

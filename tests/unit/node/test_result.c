@@ -1,15 +1,10 @@
 /* Batches of tetrahedra: what is written is read, whatever the numbers; and
  * no bytes at all make the reader leave its buffer or invent vertices. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/result.h"
+#include "tests/unit/test.h"
 
 enum { BATCH = 1592, STARS = 4000, APEXES = 40, NODES = 1000, SENDER = 3 };
 
@@ -115,8 +110,7 @@ static void round_trip(uint32_t vertices, size_t rows_max) {
     assert_int_equal(seen.bricks, e.bricks_count);
 }
 
-static void test_round_trip(void **unused) {
-    (void)unused;
+TEST(test_round_trip) {
     static const uint32_t sizes[] = {1,       64,         1000,
                                      1 << 20, UINT32_MAX, 0x80000001u};
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
@@ -127,8 +121,7 @@ static void test_round_trip(void **unused) {
 }
 
 /* Any bytes: an end, and only vertices in range. */
-static void test_garbage(void **unused) {
-    (void)unused;
+TEST(test_garbage) {
     for (size_t round = 0; round < 100000; round++) {
         size_t size = draw() % 100;
         uint8_t *data = malloc(size + 1);
@@ -158,8 +151,7 @@ static void test_garbage(void **unused) {
 }
 
 /* A batch cut short is garbage or a shorter batch, never other tetrahedra. */
-static void test_truncated(void **unused) {
-    (void)unused;
+TEST(test_truncated) {
     uint8_t buffer[200 + NODE_RESULT_SLACK];
     struct node_result_writer writer;
     const uint32_t apexes[3][3] = {{1, 2, 3}, {70000, 4, 5}, {6, 900, 7}};
@@ -187,8 +179,7 @@ static void test_truncated(void **unused) {
 
 /* Who found what, as it stands on the wire: a record where that changes, and
  * none for the sender's own. */
-static void test_finders(void **unused) {
-    (void)unused;
+TEST(test_finders) {
     /* Of the sender, vertex 5 and 6, 7, 8; of node 9, the same, and of the next
      * vertex; of node 1000. */
     static const uint8_t expected[] = {0x01, 10,  0, 2, 4, 6, /**/
@@ -232,12 +223,5 @@ static void test_finders(void **unused) {
     assert_int_equal(writer.size, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_garbage),
-        cmocka_unit_test(test_finders),
-        cmocka_unit_test(test_truncated),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_round_trip), cmocka_unit_test(test_garbage),
+          cmocka_unit_test(test_finders), cmocka_unit_test(test_truncated))

@@ -3,15 +3,9 @@
  * alone, says in figures what keeps it from going on, and goes on with the next
  * setup. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/sim/sim_cube.h"
 #include "node/node.h"
@@ -19,6 +13,7 @@
 #include "node/roles/holder.h"
 #include "node/roles/worker.h"
 #include "echo_role.h"
+#include "tests/unit/test.h"
 
 enum { SELF = 1, MEMORY = 1 << 20, FIXED = 65536, ECHO_ROLE = 9 };
 
@@ -184,11 +179,10 @@ static void refuses(uint8_t type, const void *data, size_t size,
 
 /* --- roles ---------------------------------------------------------------- */
 
-static void a_role_of_its_own(void **unused) {
+TEST(a_role_of_its_own) {
     struct node_job_message job = {.epoch = 5};
     struct node_setup_message setup = setup_of(ECHO_ROLE);
     struct node_finished_message finished;
-    (void)unused;
     say(ECHO_ASKS, "early", 5); /* without a setup */
     hear_nothing();
     struct node_ready_message ready = begin(ECHO_ROLE);
@@ -220,9 +214,8 @@ static void a_role_of_its_own(void **unused) {
 }
 
 /* The tables of a role and what they count fit what is there. */
-static void roles_map_their_arena(void **unused) {
+TEST(roles_map_their_arena) {
     static const uint8_t numbers[] = {NODE_WORKER, NODE_HOLDER};
-    (void)unused;
     for (size_t i = 0; i < sizeof numbers; i++) {
         struct node_ready_message ready = begin(numbers[i]);
         const struct node_role *role = node_role_named(numbers[i]);
@@ -243,8 +236,7 @@ static void roles_map_their_arena(void **unused) {
 
 /* Another setup makes another role of it; what the one before did stays
  * counted, and what it had is gone. */
-static void a_second_setup(void **unused) {
-    (void)unused;
+TEST(a_second_setup) {
     (void)begin(ECHO_ROLE);
     say(ECHO_ASKS, "once", 4);
     assert_string_equal(hear(ECHO_ANSWERS), "once");
@@ -283,9 +275,8 @@ static struct node_pong_message pong_of(void) {
     return pong;
 }
 
-static void pongs_tell_of_work(void **unused) {
+TEST(pongs_tell_of_work) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
-    (void)unused;
     struct node_pong_message none = pong_of();
     assert_int_equal(none.awaited, INCODE_NONE);
     assert_int_equal(none.refused, 0);
@@ -306,11 +297,10 @@ static void pongs_tell_of_work(void **unused) {
 
 /* --- faults --------------------------------------------------------------- */
 
-static void an_unknown_role(void **unused) {
+TEST(an_unknown_role) {
     struct node_setup_message setup = setup_of(7);
     struct node_ping_message ping = {2};
     struct node_pong_message pong;
-    (void)unused;
     (void)begin(ECHO_ROLE);
     char text[64];
     snprintf(text, sizeof text, "unknown role 7, known are 1..%u",
@@ -329,13 +319,12 @@ static void an_unknown_role(void **unused) {
     refuses(NODE_SETUP, &setup, sizeof setup, "nothing to echo");
 }
 
-static void setups_of_other_versions(void **unused) {
+TEST(setups_of_other_versions) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
     struct {
         struct node_setup_message setup;
         uint64_t more;
     } later = {setup, 0};
-    (void)unused;
     assert_int_equal(NODE_PROTOCOL, 12);
     setup.protocol = later.setup.protocol = 6;
     refuses(NODE_SETUP, &setup, sizeof setup,
@@ -348,9 +337,8 @@ static void setups_of_other_versions(void **unused) {
     refuses(NODE_SETUP, &later, 244, "setup in 244 bytes, expected 240");
 }
 
-static void invalid_setups(void **unused) {
+TEST(invalid_setups) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
-    (void)unused;
     setup.nodes = 8;
     refuses(NODE_SETUP, &setup, sizeof setup,
             "invalid setup: 8 nodes, expected 2");
@@ -385,12 +373,11 @@ static void invalid_setups(void **unused) {
             "message of type 7 in 3 bytes, expected none");
 }
 
-static void what_a_worker_refuses(void **unused) {
+TEST(what_a_worker_refuses) {
     struct node_job_message job = {.epoch = 1, .job = {.first = 5, .last = 3}};
     struct node_page_message page = {.head.page = 17};
     size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
     struct node_spill_header header = {.epoch = 0, .brick = 6, .sent = 1};
-    (void)unused;
     (void)begin(NODE_WORKER);
     refuses(NODE_JOB, &job, sizeof job, "invalid job: bricks 5..3");
     (void)begin(NODE_WORKER);
@@ -457,10 +444,9 @@ static void takes_no_page(const void *data, size_t bytes) {
     refuses(NODE_PAGE, &page, node_page_seal(&page, 0, bytes), text);
 }
 
-static void pages_that_a_worker_refuses(void **unused) {
+TEST(pages_that_a_worker_refuses) {
     double points[3][INCODE_BRICK_POINTS + 1] = {{0}};
     double *last = &points[2][INCODE_BRICK_POINTS - 3];
-    (void)unused;
     takes_no_page(points, 0);
     takes_no_page(points, 23);
     takes_no_page(points, 25);
@@ -472,12 +458,11 @@ static void pages_that_a_worker_refuses(void **unused) {
     takes_no_page(points, INCODE_BRICK_BYTES);
 }
 
-static void what_a_holder_refuses(void **unused) {
+TEST(what_a_holder_refuses) {
     struct node_job_message job = {.epoch = 1};
     uint32_t pages[NODE_PAGES_IN_FLIGHT_MAX + 1];
     struct node_page_message page = {.head.page = 17};
     size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
-    (void)unused;
     (void)begin(NODE_HOLDER);
     refuses(NODE_JOB, &job, sizeof job, "a job for a node that holds pages");
     (void)begin(NODE_HOLDER);
@@ -508,9 +493,8 @@ static void what_a_holder_refuses(void **unused) {
 }
 
 /* Nothing moves when a role finds it, and the board would sleep. */
-static void a_fault_is_told_at_once(void **unused) {
+TEST(a_fault_is_told_at_once) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
-    (void)unused;
     echo_is_worn = false;
     (void)begin(ECHO_ROLE);
     say(NODE_JOB, &job, sizeof job);
@@ -526,10 +510,9 @@ static void a_fault_is_told_at_once(void **unused) {
 }
 
 /* Where a node cannot start, its board learns which limit is broken. */
-static void boards_that_are_refused(void **unused) {
+TEST(boards_that_are_refused) {
     struct node_board board = world.board[SELF];
     const char *why = NULL;
-    (void)unused;
     board.identity.dimension = CUBE_DIMENSION_MAX + 1;
     assert_null(node_start(&board, &why));
     assert_string_equal(why, "dimension is above 10");
@@ -544,20 +527,10 @@ static void boards_that_are_refused(void **unused) {
 
 #define ON_A_CUBE(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        ON_A_CUBE(a_role_of_its_own),
-        ON_A_CUBE(roles_map_their_arena),
-        ON_A_CUBE(a_second_setup),
-        ON_A_CUBE(pongs_tell_of_work),
-        ON_A_CUBE(an_unknown_role),
-        ON_A_CUBE(setups_of_other_versions),
-        ON_A_CUBE(invalid_setups),
-        ON_A_CUBE(what_a_worker_refuses),
-        ON_A_CUBE(pages_that_a_worker_refuses),
-        ON_A_CUBE(what_a_holder_refuses),
-        ON_A_CUBE(a_fault_is_told_at_once),
-        ON_A_CUBE(boards_that_are_refused),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(ON_A_CUBE(a_role_of_its_own), ON_A_CUBE(roles_map_their_arena),
+          ON_A_CUBE(a_second_setup), ON_A_CUBE(pongs_tell_of_work),
+          ON_A_CUBE(an_unknown_role), ON_A_CUBE(setups_of_other_versions),
+          ON_A_CUBE(invalid_setups), ON_A_CUBE(what_a_worker_refuses),
+          ON_A_CUBE(pages_that_a_worker_refuses),
+          ON_A_CUBE(what_a_holder_refuses), ON_A_CUBE(a_fault_is_told_at_once),
+          ON_A_CUBE(boards_that_are_refused))

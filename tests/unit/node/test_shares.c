@@ -1,17 +1,12 @@
 /* Tetrahedra on their way from node to node: what room is told for them is
  * there, however they fall on the other nodes, and is enough for a whole star
  * where these are few. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "incode/pages/bricks.h"
 #include "node/roles/lending.h"
+#include "tests/unit/test.h"
 
 enum { NODES_MAX = 128 };
 
@@ -68,9 +63,8 @@ static void share(const struct scene *s, uint32_t at, uint32_t step) {
 }
 
 /* What is told to be there is: it would break off in mid-share. */
-static void test_honest(void **state) {
+TEST(test_honest) {
     static const uint32_t counts[] = {2, 3, 4, 8, 16, 32, 64, 128};
-    (void)state;
     for (size_t k = 0; k < sizeof counts / sizeof counts[0]; k++) {
         for (uint32_t step = 1; step < 6; step++) {
             for (uint32_t stride = 0; stride < 40; stride += 3) {
@@ -93,9 +87,8 @@ static void test_honest(void **state) {
 
 /* A star, of up to INCODE_STAR_BUILT tetrahedra, is not cut short where it has
  * not to be. */
-static void test_enough(void **state) {
+TEST(test_enough) {
     struct scene s;
-    (void)state;
     begin(&s, 1);
     assert_true(room_of(&s) >= 256);
     free(s.memory);
@@ -110,10 +103,4 @@ static void test_enough(void **state) {
     free(s.memory);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_honest),
-        cmocka_unit_test(test_enough),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_honest), cmocka_unit_test(test_enough))

@@ -1,14 +1,9 @@
 /* A node whose host and neighbour say what they like: drawn at random here,
  * sought by the fuzzer (tests/fuzz/fuzz_node.c). */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "node_talk.h"
 #include "tests/unit/emulated.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 88172645463325252u;
 
@@ -17,10 +12,9 @@ static uint8_t draw(void) {
 }
 
 /* TALKS for more than a few, TALK_SEED for others than these. */
-static void random_talks(void **unused) {
+TEST(random_talks) {
     const char *wanted = getenv("TALKS"), *seed = getenv("TALK_SEED");
     uint8_t bytes[300] = {0};
-    (void)unused;
     state = seed != NULL ? strtoull(seed, NULL, 10) : state;
     for (long talks = wanted != NULL ? atol(wanted)
                       : emulated()   ? 25
@@ -36,9 +30,4 @@ static void random_talks(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_talks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(random_talks))

@@ -1,14 +1,8 @@
 /* Two nodes and their host, with mailboxes in the place of links: a page that
  * the other node altered is not used, is reported and asked for again, and the
  * result is right; and of each tetrahedron the host learns who found it. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
@@ -16,6 +10,7 @@
 #include "node/page_check.h"
 #include "node/result.h"
 #include "node/roles/roles.h"
+#include "tests/unit/test.h"
 
 enum {
     NODES = 2,
@@ -424,8 +419,7 @@ static void expect_altered(void) {
     expect_right();
 }
 
-static void pages_of_a_holder(void **unused) {
-    (void)unused;
+TEST(pages_of_a_holder) {
     begin(NODE_WORKER, NODE_HOLDER);
     world.alters_every = 5;
     run();
@@ -437,13 +431,12 @@ static void pages_of_a_holder(void **unused) {
     expect_altered();
 }
 
-static void pages_of_the_host(void **unused) {
+TEST(pages_of_the_host) {
     static const uint8_t roles[][2] = {{NODE_WORKER, NODE_WORKER},
                                        {NODE_WORKER, NODE_HOLDER},
                                        {NODE_MANAGER, NODE_BUILDER},
                                        {NODE_LINDA_MANAGER, NODE_LINDA_BUILDER},
                                        {NODE_EXCHANGE, NODE_EXCHANGE}};
-    (void)unused;
     for (size_t i = 0; i < sizeof roles / sizeof roles[0]; i++) {
         begin(roles[i][0], roles[i][1]);
         world.alters = CUBE_HOST;
@@ -453,8 +446,7 @@ static void pages_of_the_host(void **unused) {
     }
 }
 
-static void pages_that_are_lent(void **unused) {
-    (void)unused;
+TEST(pages_that_are_lent) {
     for (unsigned every = 2; every > 0; every--) {
         begin(NODE_EXCHANGE, NODE_EXCHANGE);
         world.alters_every = every;
@@ -463,8 +455,7 @@ static void pages_that_are_lent(void **unused) {
     }
 }
 
-static void pages_to_all(void **unused) {
-    (void)unused;
+TEST(pages_to_all) {
     for (unsigned every = 2; every > 0; every--) {
         begin(NODE_EXCHANGE, NODE_EXCHANGE);
         world.to_all = true;
@@ -478,10 +469,9 @@ static void pages_to_all(void **unused) {
 }
 
 /* Whatever a list says: the one that it came from.  In a tuple it says so. */
-static void found_by_a_builder(void **unused) {
+TEST(found_by_a_builder) {
     static const uint8_t roles[][2] = {
         {NODE_MANAGER, NODE_BUILDER}, {NODE_LINDA_MANAGER, NODE_LINDA_BUILDER}};
-    (void)unused;
     for (unsigned i = 0; i < 2; i++) {
         begin(roles[i][0], roles[i][1]);
         world.lies = true;
@@ -493,8 +483,7 @@ static void found_by_a_builder(void **unused) {
 }
 
 /* What was found at stars that were lent: take_results. */
-static void found_by_a_borrower(void **unused) {
-    (void)unused;
+TEST(found_by_a_borrower) {
     begin(NODE_EXCHANGE, NODE_EXCHANGE);
     world.slow = 16;
     run();

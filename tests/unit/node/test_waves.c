@@ -1,14 +1,9 @@
 /* The waves of an exchange at a node that has no others: what it concludes from
  * sums that change, that agree, and that never do. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "node/roles/waves.h"
+#include "tests/unit/test.h"
 
 static struct {
     struct node_waves waves;
@@ -39,8 +34,7 @@ static uint8_t waves(unsigned count, uint64_t step_us) {
     return command;
 }
 
-static void sums_that_agree(void **unused) {
-    (void)unused;
+TEST(sums_that_agree) {
     begin(5, 5);
     assert_int_equal(waves(1, 1), NODE_WAVE_COUNT);
     assert_int_equal(waves(1, 1), NODE_WAVE_SEED);
@@ -58,8 +52,7 @@ static void sums_that_agree(void **unused) {
 
 /* Many waves in a short time, or few in a long one, prove nothing; nor does
  * what comes slowly. */
-static void slow_messages(void **unused) {
-    (void)unused;
+TEST(slow_messages) {
     begin(5, 4);
     (void)waves(100 * NODE_WAVES_UNCHANGED, 500);
     assert_false(node_fault_is_set(&world.fault));
@@ -76,19 +69,12 @@ static void slow_messages(void **unused) {
 }
 
 /* What was sent and never comes is a fault that names the sums. */
-static void sums_that_never_agree(void **unused) {
-    (void)unused;
+TEST(sums_that_never_agree) {
     begin(12, 9);
     (void)waves(NODE_WAVES_UNCHANGED + 2,
                 2 * NODE_WAVES_UNCHANGED_US / NODE_WAVES_UNCHANGED);
     assert_non_null(strstr(world.fault.text, "of 12 sent to others 9 have"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sums_that_agree),
-        cmocka_unit_test(slow_messages),
-        cmocka_unit_test(sums_that_never_agree),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(sums_that_agree), cmocka_unit_test(slow_messages),
+          cmocka_unit_test(sums_that_never_agree))

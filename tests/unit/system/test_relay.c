@@ -1,20 +1,15 @@
 /* The relay that the system tests put between UARTs: its rate, what it counts,
  * and what becomes of an end that does not read or goes away. */
 #include <errno.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
-#include <cmocka.h>
-
 #include "tests/system/relay/chance.h"
 #include "tests/system/relay/uart.h"
+#include "tests/unit/test.h"
 
 enum { CHUNK = 4096, SENT_MAX = 400000 };
 
@@ -79,9 +74,8 @@ static void fill(void) {
         sent[i] = (uint8_t)(i * 7 + i / 251);
 }
 
-static void rates(void **unused) {
+TEST(rates) {
     static const uint32_t baud[] = {19200, 115200, 921600};
-    (void)unused;
     for (size_t i = 0; i < sizeof baud / sizeof baud[0]; i++) {
         join(&(struct uart_settings){.seed = 1, .baud = baud[i]});
         uint64_t begun = now;
@@ -114,9 +108,8 @@ static double rate_now(void) {
 /* Never faster than the line, and as fast where other work on the machine has
  * not held this program up, once in five minutes.  clock: it is what is meant.
  */
-static void rate_by_the_clock(void **unused) {
+TEST(rate_by_the_clock) {
     double rate = 0;
-    (void)unused;
     for (int round = 0; round < 1500 && rate < 0.95 * 115200; round++) {
         rate = rate_now();
         assert_true(rate < 1.05 * 115200);
@@ -125,8 +118,7 @@ static void rate_by_the_clock(void **unused) {
 }
 
 /* An idle wire saves up no time, and looks are four bytes apart. */
-static void bytes_take_their_time(void **unused) {
-    (void)unused;
+TEST(bytes_take_their_time) {
     join(&(struct uart_settings){.seed = 1, .baud = 1000});
     carry(1000000, true);
     send_on(6);
@@ -153,8 +145,7 @@ static size_t differing(size_t size) {
     return different;
 }
 
-static void flips(void **unused) {
-    (void)unused;
+TEST(flips) {
     join(&(struct uart_settings){.seed = 3, .baud = 921600, .flip_bytes = 100});
     size_t different = differing(100000);
     assert_int_equal(heard_bytes, 100000);
@@ -163,8 +154,7 @@ static void flips(void **unused) {
     part();
 }
 
-static void drops(void **unused) {
-    (void)unused;
+TEST(drops) {
     join(
         &(struct uart_settings){.seed = 4, .baud = 921600, .drop_bytes = 1000});
     (void)differing(100000);
@@ -173,8 +163,7 @@ static void drops(void **unused) {
     part();
 }
 
-static void bursts(void **unused) {
-    (void)unused;
+TEST(bursts) {
     join(&(struct uart_settings){
         .seed = 5, .baud = 921600, .burst_bytes = 1000});
     size_t different = differing(100000);
@@ -188,9 +177,8 @@ static void bursts(void **unused) {
     part();
 }
 
-static void the_same_seed_does_the_same(void **unused) {
+TEST(the_same_seed_does_the_same) {
     static uint8_t first[20000];
-    (void)unused;
     for (unsigned i = 0; i < 3; i++) {
         join(&(struct uart_settings){.seed = i / 2 + 1,
                                      .baud = 921600,
@@ -206,8 +194,7 @@ static void the_same_seed_does_the_same(void **unused) {
 }
 
 /* Without `fifo`, nothing is lost, and the sender waits. */
-static void a_receiver_is_waited_for(void **unused) {
-    (void)unused;
+TEST(a_receiver_is_waited_for) {
     join(&(struct uart_settings){.seed = 1, .baud = 921600});
     for (unsigned i = 0; i < 500; i++) {
         send_on(SENT_MAX);
@@ -223,8 +210,7 @@ static void a_receiver_is_waited_for(void **unused) {
     part();
 }
 
-static void a_receiver_overruns(void **unused) {
-    (void)unused;
+TEST(a_receiver_overruns) {
     join(&(struct uart_settings){.seed = 1, .baud = 19200, .fifo = 1});
     send_on(1000);
     carry(100000, true);
@@ -260,9 +246,8 @@ static int listening(const char *path) {
 }
 
 /* One end is killed and comes back, twice: the other stays as it is. */
-static void an_end_goes_and_comes(void **unused) {
+TEST(an_end_goes_and_comes) {
     char folder[] = "/tmp/relay.XXXXXX", calls[64], text[200], made[64];
-    (void)unused;
     assert_non_null(mkdtemp(folder));
     snprintf(calls, sizeof calls, "%s/a", folder);
     snprintf(made, sizeof made, "%s/b", folder);
@@ -296,10 +281,9 @@ static void an_end_goes_and_comes(void **unused) {
     assert_int_equal(rmdir(folder), 0);
 }
 
-static void wrong_texts(void **unused) {
+TEST(wrong_texts) {
     static const char *const texts[] = {"",    ",",        "/a",  "/a,",
                                         ",/a", "/a,/b,/c", "@,/b"};
-    (void)unused;
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         assert_true(
             uart_wires_init(&wires, &(struct uart_settings){.baud = 9600}));

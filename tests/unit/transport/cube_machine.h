@@ -4,18 +4,13 @@
 #ifndef TESTS_UNIT_CUBE_MACHINE_H
 #define TESTS_UNIT_CUBE_MACHINE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/sim/sim_cube.h"
 #include "transport/cube.h"
 #include "transport/routes.h"
+#include "tests/unit/test.h"
 
 enum { NODES_MAX = 32, ENDS_MAX = NODES_MAX + 1, TYPES = 4 };
 

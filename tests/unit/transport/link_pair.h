@@ -3,16 +3,11 @@
 #ifndef TESTS_UNIT_LINK_PAIR_H
 #define TESTS_UNIT_LINK_PAIR_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/sim/sim_cube.h"
+#include "tests/unit/test.h"
 
 enum { PAIR_BYTES = 1 << 17 }; /* on the wire, each way */
 

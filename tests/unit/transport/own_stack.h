@@ -5,15 +5,11 @@
 #ifndef TESTS_UNIT_OWN_STACK_H
 #define TESTS_UNIT_OWN_STACK_H
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 #include <ucontext.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 
 enum { STACK_BYTES = 1 << 18 };
 

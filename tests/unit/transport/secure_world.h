@@ -3,17 +3,12 @@
 #ifndef TESTS_UNIT_SECURE_WORLD_H
 #define TESTS_UNIT_SECURE_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/drivers/secure_sodium.h"
+#include "tests/unit/test.h"
 
 enum { ROOM = 1 << 16 };
 

@@ -51,8 +51,7 @@ static struct pair *talking(const struct link_config *config) {
     return p;
 }
 
-static void a_link_that_opens(void **unused) {
-    (void)unused;
+TEST(a_link_that_opens) {
     struct pair *p = new_pair(&small, &perfect, 1);
     link_poll(p->ends[0].link, p->now_us);
     stays(p, LINK_OPENING);
@@ -60,8 +59,7 @@ static void a_link_that_opens(void **unused) {
     free_pair(p);
 }
 
-static void a_link_that_is_up(void **unused) {
-    (void)unused;
+TEST(a_link_that_is_up) {
     for (unsigned keeps = 0; keeps < 2; keeps++) {
         struct link_config config = small;
         config.keeps_peer = keeps > 0;
@@ -80,8 +78,7 @@ static void a_link_that_is_up(void **unused) {
     }
 }
 
-static void a_link_that_refuses(void **unused) {
-    (void)unused;
+TEST(a_link_that_refuses) {
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.frame_payload = 168;
     start(p, 1, 4242);
@@ -95,8 +92,7 @@ static void a_link_that_refuses(void **unused) {
 }
 
 /* Its peer has said farewell, and is reset then. */
-static void a_link_that_is_closed(void **unused) {
-    (void)unused;
+TEST(a_link_that_is_closed) {
     struct pair *p = talking(&small);
     link_close(p->ends[1].link, p->now_us + 1000000);
     for (unsigned i = 0; i < 50; i++)
@@ -111,8 +107,7 @@ static void a_link_that_is_closed(void **unused) {
 }
 
 /* This end says farewell, and nobody answers. */
-static void a_link_that_closes(void **unused) {
-    (void)unused;
+TEST(a_link_that_closes) {
     struct pair *p = talking(&small);
     link_close(p->ends[0].link, p->now_us + 60000000);
     link_poll(p->ends[0].link, p->now_us);
@@ -122,8 +117,7 @@ static void a_link_that_closes(void **unused) {
 
 /* Nothing comes by a pipe that is closed; what comes when it works again finds
  * a link that greets as ever. */
-static void a_link_that_is_down(void **unused) {
-    (void)unused;
+TEST(a_link_that_is_down) {
     struct pair *p = talking(&small);
     cut_pair(p, true);
     link_poll(p->ends[0].link, p->now_us);
@@ -138,14 +132,9 @@ static void a_link_that_is_down(void **unused) {
     free_pair(p);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_link_that_opens),
-        cmocka_unit_test(a_link_that_is_up),
-        cmocka_unit_test(a_link_that_refuses),
-        cmocka_unit_test(a_link_that_is_closed),
-        cmocka_unit_test(a_link_that_closes),
-        cmocka_unit_test(a_link_that_is_down),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_link_that_opens),
+          cmocka_unit_test(a_link_that_is_up),
+          cmocka_unit_test(a_link_that_refuses),
+          cmocka_unit_test(a_link_that_is_closed),
+          cmocka_unit_test(a_link_that_closes),
+          cmocka_unit_test(a_link_that_is_down))

@@ -4,8 +4,7 @@
 
 /* --- tests ---------------------------------------------------------------- */
 
-static void every_pair_at_once_with_windows_of_one(void **unused) {
-    (void)unused;
+TEST(every_pair_at_once_with_windows_of_one) {
     for (unsigned d = 0; d <= 5; d++) {
         struct cube_config c = {.window = 1};
         struct machine *m = build(d, &c, &perfect, d);
@@ -15,8 +14,7 @@ static void every_pair_at_once_with_windows_of_one(void **unused) {
     }
 }
 
-static void every_pair_at_once_with_wider_windows(void **unused) {
-    (void)unused;
+TEST(every_pair_at_once_with_wider_windows) {
     for (unsigned d = 0; d <= 4; d++) {
         struct cube_config c = {.window = (uint16_t)(2 + 3 * d)};
         struct machine *m = build(d, &c, &perfect, d);
@@ -27,8 +25,7 @@ static void every_pair_at_once_with_wider_windows(void **unused) {
 }
 
 /* A message in four frames, windows of one message. */
-static void every_pair_at_once_in_small_frames(void **unused) {
-    (void)unused;
+TEST(every_pair_at_once_in_small_frames) {
     for (unsigned d = 1; d <= 4; d++) {
         struct cube_config c = {
             .window = 4, .frame_payload = 408, .staging = 1};
@@ -39,9 +36,8 @@ static void every_pair_at_once_in_small_frames(void **unused) {
     }
 }
 
-static void every_pair_at_once_on_bad_wires(void **unused) {
+TEST(every_pair_at_once_on_bad_wires) {
     struct host_sim_cube_options bad = perfect;
-    (void)unused;
     bad.faults.chance[SIM_FLIP] = 1e-5;
     bad.faults.chance[SIM_DELETE] = bad.faults.chance[SIM_INSERT] =
         bad.faults.chance[SIM_REPEAT] = 2e-5;
@@ -56,8 +52,7 @@ static void every_pair_at_once_on_bad_wires(void **unused) {
     }
 }
 
-static void broadcasts_from_everywhere(void **unused) {
-    (void)unused;
+TEST(broadcasts_from_everywhere) {
     for (unsigned d = 0; d <= 5; d++) {
         struct cube_config c = {.window = 1 + d % 2};
         struct machine *m = build(d, &c, &perfect, d);
@@ -70,8 +65,7 @@ static void broadcasts_from_everywhere(void **unused) {
 
 /* The host is wired to each of the first nodes: no message of it makes a hop in
  * the dimensions in which those differ. */
-static void a_host_with_many_wires(void **unused) {
-    (void)unused;
+TEST(a_host_with_many_wires) {
     for (unsigned d = 1; d <= 5; d++) {
         for (unsigned wires = 2; wires <= 1u << d && wires <= 8; wires *= 2) {
             struct cube_config c = {.window = 1, .host_ports = (uint8_t)wires};
@@ -85,9 +79,8 @@ static void a_host_with_many_wires(void **unused) {
     }
 }
 
-static void a_host_wired_to_all_needs_nobody_between(void **unused) {
+TEST(a_host_wired_to_all_needs_nobody_between) {
     struct cube_config c = {.window = 2, .host_ports = 8};
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     for (unsigned turn = 0; turn < 2000; turn++) { /* all come up */
         m->now_us += 50;
@@ -122,8 +115,7 @@ static void a_host_wired_to_all_needs_nobody_between(void **unused) {
 }
 
 /* Each place stops, or does not read, at random times. */
-static void places_that_stall(void **unused) {
-    (void)unused;
+TEST(places_that_stall) {
     for (uint64_t seed = 0; seed < 4; seed++) {
         struct cube_config c = {.window = 1};
         struct machine *m = build(3 + (unsigned)seed % 3, &c, &perfect, seed);
@@ -146,10 +138,9 @@ static void places_that_stall(void **unused) {
 }
 
 /* The host reads a message now and then: all wait, none is lost. */
-static void a_host_that_is_slow(void **unused) {
+TEST(a_host_that_is_slow) {
     struct cube_config c = {.window = 2};
     struct cube_message message;
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     struct place *host = &m->places[m->nodes];
     m->each = 10;
@@ -171,11 +162,10 @@ static void a_host_that_is_slow(void **unused) {
 
 /* Node 1 does not read what node 0 sent it; messages from 3 to 0 pass through
  * it all the same. */
-static void an_unread_message_holds_its_own_link_alone(void **unused) {
+TEST(an_unread_message_holds_its_own_link_alone) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
     unsigned passed = 0;
-    (void)unused;
     struct machine *m = build(2, &c, &perfect, 1);
     for (unsigned i = 0; i < 1000; i++) {
         m->now_us += 100;
@@ -201,11 +191,10 @@ static void an_unread_message_holds_its_own_link_alone(void **unused) {
 }
 
 /* Node 0 is flooded with messages for the host; its own get through. */
-static void a_flood_does_not_starve_the_node_it_passes(void **unused) {
+TEST(a_flood_does_not_starve_the_node_it_passes) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
     unsigned own = 0, others = 0;
-    (void)unused;
     struct machine *m = build(2, &c, &perfect, 1);
     for (unsigned i = 0; i < 20000; i++) {
         m->now_us += 40;
@@ -225,13 +214,12 @@ static void a_flood_does_not_starve_the_node_it_passes(void **unused) {
 }
 
 /* Nor where its own messages are of four frames, and those that pass of one. */
-static void small_messages_leave_room_for_a_large_one(void **unused) {
+TEST(small_messages_leave_room_for_a_large_one) {
     static const uint8_t large[CUBE_PAYLOAD_MAX];
     struct host_sim_cube_options slow = perfect;
     struct cube_config c = {.window = 7, .frame_payload = 408, .staging = 2};
     struct cube_message message;
     unsigned own = 0, others = 0;
-    (void)unused;
     slow.wire.bytes_per_s = 100000;
     struct machine *m = build(2, &c, &slow, 1);
     for (unsigned i = 0; i < 50000; i++) {
@@ -252,9 +240,8 @@ static void small_messages_leave_room_for_a_large_one(void **unused) {
     destroy(m);
 }
 
-static void a_wrong_wire_is_named(void **unused) {
+TEST(a_wrong_wire_is_named) {
     struct cube_config c = {.window = 2};
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     /* Ends of the wires 5-1 and 3-7 in dimension 2 are exchanged. */
     struct place *five = &m->places[5], *seven = &m->places[7];
@@ -296,7 +283,7 @@ static void a_wrong_wire_is_named(void **unused) {
     destroy(m);
 }
 
-static void wrong_wires_in_words(void **unused) {
+TEST(wrong_wires_in_words) {
     static const struct {
         struct cube_wrong wrong;
         const char *text;
@@ -322,7 +309,6 @@ static void wrong_wires_in_words(void **unused) {
     };
     static const struct cube_config spare = {.dimension = 10, .spare_node = 6};
     char text[CUBE_FAULT_BYTES];
-    (void)unused;
     for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         cube_wrong_text(&cases[i].wrong, &spare, text);
         assert_string_equal(text, cases[i].text);
@@ -363,12 +349,11 @@ static bool starts(const struct cube_config *config) {
         assert_false(starts(&c_));                                             \
     } while (0)
 
-static void limits_of_a_config(void **unused) {
+TEST(limits_of_a_config) {
     struct sim_end nowhere = {NULL, NULL, NULL};
     struct link_pipe pipe = sim_pipe(&nowhere), none = {NULL, NULL, NULL};
     struct cube_config node = {
         .self = 3, .dimension = 2, .window = 4, .epoch = 1};
-    (void)unused;
     for (unsigned d = 0; d < CUBE_LINKS_MAX; d++)
         node.pipes[d] = pipe;
     struct cube_config host = node;
@@ -410,9 +395,8 @@ static void limits_of_a_config(void **unused) {
     assert_true(starts(&node));
 }
 
-static void all_say_farewell(void **unused) {
+TEST(all_say_farewell) {
     struct cube_config c = {.window = 2};
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     run(m, 3, 100000000);
     uint64_t deadline = m->now_us + 1000000;
@@ -429,24 +413,19 @@ static void all_say_farewell(void **unused) {
     destroy(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_pair_at_once_with_windows_of_one),
-        cmocka_unit_test(every_pair_at_once_with_wider_windows),
-        cmocka_unit_test(every_pair_at_once_in_small_frames),
-        cmocka_unit_test(every_pair_at_once_on_bad_wires),
-        cmocka_unit_test(broadcasts_from_everywhere),
-        cmocka_unit_test(a_host_with_many_wires),
-        cmocka_unit_test(a_host_wired_to_all_needs_nobody_between),
-        cmocka_unit_test(places_that_stall),
-        cmocka_unit_test(a_host_that_is_slow),
-        cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
-        cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
-        cmocka_unit_test(small_messages_leave_room_for_a_large_one),
-        cmocka_unit_test(a_wrong_wire_is_named),
-        cmocka_unit_test(wrong_wires_in_words),
-        cmocka_unit_test(limits_of_a_config),
-        cmocka_unit_test(all_say_farewell),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(every_pair_at_once_with_windows_of_one),
+          cmocka_unit_test(every_pair_at_once_with_wider_windows),
+          cmocka_unit_test(every_pair_at_once_in_small_frames),
+          cmocka_unit_test(every_pair_at_once_on_bad_wires),
+          cmocka_unit_test(broadcasts_from_everywhere),
+          cmocka_unit_test(a_host_with_many_wires),
+          cmocka_unit_test(a_host_wired_to_all_needs_nobody_between),
+          cmocka_unit_test(places_that_stall),
+          cmocka_unit_test(a_host_that_is_slow),
+          cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
+          cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
+          cmocka_unit_test(small_messages_leave_room_for_a_large_one),
+          cmocka_unit_test(a_wrong_wire_is_named),
+          cmocka_unit_test(wrong_wires_in_words),
+          cmocka_unit_test(limits_of_a_config),
+          cmocka_unit_test(all_say_farewell))

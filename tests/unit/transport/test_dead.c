@@ -53,8 +53,7 @@ static void traffic(struct machine *m, uint32_t each) {
     }
 }
 
-static void all_pairs_after_each_single_dead_link(void **unused) {
-    (void)unused;
+TEST(all_pairs_after_each_single_dead_link) {
     for (unsigned d = 2; d <= 4; d++) {
         for (unsigned i = 0; i < 1u << d; i++) {
             for (unsigned link = 0; link < d; link++) {
@@ -80,8 +79,7 @@ static void all_pairs_after_each_single_dead_link(void **unused) {
 }
 
 /* The wires of one node in turn, down to the last. */
-static void links_that_die_one_after_another(void **unused) {
-    (void)unused;
+TEST(links_that_die_one_after_another) {
     struct machine *m = build(4, &smallest, &perfect, 9);
     settle(m, 1);
     for (unsigned link = 0; link < 3; link++) {
@@ -96,8 +94,7 @@ static void links_that_die_one_after_another(void **unused) {
 }
 
 /* A wire that takes no byte and brings none, but does not say so. */
-static void a_link_that_falls_silent(void **unused) {
-    (void)unused;
+TEST(a_link_that_falls_silent) {
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
     chatter_for(m, 100);
@@ -109,8 +106,7 @@ static void a_link_that_falls_silent(void **unused) {
     destroy(m);
 }
 
-static void a_node_that_dies(void **unused) {
-    (void)unused;
+TEST(a_node_that_dies) {
     for (unsigned node = 1; node < 8; node++) {
         struct machine *m = build(3, &smallest, &perfect, node);
         struct cube *host = m->places[m->nodes].cube;
@@ -139,8 +135,7 @@ static void a_node_that_dies(void **unused) {
 
 /* The host's wire to node 0 dies, or node 0 itself: the host goes on by its
  * spare wire. */
-static void the_gateway_is_moved(void **unused) {
-    (void)unused;
+TEST(the_gateway_is_moved) {
     for (unsigned round = 0; round < 6; round++) {
         struct cube_config c = smallest;
         bool node_dies = round % 2 != 0;
@@ -165,8 +160,7 @@ static void the_gateway_is_moved(void **unused) {
 }
 
 /* Its own sleep is nobody's death. */
-static void who_sleeps_does_not_call_others_dead(void **unused) {
-    (void)unused;
+TEST(who_sleeps_does_not_call_others_dead) {
     struct machine *m = build(3, &smallest, &perfect, 5);
     settle(m, 1);
     chatter_for(m, 100);
@@ -180,8 +174,7 @@ static void who_sleeps_does_not_call_others_dead(void **unused) {
 }
 
 /* As many as are remembered, and more, at random, in larger cubes. */
-static void many_dead_links(void **unused) {
-    (void)unused;
+TEST(many_dead_links) {
     for (unsigned seed = 0; seed < 3; seed++) {
         struct machine *m = build(seed == 0 ? 5 : 4, &smallest, &perfect, seed);
         unsigned cut = 0;
@@ -204,8 +197,7 @@ static void many_dead_links(void **unused) {
 }
 
 /* Nodes start late, in any order: each joins when it does. */
-static void nodes_start_late(void **unused) {
-    (void)unused;
+TEST(nodes_start_late) {
     for (unsigned seed = 0; seed < 5; seed++) {
         struct machine *m = build(4, &smallest, &perfect, seed);
         for (unsigned i = 0; i < m->count; i++)
@@ -224,16 +216,10 @@ static void nodes_start_late(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_pairs_after_each_single_dead_link),
-        cmocka_unit_test(links_that_die_one_after_another),
-        cmocka_unit_test(a_link_that_falls_silent),
-        cmocka_unit_test(a_node_that_dies),
-        cmocka_unit_test(the_gateway_is_moved),
-        cmocka_unit_test(who_sleeps_does_not_call_others_dead),
-        cmocka_unit_test(many_dead_links),
-        cmocka_unit_test(nodes_start_late),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(all_pairs_after_each_single_dead_link),
+          cmocka_unit_test(links_that_die_one_after_another),
+          cmocka_unit_test(a_link_that_falls_silent),
+          cmocka_unit_test(a_node_that_dies),
+          cmocka_unit_test(the_gateway_is_moved),
+          cmocka_unit_test(who_sleeps_does_not_call_others_dead),
+          cmocka_unit_test(many_dead_links), cmocka_unit_test(nodes_start_late))

@@ -109,8 +109,7 @@ static void speak(struct machine *m) {
     }
 }
 
-static void no_node_speaks_as_another_end(void **unused) {
-    (void)unused;
+TEST(no_node_speaks_as_another_end) {
     for (unsigned d = 1; d <= 4; d++) {
         struct cube_config c = {.window = 8};
         struct machine *m = build(d, &c, &perfect, d);
@@ -120,8 +119,7 @@ static void no_node_speaks_as_another_end(void **unused) {
     }
 }
 
-static void nor_where_the_host_has_many_wires(void **unused) {
-    (void)unused;
+TEST(nor_where_the_host_has_many_wires) {
     for (unsigned ports = 2; ports <= 8; ports *= 2) {
         struct cube_config c = {.window = 8, .host_ports = (uint8_t)ports};
         struct machine *m = build(3, &c, &perfect, ports);
@@ -132,8 +130,7 @@ static void nor_where_the_host_has_many_wires(void **unused) {
 }
 
 /* A dead wire, a dead node, a gateway that has moved. */
-static void nor_off_the_e_cube_path(void **unused) {
-    (void)unused;
+TEST(nor_off_the_e_cube_path) {
     for (unsigned round = 0; round < 12; round++) {
         struct cube_config c = {.window = 8,
                                 .dead_us = 200000,
@@ -164,11 +161,6 @@ static void nor_off_the_e_cube_path(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_node_speaks_as_another_end),
-        cmocka_unit_test(nor_where_the_host_has_many_wires),
-        cmocka_unit_test(nor_off_the_e_cube_path),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(no_node_speaks_as_another_end),
+          cmocka_unit_test(nor_where_the_host_has_many_wires),
+          cmocka_unit_test(nor_off_the_e_cube_path))

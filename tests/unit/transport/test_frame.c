@@ -1,16 +1,11 @@
 /* Frames: the checks against their published values, COBS at its edges, and
  * no bytes at all that make the reader believe what was not sent. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 enum { PAYLOAD_MAX = 1616 };
 
@@ -42,9 +37,8 @@ static uint32_t slow_crc(const uint8_t *p, size_t size, uint32_t polynomial,
     return crc;
 }
 
-static void checks_have_their_published_values(void **unused) {
+TEST(checks_have_their_published_values) {
     uint8_t bytes[32];
-    (void)unused;
     /* CRC catalogue, "123456789". */
     assert_int_equal(frame_crc32c(0, "123456789", 9), 0xe3069283);
     assert_int_equal(frame_crc32c_table(0, "123456789", 9), 0xe3069283);
@@ -60,9 +54,8 @@ static void checks_have_their_published_values(void **unused) {
     assert_int_equal(frame_crc32c_table(0, bytes, 32), 0x46dd794e);
 }
 
-static void checks_follow_their_definition(void **unused) {
+TEST(checks_follow_their_definition) {
     uint8_t bytes[300];
-    (void)unused;
     for (unsigned round = 0; round < 2000; round++) {
         size_t from = draw() % 9, size = draw() % 280, part = draw() % 280;
         for (size_t i = 0; i < sizeof bytes; i++)
@@ -80,9 +73,8 @@ static void checks_follow_their_definition(void **unused) {
     }
 }
 
-static void zeros_are_found(void **unused) {
+TEST(zeros_are_found) {
     uint8_t bytes[80];
-    (void)unused;
     for (size_t from = 0; from < 9; from++) {
         for (size_t at = from; at < sizeof bytes; at++) {
             memset(bytes, 1, sizeof bytes);
@@ -212,10 +204,9 @@ static void round_trip(struct sample *s, size_t size) {
     assert_int_equal(header.acknowledge, s->header.acknowledge);
 }
 
-static void every_size_and_density_of_zeros(void **unused) {
+TEST(every_size_and_density_of_zeros) {
     static struct sample s;
     const unsigned one_in[] = {1, 2, 3, 8, 40, 254, 0};
-    (void)unused;
     for (unsigned k = 0; k < sizeof one_in / sizeof one_in[0]; k++) {
         for (size_t size = 0; size <= PAYLOAD_MAX;
              size += size < 600 ? 1 : 13) {
@@ -229,9 +220,8 @@ static void every_size_and_density_of_zeros(void **unused) {
 }
 
 /* A single zero at each place around the length of a full run. */
-static void runs_of_253_to_256(void **unused) {
+TEST(runs_of_253_to_256) {
     static struct sample s;
-    (void)unused;
     for (size_t size = 225; size < 275; size++) {
         for (size_t at = 225; at < size; at++) {
             memset(s.payload, 7, sizeof s.payload);
@@ -259,11 +249,10 @@ static bool ends_full(const struct sample *s) {
 
 /* A frame that ends with a full run may be closed with the code 1 or without:
  * encoders differ. */
-static void both_ends_of_a_full_run(void **unused) {
+TEST(both_ends_of_a_full_run) {
     static struct sample s;
     struct frame_header header;
     unsigned seen = 0;
-    (void)unused;
     memset(s.payload, 9, sizeof s.payload);
     for (size_t round = 0; round < 1000 && seen < 20; round++) {
         /* The zero above the size is the last: 2 + 248 + 4 bytes follow. */
@@ -281,10 +270,9 @@ static void both_ends_of_a_full_run(void **unused) {
 
 /* --- damage --------------------------------------------------------------- */
 
-static void each_wrong_bit_is_found(void **unused) {
+TEST(each_wrong_bit_is_found) {
     static struct sample s;
     const size_t sizes[] = {0, 1, 24, 240, 500};
-    (void)unused;
     for (unsigned k = 0; k < 5; k++) {
         for (size_t i = 0; i < sizes[k]; i++)
             s.payload[i] = (uint8_t)(draw_sparse());
@@ -301,11 +289,10 @@ static void each_wrong_bit_is_found(void **unused) {
     }
 }
 
-static void lost_and_inserted_bytes_are_found(void **unused) {
+TEST(lost_and_inserted_bytes_are_found) {
     static struct sample s;
     uint8_t damaged[FRAME_ENCODED(PAYLOAD_MAX) + 1];
     struct frame_header header;
-    (void)unused;
     for (size_t i = 0; i < 300; i++)
         s.payload[i] = (uint8_t)draw();
     encode(&s, 300);
@@ -326,11 +313,10 @@ static void lost_and_inserted_bytes_are_found(void **unused) {
     }
 }
 
-static void garbage_is_no_frame(void **unused) {
+TEST(garbage_is_no_frame) {
     uint8_t garbage[700] = {0};
     struct frame_header header;
     unsigned opened = 0;
-    (void)unused;
     for (unsigned round = 0; round < 300000; round++) {
         size_t size = draw() % (round % 16 == 0 ? sizeof garbage : 64);
         for (size_t i = 0; i < size; i++)
@@ -343,17 +329,12 @@ static void garbage_is_no_frame(void **unused) {
     assert_true(opened < 30);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(checks_have_their_published_values),
-        cmocka_unit_test(checks_follow_their_definition),
-        cmocka_unit_test(zeros_are_found),
-        cmocka_unit_test(every_size_and_density_of_zeros),
-        cmocka_unit_test(runs_of_253_to_256),
-        cmocka_unit_test(both_ends_of_a_full_run),
-        cmocka_unit_test(each_wrong_bit_is_found),
-        cmocka_unit_test(lost_and_inserted_bytes_are_found),
-        cmocka_unit_test(garbage_is_no_frame),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(checks_have_their_published_values),
+          cmocka_unit_test(checks_follow_their_definition),
+          cmocka_unit_test(zeros_are_found),
+          cmocka_unit_test(every_size_and_density_of_zeros),
+          cmocka_unit_test(runs_of_253_to_256),
+          cmocka_unit_test(both_ends_of_a_full_run),
+          cmocka_unit_test(each_wrong_bit_is_found),
+          cmocka_unit_test(lost_and_inserted_bytes_are_found),
+          cmocka_unit_test(garbage_is_no_frame))

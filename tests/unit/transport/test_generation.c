@@ -9,8 +9,7 @@ static const uint32_t leaps[] = {0,      0x7fff,  0x8000,  0x8001,
 enum { LEAPS = sizeof leaps / sizeof leaps[0] };
 
 /* The host begins anew while windows are full and nobody reads. */
-static void nothing_of_an_old_generation_is_read(void **unused) {
-    (void)unused;
+TEST(nothing_of_an_old_generation_is_read) {
     for (unsigned d = 0; d <= 4; d++) {
         struct cube_config c = {.window = (uint16_t)(d % 2 == 0 ? 1 : 4)};
         c.frame_payload = d % 2 == 0 ? 0 : 408;
@@ -41,10 +40,9 @@ static void nothing_of_an_old_generation_is_read(void **unused) {
 }
 
 /* On lines that lose every third frame or so. */
-static void datagrams_that_are_lost_are_told_again(void **unused) {
+TEST(datagrams_that_are_lost_are_told_again) {
     struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 2};
-    (void)unused;
     bad.faults.chance[SIM_DELETE] = 0.005;
     struct machine *m = build(4, &c, &bad, 3);
     for (uint32_t generation = 1; generation <= 10; generation++) {
@@ -59,11 +57,10 @@ static void datagrams_that_are_lost_are_told_again(void **unused) {
 
 /* Who is told first writes at once; what comes to those who are told later
  * waits until they are. */
-static void nothing_of_the_new_generation_is_lost(void **unused) {
+TEST(nothing_of_the_new_generation_is_lost) {
     struct host_sim_cube_options bad = perfect;
     struct cube_config c = {.window = 4};
     uint32_t written = 0, read = 0;
-    (void)unused;
     bad.faults.chance[SIM_DELETE] = 0.005;
     struct machine *m = build(3, &c, &bad, 3);
     settle(m, 1);
@@ -97,10 +94,9 @@ static void nothing_of_the_new_generation_is_lost(void **unused) {
 }
 
 /* State datagrams cost nothing once all agree. */
-static void all_is_quiet_when_all_agree(void **unused) {
+TEST(all_is_quiet_when_all_agree) {
     struct cube_config c = {.window = 2};
     uint64_t datagrams[2] = {0, 0};
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 3);
     settle(m, 1);
     for (unsigned round = 0; round < 2; round++) {
@@ -118,10 +114,9 @@ static void all_is_quiet_when_all_agree(void **unused) {
     destroy(m);
 }
 
-static void a_node_that_restarts_is_told(void **unused) {
+TEST(a_node_that_restarts_is_told) {
     struct cube_config c = {.window = 2};
     uint8_t byte = 1;
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 3);
     struct cube *host = m->places[m->nodes].cube;
     struct cube_wiring next = *cube_wiring(host);
@@ -144,12 +139,11 @@ static void a_node_that_restarts_is_told(void **unused) {
 /* A host that starts again finds the nodes in generations of its former self,
  * and its own is the later one: at once, or as it outdoes theirs.  After the
  * 3 s in which a node keeps to the host that it has. */
-static void a_host_that_restarts_is_in_charge(void **unused) {
+TEST(a_host_that_restarts_is_in_charge) {
     static const uint32_t generations[] = {2,          4,          0xffff,
                                            0x7fffffff, 0x80000001, 0x80000002,
                                            0xfffffffe, 0xffffffff};
     struct cube_config c = {.window = 2};
-    (void)unused;
     for (unsigned k = 0; k < sizeof generations / sizeof generations[0]; k++) {
         uint32_t before = generations[k];
         uint32_t after = wiring_after(1, before) ? 1 : wiring_next(before);
@@ -178,10 +172,9 @@ static void a_host_that_restarts_is_in_charge(void **unused) {
 
 /* What is unread when a generation begins is no hindrance, however far that is
  * from the last: another host's may be anywhere. */
-static void an_unread_message_outlives_no_leap(void **unused) {
+TEST(an_unread_message_outlives_no_leap) {
     struct cube_config c = {.window = 2};
     uint8_t bytes[CUBE_PAYLOAD_MAX] = {0};
-    (void)unused;
     for (unsigned i = 0; i < LEAPS; i++) {
         struct machine *m = build(2, &c, &perfect, i);
         struct cube *host = m->places[m->nodes].cube;
@@ -205,10 +198,9 @@ static void an_unread_message_outlives_no_leap(void **unused) {
 }
 
 /* The message in hand stays until it is released. */
-static void a_message_being_read_outlives_its_generation(void **unused) {
+TEST(a_message_being_read_outlives_its_generation) {
     struct cube_config c = {.window = 1};
     struct cube_message message;
-    (void)unused;
     struct machine *m = build(1, &c, &perfect, 1);
     struct cube *host = m->places[m->nodes].cube;
     settle(m, 1);
@@ -225,16 +217,11 @@ static void a_message_being_read_outlives_its_generation(void **unused) {
     destroy(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nothing_of_an_old_generation_is_read),
-        cmocka_unit_test(datagrams_that_are_lost_are_told_again),
-        cmocka_unit_test(nothing_of_the_new_generation_is_lost),
-        cmocka_unit_test(all_is_quiet_when_all_agree),
-        cmocka_unit_test(a_node_that_restarts_is_told),
-        cmocka_unit_test(a_host_that_restarts_is_in_charge),
-        cmocka_unit_test(an_unread_message_outlives_no_leap),
-        cmocka_unit_test(a_message_being_read_outlives_its_generation),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(nothing_of_an_old_generation_is_read),
+          cmocka_unit_test(datagrams_that_are_lost_are_told_again),
+          cmocka_unit_test(nothing_of_the_new_generation_is_lost),
+          cmocka_unit_test(all_is_quiet_when_all_agree),
+          cmocka_unit_test(a_node_that_restarts_is_told),
+          cmocka_unit_test(a_host_that_restarts_is_in_charge),
+          cmocka_unit_test(an_unread_message_outlives_no_leap),
+          cmocka_unit_test(a_message_being_read_outlives_its_generation))

@@ -39,10 +39,9 @@ static void learn_all(struct machine *m, struct learner *learners,
     }
 }
 
-static void a_cube_learns_from_its_host(void **unused) {
+TEST(a_cube_learns_from_its_host) {
     struct learner learners[ENDS_MAX];
     unsigned heard_host = 0;
-    (void)unused;
     for (unsigned d = 0; d <= 5; d++) {
         struct host_sim_cube_options bad = perfect;
         bad.faults.chance[SIM_FLIP] = d % 2 ? 1e-4 : 0;
@@ -62,12 +61,11 @@ static void a_cube_learns_from_its_host(void **unused) {
     assert_int_equal(heard_host, 1);
 }
 
-static void a_wire_in_another_socket_teaches_nothing(void **unused) {
+TEST(a_wire_in_another_socket_teaches_nothing) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
     struct link_pipe pipes[3];
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 1);
     memcpy(pipes, m->places[5].config.pipes, sizeof pipes);
     struct link_pipe first = pipes[0];
@@ -88,12 +86,11 @@ static void a_wire_in_another_socket_teaches_nothing(void **unused) {
 
 /* A node of a cube of 8 hears a node of a cube of 2 on the same link first: it
  * passes that over, and hears its own neighbours. */
-static void a_greeting_to_another_is_passed_over(void **unused) {
+TEST(a_greeting_to_another_is_passed_over) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
     struct link_pipe pipes[3];
-    (void)unused;
     struct machine *small = build(1, &c, &perfect, 1);
     struct machine *m = build(3, &c, &perfect, 1);
     memcpy(pipes, m->places[5].config.pipes, sizeof pipes);
@@ -117,14 +114,13 @@ static void a_greeting_to_another_is_passed_over(void **unused) {
     destroy(m);
 }
 
-static void noise_teaches_nothing(void **unused) {
+TEST(noise_teaches_nothing) {
     struct learner learner;
     struct learned learned;
     struct host_sim_cube cube;
     struct host_error error = {0};
     uint64_t now_us = 0, random = 99;
     uint8_t noise[97];
-    (void)unused;
     assert_int_equal(host_sim_cube_open(&cube, &perfect, &now_us, &error), 0);
     struct link_pipe pipe = host_sim_cube_pipe(&cube, 0, 0);
     struct link_pipe far = host_sim_cube_pipe(&cube, 1, 0);
@@ -219,10 +215,9 @@ static uint64_t ask_until(struct machine *m, unsigned i,
 
 /* All on boards of four sockets, and the host's wire to node 0 alone, or to a
  * spare node as well. */
-static void boards_of_four_sockets_learn(void **unused) {
+TEST(boards_of_four_sockets_learn) {
     struct learner learners[NODES_MAX];
     struct learned learned;
-    (void)unused;
     for (unsigned k = 0; k < 10; k++) {
         unsigned dimension = k % 5, known = 0;
         struct host_sim_cube_options bad = perfect;
@@ -278,8 +273,7 @@ static void check_others(const struct machine *m, unsigned besides) {
 }
 
 /* Reset, while its neighbours are up: they would never greet again. */
-static void a_node_that_was_reset_asks(void **unused) {
-    (void)unused;
+TEST(a_node_that_was_reset_asks) {
     for (unsigned k = 0; k < 12; k++) {
         struct cube_config c = {.window = 2};
         struct host_sim_cube_options wires = perfect;
@@ -318,10 +312,9 @@ static void a_node_that_was_reset_asks(void **unused) {
 /* Neighbours that have met different starts of a node, one of which does not
  * answer at first: the largest counts, and who is silent is not waited for for
  * ever. */
-static void the_largest_epoch_counts(void **unused) {
+TEST(the_largest_epoch_counts) {
     struct cube_config c = {.window = 2};
     struct learner learner;
-    (void)unused;
     struct machine *m = build(2, &c, &perfect, 3);
     settle(m, 1);
     run(m, 1, 1000000000);
@@ -380,11 +373,10 @@ static unsigned count_questions(const struct nowhere *n) {
     return count;
 }
 
-static void questions_are_few_and_whole(void **unused) {
+TEST(questions_are_few_and_whole) {
     static struct nowhere wires[4];
     struct link_pipe pipes[4];
     struct learner learner;
-    (void)unused;
     memset(wires, 0, sizeof wires);
     for (unsigned d = 0; d < 4; d++)
         pipes[d] = (struct link_pipe){&wires[d], lose, bring_none};
@@ -412,11 +404,10 @@ static void questions_are_few_and_whole(void **unused) {
 
 /* Questions in the midst of traffic, by all wires: all arrives, and no link is
  * ever anything but up. */
-static void questions_do_no_harm(void **unused) {
+TEST(questions_do_no_harm) {
     struct cube_config c = {.window = 3};
     struct learner learner;
     uint64_t stale = 0;
-    (void)unused;
     struct machine *m = build(3, &c, &perfect, 8);
     settle(m, 1);
     m->broadcasts = 1;
@@ -446,12 +437,11 @@ static void questions_do_no_harm(void **unused) {
 
 /* Who has found who it is hears what strangers say, and takes nothing from it;
  * a host at a neighbour's socket, and a neighbour at the host's, are found. */
-static void strangers_are_not_believed(void **unused) {
+TEST(strangers_are_not_believed) {
     struct cube_config c = {.window = 2};
     struct learner learner;
     struct learned learned;
     struct link_pipe pipes[SOCKETS + 1];
-    (void)unused;
     struct machine *m = build(2, &c, &perfect, 4),
                    *other = build(2, &c, &perfect, 5);
     settle(m, 1);
@@ -493,18 +483,13 @@ static void strangers_are_not_believed(void **unused) {
     destroy(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_cube_learns_from_its_host),
-        cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),
-        cmocka_unit_test(a_greeting_to_another_is_passed_over),
-        cmocka_unit_test(noise_teaches_nothing),
-        cmocka_unit_test(boards_of_four_sockets_learn),
-        cmocka_unit_test(a_node_that_was_reset_asks),
-        cmocka_unit_test(the_largest_epoch_counts),
-        cmocka_unit_test(questions_are_few_and_whole),
-        cmocka_unit_test(questions_do_no_harm),
-        cmocka_unit_test(strangers_are_not_believed),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_cube_learns_from_its_host),
+          cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),
+          cmocka_unit_test(a_greeting_to_another_is_passed_over),
+          cmocka_unit_test(noise_teaches_nothing),
+          cmocka_unit_test(boards_of_four_sockets_learn),
+          cmocka_unit_test(a_node_that_was_reset_asks),
+          cmocka_unit_test(the_largest_epoch_counts),
+          cmocka_unit_test(questions_are_few_and_whole),
+          cmocka_unit_test(questions_do_no_harm),
+          cmocka_unit_test(strangers_are_not_believed))

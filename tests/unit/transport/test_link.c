@@ -6,8 +6,7 @@
 
 /* --- clean wires ---------------------------------------------------------- */
 
-static void messages_of_every_size(void **unused) {
-    (void)unused;
+TEST(messages_of_every_size) {
     unsigned messages = emulated() ? 400 : 2000;
     for (unsigned window = 1; window <= LINK_WINDOW_MAX; window *= 2) {
         struct link_config c = {.window = (uint16_t)window};
@@ -28,8 +27,7 @@ static void messages_of_every_size(void **unused) {
     }
 }
 
-static void messages_of_many_frames(void **unused) {
-    (void)unused;
+TEST(messages_of_many_frames) {
     for (unsigned payload = 32; payload <= 1608; payload += 8) {
         struct link_config c = {.window = (uint16_t)(1607 / payload + 1),
                                 .frame_payload = (uint16_t)payload,
@@ -46,10 +44,9 @@ static void messages_of_many_frames(void **unused) {
 }
 
 /* More than twice around all sequence numbers. */
-static void sequence_numbers_wrap(void **unused) {
+TEST(sequence_numbers_wrap) {
     struct link_config c = {
         .window = 64, .frame_payload = 32, .message_max = 32};
-    (void)unused;
     struct pair *p = new_pair(&c, &perfect, 3);
     p->ends[0].size_max = p->ends[1].size_max = 8;
     run(p, 140000, 60, UINT64_MAX / 2);
@@ -65,8 +62,7 @@ static void sequence_numbers_wrap(void **unused) {
     free_pair(p);
 }
 
-static void a_reader_that_does_not_read_holds_the_writer(void **unused) {
-    (void)unused;
+TEST(a_reader_that_does_not_read_holds_the_writer) {
     struct pair *p = new_pair(&small, &perfect, 5);
     p->ends[1].lazy = true;
     p->ends[1].most = 0;
@@ -85,9 +81,8 @@ static void a_reader_that_does_not_read_holds_the_writer(void **unused) {
 }
 
 /* The last window of credits gets lost: the sender asks for it. */
-static void lost_credits_are_asked_for(void **unused) {
+TEST(lost_credits_are_asked_for) {
     struct link_config c = {.window = 1};
-    (void)unused;
     struct pair *p = new_pair(&c, &perfect, 6);
     p->ends[1].lazy = true;
     for (unsigned i = 0; i < 100; i++)
@@ -107,10 +102,9 @@ static void lost_credits_are_asked_for(void **unused) {
 /* --- bad wires ------------------------------------------------------------ */
 
 /* Everything at once, each seed another mix. */
-static void every_kind_of_damage(void **unused) {
+TEST(every_kind_of_damage) {
     const double chances[] = {0, 1e-5, 1e-4, 1e-3};
     uint64_t damaged = 0, again = 0, duplicates = 0;
-    (void)unused;
     for (uint64_t seed = 0; seed < 60; seed++) {
         struct host_sim_cube_options q = {
             .wire = {.bytes_per_s = seed % 3 ? 300000 : 0,
@@ -140,8 +134,7 @@ static void every_kind_of_damage(void **unused) {
     assert_true(damaged > 5000 && again > 1500 && duplicates > 20);
 }
 
-static void garbage_between_frames(void **unused) {
-    (void)unused;
+TEST(garbage_between_frames) {
     struct pair *p = new_pair(&small, &perfect, 9);
     uint64_t random = 99;
     p->ends[0].size_max = p->ends[1].size_max = 1608;
@@ -170,9 +163,8 @@ static void garbage_between_frames(void **unused) {
 /* --- time ----------------------------------------------------------------- */
 
 /* An end that sleeps until its next due time, or a byte, misses nothing. */
-static void sleeping_until_due_is_enough(void **unused) {
+TEST(sleeping_until_due_is_enough) {
     struct host_sim_cube_options bad = perfect;
-    (void)unused;
     bad.faults.chance[SIM_DELETE] = 3e-4;
     for (uint64_t seed = 0; seed < 10; seed++) {
         struct pair *p = new_pair(&small, &bad, seed);
@@ -214,9 +206,8 @@ static double share(double baud, double bit_error, uint32_t step_us,
     return ideal / took;
 }
 
-static void throughput_on_serial_wires(void **unused) {
+TEST(throughput_on_serial_wires) {
     const double bauds[] = {115200, 921600, 3000000};
-    (void)unused;
     for (unsigned i = 0; i < 3; i++) {
         size_t bytes;
         uint32_t step_us = (uint32_t)(3e8 / bauds[i]);
@@ -257,11 +248,10 @@ static bool starts(const struct link_config *config) {
         assert_false(starts(&c_));                                             \
     } while (0)
 
-static void limits_of_a_config(void **unused) {
+TEST(limits_of_a_config) {
     struct sim_end nowhere = {NULL, NULL, NULL};
     struct link_config c = {
         .pipe = sim_pipe(&nowhere), .epoch = 1, .window = 4};
-    (void)unused;
     limit(c, pipe.send, c.pipe.send, NULL);
     limit(c, pipe.receive, c.pipe.receive, NULL);
     limit(c, epoch, UINT32_MAX, 0);
@@ -279,18 +269,13 @@ static void limits_of_a_config(void **unused) {
     limit(c, timeout_max_us, 100000, 99999);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(messages_of_every_size),
-        cmocka_unit_test(messages_of_many_frames),
-        cmocka_unit_test(sequence_numbers_wrap),
-        cmocka_unit_test(a_reader_that_does_not_read_holds_the_writer),
-        cmocka_unit_test(lost_credits_are_asked_for),
-        cmocka_unit_test(every_kind_of_damage),
-        cmocka_unit_test(garbage_between_frames),
-        cmocka_unit_test(sleeping_until_due_is_enough),
-        cmocka_unit_test(throughput_on_serial_wires),
-        cmocka_unit_test(limits_of_a_config),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(messages_of_every_size),
+          cmocka_unit_test(messages_of_many_frames),
+          cmocka_unit_test(sequence_numbers_wrap),
+          cmocka_unit_test(a_reader_that_does_not_read_holds_the_writer),
+          cmocka_unit_test(lost_credits_are_asked_for),
+          cmocka_unit_test(every_kind_of_damage),
+          cmocka_unit_test(garbage_between_frames),
+          cmocka_unit_test(sleeping_until_due_is_enough),
+          cmocka_unit_test(throughput_on_serial_wires),
+          cmocka_unit_test(limits_of_a_config))

@@ -2,17 +2,12 @@
  * cuts, one-way failures, pauses, readers that do not read, and restarts of
  * either end.  Within a session nothing is missing, nothing comes twice; once
  * the faults stop, messages flow again. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/drivers/sim.h"
+#include "tests/unit/test.h"
 
 enum {
     WIRE_BYTES = 1 << 15,
@@ -222,10 +217,9 @@ static void recover(struct world *w, uint32_t step_us) {
     }
 }
 
-static void everything_at_once_then_quiet(void **unused) {
+TEST(everything_at_once_then_quiet) {
     static struct world w;
     uint32_t struck[KINDS] = {0};
-    (void)unused;
     for (uint64_t seed = 0; seed < 400; seed++) {
         begin(&w, seed);
         uint32_t step_us = 50 + draw(&w) % 1000;
@@ -243,9 +237,4 @@ static void everything_at_once_then_quiet(void **unused) {
         assert_true(struck[k] > 1000);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(everything_at_once_then_quiet),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(everything_at_once_then_quiet))

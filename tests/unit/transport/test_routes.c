@@ -1,16 +1,11 @@
 /* Routes of cubes of which links and nodes are dead, without any link: every
  * node that can be reached is, over live links, by paths that go up a tree and
  * then down; what is sent to all comes to each once. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/routes.h"
+#include "tests/unit/test.h"
 
 enum { NODES_MAX = 1 << CUBE_DIMENSION_MAX };
 
@@ -147,9 +142,8 @@ static void check(struct cut_cube *c, unsigned pairs) {
     check_to_all(c, c->wiring.gateway);
 }
 
-static void while_nothing_is_dead_e_cube(void **unused) {
+TEST(while_nothing_is_dead_e_cube) {
     struct cut_cube c;
-    (void)unused;
     open_cube(&c, 6, 0);
     routes_find(&c.routes, &c.wiring);
     search(&c);
@@ -169,9 +163,8 @@ static void while_nothing_is_dead_e_cube(void **unused) {
     free(c.memory);
 }
 
-static void each_single_dead_link_and_node(void **unused) {
+TEST(each_single_dead_link_and_node) {
     struct cut_cube c;
-    (void)unused;
     for (unsigned dimension = 1; dimension <= 6; dimension++) {
         for (unsigned gateway = 0; gateway < 1u << dimension;
              gateway += 1 + gateway * 2) {
@@ -194,9 +187,8 @@ static void each_single_dead_link_and_node(void **unused) {
     }
 }
 
-static void random_sets_of_dead_links_and_nodes(void **unused) {
+TEST(random_sets_of_dead_links_and_nodes) {
     struct cut_cube c;
-    (void)unused;
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
         open_cube(&c, dimension, 0);
         unsigned rounds = dimension < 7 ? 800 : 4000u >> (dimension - 4);
@@ -221,9 +213,8 @@ static void random_sets_of_dead_links_and_nodes(void **unused) {
 }
 
 /* The nodes with the largest subtrees are dead: no set alters more parents. */
-static void the_table_holds_the_worst(void **unused) {
+TEST(the_table_holds_the_worst) {
     struct cut_cube c;
-    (void)unused;
     for (unsigned dimension = 1; dimension <= CUBE_DIMENSION_MAX; dimension++) {
         unsigned left = CUBE_DEAD_MAX;
         open_cube(&c, dimension, 0);
@@ -239,12 +230,7 @@ static void the_table_holds_the_worst(void **unused) {
     assert_true(routes_bytes(CUBE_DIMENSION_MAX) <= 2048);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(while_nothing_is_dead_e_cube),
-        cmocka_unit_test(each_single_dead_link_and_node),
-        cmocka_unit_test(random_sets_of_dead_links_and_nodes),
-        cmocka_unit_test(the_table_holds_the_worst),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(while_nothing_is_dead_e_cube),
+          cmocka_unit_test(each_single_dead_link_and_node),
+          cmocka_unit_test(random_sets_of_dead_links_and_nodes),
+          cmocka_unit_test(the_table_holds_the_worst))

@@ -33,10 +33,9 @@ static int receive_all(struct world *w, unsigned who, uint8_t *bytes,
     return (int)done;
 }
 
-static void what_is_said_arrives(void **unused) {
+TEST(what_is_said_arrives) {
     static uint8_t said[20000], heard[20001];
     static const size_t mosts[] = {0, 1, 7, 100};
-    (void)unused;
     for (size_t i = 0; i < sizeof said; i++)
         said[i] = (uint8_t)(i * 31 >> 3);
     for (size_t k = 0; k < 4; k++) {
@@ -56,11 +55,10 @@ static void what_is_said_arrives(void **unused) {
 
 /* A pipe that has room is given all: what it does not take, the link holds back
  * until it hears of room. */
-static void all_that_fits_is_taken(void **unused) {
+TEST(all_that_fits_is_taken) {
     static uint8_t said[3 * SECURE_RECORD_MAX], heard[sizeof said];
     struct world *w = connected(2, 0);
     struct link_pipe p = secure_records_pipe(&w->records[0]);
-    (void)unused;
     assert_int_equal(p.send(p.context, said, sizeof said), sizeof said);
     assert_int_equal(receive_all(w, 1, heard, sizeof heard), sizeof said);
     w->lanes[0].most = 100;
@@ -79,10 +77,9 @@ static void expect_two(struct world *w, const uint8_t *said, int size) {
 }
 
 /* Each byte of a record changed, or cut out, or twice there. */
-static void a_changed_byte_loses_a_record(void **unused) {
+TEST(a_changed_byte_loses_a_record) {
     uint8_t said[40] = "forty bytes that nobody may change";
     enum { RECORD = SECURE_HEAD_BYTES + sizeof said + 16 };
-    (void)unused;
     for (size_t at = 0; at < 3 * RECORD; at++) {
         struct world *w = connected(5, at % 2 == 0 ? 0 : 9);
         struct lane *lane = &w->lanes[0];
@@ -110,9 +107,8 @@ static void a_changed_byte_loses_a_record(void **unused) {
 }
 
 /* What is missing of a record is not waited for where another one begins. */
-static void a_record_cut_short_holds_up_none(void **unused) {
+TEST(a_record_cut_short_holds_up_none) {
     static uint8_t said[2000], heard[64];
-    (void)unused;
     for (size_t left = 1; left < sizeof said; left += 99) {
         struct world *w = connected(6, 0);
         struct lane *lane = &w->lanes[0];
@@ -128,10 +124,9 @@ static void a_record_cut_short_holds_up_none(void **unused) {
 
 /* The record again, the next one first, one's own back, an earlier connection's
  * whole side. */
-static void a_repeated_record_is_not_heard(void **unused) {
+TEST(a_repeated_record_is_not_heard) {
     static uint8_t kept[ROOM];
     uint8_t said[16] = "once", heard[64];
-    (void)unused;
     for (unsigned how = 0; how < 3; how++) {
         struct world *w = connected(7, 0);
         struct lane *lane = &w->lanes[0];
@@ -188,10 +183,9 @@ static uint8_t draw(uint32_t *random) {
     return (uint8_t)(*random >> 24);
 }
 
-static void noise_is_passed_over(void **unused) {
+TEST(noise_is_passed_over) {
     uint32_t random = 1;
     uint8_t said[8] = "silence", heard[64];
-    (void)unused;
     for (unsigned round = 0; round < 300; round++) {
         int status = 0;
         struct world *w = round % 2 == 0 ? new_world(8, 0) : connected(8, 0);
@@ -213,10 +207,9 @@ static void noise_is_passed_over(void **unused) {
 
 /* Noise without end, and heads of records that are none: the work is bounded,
  * and then the connection is over. */
-static void noise_without_end_ends_it(void **unused) {
+TEST(noise_without_end_ends_it) {
     static const uint8_t heads[SECURE_HEAD_BYTES] = {0, 8, 0xff, 0xf7, 9};
     uint8_t byte;
-    (void)unused;
     for (unsigned crafted = 0; crafted < 2; crafted++) {
         struct world *w = connected(8, 0);
         struct link_pipe p = secure_records_pipe(&w->records[1]);
@@ -256,10 +249,9 @@ static size_t make_record(uint8_t *bytes, unsigned number) {
 
 /* Bytes that are damaged by chance: whole records are heard and no others, in
  * order, with a zero for each gap, and when it is over nothing is missing. */
-static void damage_costs_what_it_touches(void **unused) {
+TEST(damage_costs_what_it_touches) {
     enum { RECORDS = 200, CLEAN = 8 };
     static uint8_t said[1024], heard[1 << 18];
-    (void)unused;
     for (uint32_t seed = 1; seed < 60; seed++) {
         struct world *w = connected(4, 0);
         struct lane *lane = &w->lanes[0];
@@ -316,16 +308,11 @@ static void damage_costs_what_it_touches(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_said_arrives),
-        cmocka_unit_test(all_that_fits_is_taken),
-        cmocka_unit_test(a_changed_byte_loses_a_record),
-        cmocka_unit_test(a_record_cut_short_holds_up_none),
-        cmocka_unit_test(a_repeated_record_is_not_heard),
-        cmocka_unit_test(noise_is_passed_over),
-        cmocka_unit_test(noise_without_end_ends_it),
-        cmocka_unit_test(damage_costs_what_it_touches),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(what_is_said_arrives),
+          cmocka_unit_test(all_that_fits_is_taken),
+          cmocka_unit_test(a_changed_byte_loses_a_record),
+          cmocka_unit_test(a_record_cut_short_holds_up_none),
+          cmocka_unit_test(a_repeated_record_is_not_heard),
+          cmocka_unit_test(noise_is_passed_over),
+          cmocka_unit_test(noise_without_end_ends_it),
+          cmocka_unit_test(damage_costs_what_it_touches))

@@ -10,12 +10,11 @@ static int by_bytes(const void *a, const void *b) {
 }
 
 /* Of 10 devices, the first 20 draws of each of 20 starts. */
-static void no_seed_comes_twice(void **unused) {
+TEST(no_seed_comes_twice) {
     enum { DEVICES = 10, STARTS = 20, DRAWS = 20 };
     enum { SEEDS = DEVICES * STARTS * DRAWS };
     static uint8_t parts[2 * SEEDS][SECURE_NONCE_BYTES];
     size_t count = 0;
-    (void)unused;
     for (unsigned device = 0; device < DEVICES; device++) {
         for (uint64_t start = 1; start <= STARTS; start++) {
             struct secure_source source = {.boot = start};
@@ -37,11 +36,10 @@ static void no_seed_comes_twice(void **unused) {
 }
 
 /* Every part of what a seed is made of makes another, to the last byte. */
-static void every_byte_of_the_source_counts(void **unused) {
+TEST(every_byte_of_the_source_counts) {
     struct secure_source source = {.boot = 1};
     struct secure_seed first, other;
     uint8_t other_key[SECURE_KEY_BYTES];
-    (void)unused;
     assert_true(secure_seed_draw(&source, &secure_sodium, key, &first));
     for (unsigned i = 0; i < SECURE_DEVICE_BYTES; i++) {
         struct secure_source near = {.boot = 1};
@@ -70,12 +68,11 @@ static bool constant_bytes(void *context, uint8_t *bytes, size_t size) {
     return *(const uint8_t *)context != 0;
 }
 
-static void random_bytes_count_and_may_fail(void **unused) {
+TEST(random_bytes_count_and_may_fail) {
     static const struct secure_seed none;
     struct secure_seed first, other;
     uint8_t byte = 1;
     struct secure_source source = {.random = constant_bytes, .context = &byte};
-    (void)unused;
     assert_true(secure_seed_draw(&source, &secure_sodium, key, &first));
     byte = 2;
     source.draws = 0;
@@ -92,11 +89,10 @@ static void random_bytes_count_and_may_fail(void **unused) {
 }
 
 /* The vector of PROTOCOL.md. */
-static void the_vector(void **unused) {
+TEST(the_vector) {
     struct secure_source source = {.device = "board 17", .boot = 3};
     struct secure_seed seed;
     uint8_t counted[SECURE_KEY_BYTES];
-    (void)unused;
     for (size_t i = 0; i < sizeof counted; i++)
         counted[i] = (uint8_t)i;
     assert_true(secure_seed_draw(&source, &secure_sodium, counted, &seed));
@@ -106,12 +102,7 @@ static void the_vector(void **unused) {
                               "bf6357611d7cc7e8a16a6f8ca5b45702");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_seed_comes_twice),
-        cmocka_unit_test(every_byte_of_the_source_counts),
-        cmocka_unit_test(random_bytes_count_and_may_fail),
-        cmocka_unit_test(the_vector),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(no_seed_comes_twice),
+          cmocka_unit_test(every_byte_of_the_source_counts),
+          cmocka_unit_test(random_bytes_count_and_may_fail),
+          cmocka_unit_test(the_vector))

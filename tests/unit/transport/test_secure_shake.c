@@ -3,8 +3,7 @@
  * PROTOCOL.md holds. */
 #include "secure_world.h"
 
-static void another_key_is_refused(void **unused) {
-    (void)unused;
+TEST(another_key_is_refused) {
     for (unsigned bit = 0; bit < 256; bit += 17) {
         int status[2];
         struct world *w = new_world(3, 0);
@@ -20,7 +19,7 @@ static void another_key_is_refused(void **unused) {
 }
 
 /* What else may be at the other end, and how it is told. */
-static void what_is_no_greeting_is_told(void **unused) {
+TEST(what_is_no_greeting_is_told) {
     static const uint8_t link[] = {
         3, 1, 8, 1,    1, 1,    3, 0x44, 0x33, 1,    2,    0x18, 6,    2, 0x23,
         1, 2, 5, 2,    1, 7,    2, 4,    0x44, 0x33, 0x22, 0x11, 1,    1, 1,
@@ -34,7 +33,6 @@ static void what_is_no_greeting_is_told(void **unused) {
                  {"incodeS", SECURE_NO_GREETING},
                  {"incodes\x02more", SECURE_OTHER_VERSION},
                  {"incodes\x03", SECURE_SOUND}};
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct world *w = new_world(3, 0);
         const char *said = cases[i].said;
@@ -52,7 +50,7 @@ static void what_is_no_greeting_is_told(void **unused) {
 
 /* Each of the two says which wire it takes this for, and the other hears it:
  * one that somebody has joined to another is found. */
-static void a_wire_that_leads_elsewhere_is_told(void **unused) {
+TEST(a_wire_that_leads_elsewhere_is_told) {
     static const struct {
         struct secure_ends caller;
         bool misled;
@@ -68,7 +66,6 @@ static void a_wire_that_leads_elsewhere_is_told(void **unused) {
                  {{{SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN},
                    {SECURE_NODE_UNKNOWN, SECURE_PORT_UNKNOWN}},
                   false}};
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct world *w = new_world(3, 0);
         int status[2] = {0, 0};
@@ -98,7 +95,7 @@ static void counted_x25519(uint8_t out[SECURE_KEY_BYTES],
 
 /* Points of a small order, which leave no secret, said by one who has the key;
  * and a listener multiplies for no stranger. */
-static void a_point_without_a_secret_is_refused(void **unused) {
+TEST(a_point_without_a_secret_is_refused) {
     static const uint8_t points[][SECURE_KEY_BYTES] = {
         {0}, {1}, {0xe0, 0xeb, 0x7a, 0x7c, 0x3b, 0x41, 0xb8, 0xae,
                    0x16, 0x56, 0xe3, 0xfa, 0xf1, 0x9f, 0xc4, 0x6a,
@@ -106,7 +103,6 @@ static void a_point_without_a_secret_is_refused(void **unused) {
                    0x86, 0x62, 0x05, 0x16, 0x5f, 0x49, 0xb8, 0x00}};
     enum { TAG = 40, POINT = SECURE_GREETING_BYTES };
     struct secure_suite suite = secure_sodium;
-    (void)unused;
     suite.x25519 = counted_x25519;
     for (unsigned tagged = 0; tagged < 2; tagged++) {
         for (size_t i = 0; i < 3; i++) {
@@ -132,10 +128,9 @@ static void a_point_without_a_secret_is_refused(void **unused) {
 
 /* Whose key is known later: the records' keys need the exchange as well; and
  * who can undo that needs the key. */
-static void keys_need_the_key_and_the_exchange(void **unused) {
+TEST(keys_need_the_key_and_the_exchange) {
     static const uint8_t zero[SECURE_KEY_BYTES];
     struct secure_keys keys[3];
-    (void)unused;
     for (unsigned how = 0; how < 3; how++) {
         int status[2] = {0, 0};
         struct world *w = new_world(3, 0);
@@ -164,8 +159,7 @@ static void keys_need_the_key_and_the_exchange(void **unused) {
 }
 
 /* Each byte of it in turn. */
-static void a_changed_opening_is_refused(void **unused) {
-    (void)unused;
+TEST(a_changed_opening_is_refused) {
     for (size_t at = 0; at < SECURE_OPENING_BYTES; at++) {
         int status[2] = {0, 0};
         struct world *w = new_world(5, 0);
@@ -186,10 +180,9 @@ static void a_changed_opening_is_refused(void **unused) {
 }
 
 /* The vector of PROTOCOL.md. */
-static void the_vector(void **unused) {
+TEST(the_vector) {
     struct world *w = connected(0xa0, 0);
     struct link_pipe p = secure_records_pipe(&w->records[0]);
-    (void)unused;
     assert_int_equal(p.send(p.context, (const uint8_t *)"page", 4), 4);
     expect_bytes(w->lanes[0].bytes, "696e636f64657303"
                                     "6302050001000200"
@@ -215,15 +208,10 @@ static void the_vector(void **unused) {
     free(w);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(another_key_is_refused),
-        cmocka_unit_test(what_is_no_greeting_is_told),
-        cmocka_unit_test(a_wire_that_leads_elsewhere_is_told),
-        cmocka_unit_test(a_point_without_a_secret_is_refused),
-        cmocka_unit_test(keys_need_the_key_and_the_exchange),
-        cmocka_unit_test(a_changed_opening_is_refused),
-        cmocka_unit_test(the_vector),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(another_key_is_refused),
+          cmocka_unit_test(what_is_no_greeting_is_told),
+          cmocka_unit_test(a_wire_that_leads_elsewhere_is_told),
+          cmocka_unit_test(a_point_without_a_secret_is_refused),
+          cmocka_unit_test(keys_need_the_key_and_the_exchange),
+          cmocka_unit_test(a_changed_opening_is_refused),
+          cmocka_unit_test(the_vector))

@@ -25,8 +25,7 @@ static void use_and_wipe(void) {
     secure_wipe(copy, sizeof copy);
 }
 
-static void a_wipe_stays(void **unused) {
-    (void)unused;
+TEST(a_wipe_stays) {
     for (unsigned i = 0; i < SECRET_BYTES; i++)
         secret[i] = (uint8_t)(0x81 + 3 * i);
     run_on_stack(use_and_leave);
@@ -118,8 +117,7 @@ static struct world *same_world(const struct secure_suite *suite) {
 }
 
 /* All that a connection's keys are made of, and they. */
-static void no_turn_leaves_a_secret(void **unused) {
-    (void)unused;
+TEST(no_turn_leaves_a_secret) {
     /* Once before, as a library's function that is called for the first time
      * is looked for, and all registers are saved on the stack. */
     world = same_world(&toy);
@@ -149,11 +147,10 @@ static void no_turn_leaves_a_secret(void **unused) {
 }
 
 /* In the structs, as soon as they are not needed. */
-static void a_connection_that_ends_leaves_no_keys(void **unused) {
+TEST(a_connection_that_ends_leaves_no_keys) {
     uint8_t said[40] = "what is secret while it is not said";
     struct world *w = same_world(&secure_sodium);
     int status[2];
-    (void)unused;
     found_count = 0;
     keep(w->shake[0].secret);
     keep(w->shake[1].secret);
@@ -185,9 +182,8 @@ static void a_connection_that_ends_leaves_no_keys(void **unused) {
 }
 
 /* One that fails, and one that is given up, too. */
-static void a_shake_that_ends_leaves_none(void **unused) {
+TEST(a_shake_that_ends_leaves_none) {
     static const uint8_t noise[SECURE_GREETING_BYTES] = "noise";
-    (void)unused;
     for (unsigned given_up = 0; given_up < 2; given_up++) {
         uint8_t ephemeral[SECURE_KEY_BYTES];
         memset(ephemeral, 0x41, sizeof ephemeral);
@@ -203,12 +199,7 @@ static void a_shake_that_ends_leaves_none(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_wipe_stays),
-        cmocka_unit_test(no_turn_leaves_a_secret),
-        cmocka_unit_test(a_connection_that_ends_leaves_no_keys),
-        cmocka_unit_test(a_shake_that_ends_leaves_none),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_wipe_stays),
+          cmocka_unit_test(no_turn_leaves_a_secret),
+          cmocka_unit_test(a_connection_that_ends_leaves_no_keys),
+          cmocka_unit_test(a_shake_that_ends_leaves_none))

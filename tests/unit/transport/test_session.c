@@ -4,8 +4,7 @@
 
 /* --- peers that come, go and come again ----------------------------------- */
 
-static void a_cut_wire_goes_on_where_it_was(void **unused) {
-    (void)unused;
+TEST(a_cut_wire_goes_on_where_it_was) {
     for (uint64_t seed = 0; seed < 20; seed++) {
         struct pair *p = new_pair(&small, &perfect, seed);
         p->ends[0].size_max = p->ends[1].size_max = 1608;
@@ -29,8 +28,7 @@ static void a_cut_wire_goes_on_where_it_was(void **unused) {
     }
 }
 
-static void a_peer_that_stops_for_long_is_called_silent(void **unused) {
-    (void)unused;
+TEST(a_peer_that_stops_for_long_is_called_silent) {
     struct pair *p = new_pair(&small, &perfect, 2);
     for (unsigned i = 0; i < 200; i++)
         step(p, 100);
@@ -80,9 +78,8 @@ static void restart(struct pair *p, uint32_t epoch,
     reborn->most = UINT32_MAX;
 }
 
-static void a_restarted_peer_is_noticed(void **unused) {
+TEST(a_restarted_peer_is_noticed) {
     struct host_sim_cube_options bad = perfect;
-    (void)unused;
     bad.wire.latency_us = 3000;
     bad.faults.chance[SIM_DELETE] = 2e-4;
     for (uint64_t seed = 0; seed < 20; seed++) {
@@ -121,8 +118,7 @@ static struct pair *new_loyal_pair(void) {
 }
 
 /* Three ends: a third one in the place of the second. */
-static void an_end_may_keep_to_its_peer(void **unused) {
-    (void)unused;
+TEST(an_end_may_keep_to_its_peer) {
     struct pair *p = new_loyal_pair();
     struct end other = p->ends[1];
     p->ends[1].memory = NULL;
@@ -161,8 +157,7 @@ static void an_end_may_keep_to_its_peer(void **unused) {
 
 /* One that was told so does not slip in when that end starts again: whom it
  * kept to has time to come back. */
-static void who_is_sent_away_waits_for_the_other(void **unused) {
-    (void)unused;
+TEST(who_is_sent_away_waits_for_the_other) {
     struct pair *p = new_loyal_pair();
     struct end first = p->ends[1];
     p->ends[1].memory = NULL;
@@ -184,8 +179,7 @@ static void who_is_sent_away_waits_for_the_other(void **unused) {
     free_pair(p);
 }
 
-static void a_wrong_wire_is_named(void **unused) {
-    (void)unused;
+TEST(a_wrong_wire_is_named) {
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.node = 99;
     /* start() sets who it is: another node, by hand. */
@@ -206,8 +200,7 @@ static void a_wrong_wire_is_named(void **unused) {
     free_pair(p);
 }
 
-static void sizes_that_do_not_fit_are_refused(void **unused) {
-    (void)unused;
+TEST(sizes_that_do_not_fit_are_refused) {
     struct pair *p = new_pair(&small, &perfect, 1);
     p->ends[1].config.frame_payload = 168;
     start(p, 1, 4242);
@@ -218,8 +211,7 @@ static void sizes_that_do_not_fit_are_refused(void **unused) {
 }
 
 /* Its own bytes come back: the plug is in both sockets of one port. */
-static void a_wire_to_itself_is_refused(void **unused) {
-    (void)unused;
+TEST(a_wire_to_itself_is_refused) {
     struct pair *p = new_pair(&small, &perfect, 1);
     struct sim_end *end = host_sim_cube_port(&p->cube, 0, 0)->end;
     end->in = end->out;
@@ -229,8 +221,7 @@ static void a_wire_to_itself_is_refused(void **unused) {
     free_pair(p);
 }
 
-static void farewell(void **unused) {
-    (void)unused;
+TEST(farewell) {
     for (uint64_t seed = 0; seed < 20; seed++) {
         struct host_sim_cube_options bad = perfect;
         bad.faults.chance[SIM_DELETE] = seed % 2 ? 0.002 : 0;
@@ -259,8 +250,7 @@ static void farewell(void **unused) {
 
 /* The other end's farewell comes before this one has begun its own, on a wire
  * with room for it, or for less than the answer. */
-static void farewells_that_cross_are_answered(void **unused) {
-    (void)unused;
+TEST(farewells_that_cross_are_answered) {
     for (unsigned held = 0; held < 2; held++) {
         struct pair *p = new_pair(&small, &perfect, 1);
         p->ends[0].most = p->ends[1].most = 0;
@@ -289,8 +279,7 @@ static void farewells_that_cross_are_answered(void **unused) {
     }
 }
 
-static void farewell_to_the_dead_ends_in_time(void **unused) {
-    (void)unused;
+TEST(farewell_to_the_dead_ends_in_time) {
     for (unsigned cut = 0; cut < 2; cut++) {
         struct pair *p = new_pair(&small, &perfect, 1);
         for (unsigned i = 0; i < 50; i++)
@@ -313,10 +302,9 @@ static void farewell_to_the_dead_ends_in_time(void **unused) {
 
 /* End 0 forgets what it has not begun to send; what arrives is whole, and the
  * count is right. */
-static void what_is_unsent_is_forgotten(void **unused) {
+TEST(what_is_unsent_is_forgotten) {
     struct host_sim_cube_options slow = perfect;
     struct link_message message;
-    (void)unused;
     slow.wire.bytes_per_s = 100000;
     slow.wire.room = 100;
     for (uint64_t seed = 0; seed < 40; seed++) {
@@ -432,7 +420,7 @@ static const uint8_t bye_1[] = {0x00, 0x07, 0x24, 0x08, 0x8f, 0x87, 0x96,
                                 0xb6, 0xaf, 0x77, 0x35, 0x4c, 0x98, 0x00};
 
 /* Node 1 of epoch 0xfffe answers node 5 of epoch 0x11223344 on port 2. */
-static void test_vectors(void **unused) {
+TEST(test_vectors) {
     const uint8_t head[8] = {5, 0, 1, 0, 34, 0, 0xe7, 0x3f};
     struct link_message datagram;
     bool ask;
@@ -446,7 +434,6 @@ static void test_vectors(void **unused) {
                             .greeting = 4,
                             .window = 8,
                             .message_max = 1608};
-    (void)unused;
     void *memory = malloc(link_bytes(&c));
     struct link *link = link_init(memory, link_bytes(&c), &c);
     assert_non_null(link);
@@ -483,21 +470,16 @@ static void test_vectors(void **unused) {
     free(memory);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_unsent_is_forgotten),
-        cmocka_unit_test(test_vectors),
-        cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
-        cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
-        cmocka_unit_test(a_restarted_peer_is_noticed),
-        cmocka_unit_test(an_end_may_keep_to_its_peer),
-        cmocka_unit_test(who_is_sent_away_waits_for_the_other),
-        cmocka_unit_test(a_wrong_wire_is_named),
-        cmocka_unit_test(sizes_that_do_not_fit_are_refused),
-        cmocka_unit_test(a_wire_to_itself_is_refused),
-        cmocka_unit_test(farewell),
-        cmocka_unit_test(farewells_that_cross_are_answered),
-        cmocka_unit_test(farewell_to_the_dead_ends_in_time),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(what_is_unsent_is_forgotten),
+          cmocka_unit_test(test_vectors),
+          cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
+          cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
+          cmocka_unit_test(a_restarted_peer_is_noticed),
+          cmocka_unit_test(an_end_may_keep_to_its_peer),
+          cmocka_unit_test(who_is_sent_away_waits_for_the_other),
+          cmocka_unit_test(a_wrong_wire_is_named),
+          cmocka_unit_test(sizes_that_do_not_fit_are_refused),
+          cmocka_unit_test(a_wire_to_itself_is_refused),
+          cmocka_unit_test(farewell),
+          cmocka_unit_test(farewells_that_cross_are_answered),
+          cmocka_unit_test(farewell_to_the_dead_ends_in_time))

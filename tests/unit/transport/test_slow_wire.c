@@ -40,7 +40,7 @@ static double share(uint32_t baud, uint32_t told, uint32_t look_us, bool bad,
     return bytes * 1e6 / us / (baud / 10.0);
 }
 
-static void slow_wires_carry(void **unused) {
+TEST(slow_wires_carry) {
     static const struct {
         uint32_t baud, told, look_us;
     } cases[] = {{19200, 19200, 1000},   {19200, 19200, 50000},
@@ -48,7 +48,6 @@ static void slow_wires_carry(void **unused) {
                  {115200, 115200, 1000}, {115200, 115200, 50000},
                  {115200, 921600, 1000}, {115200, 921600, 50000},
                  {921600, 115200, 5000}, {921600, 921600, 5000}};
-    (void)unused;
     for (unsigned i = 0; i < 10; i++) {
         double clean =
             share(cases[i].baud, cases[i].told, cases[i].look_us, false, i);
@@ -63,9 +62,4 @@ static void slow_wires_carry(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(slow_wires_carry),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(slow_wires_carry))

@@ -55,8 +55,7 @@ static void read_slowly(struct machine *m, unsigned i) {
     give(m, i);
 }
 
-static void messages_being_read_stay(void **unused) {
-    (void)unused;
+TEST(messages_being_read_stay) {
     for (unsigned k = 0; k < 24; k++) {
         struct cube_config c = {.window = (uint16_t)(k % 2 ? 2 : 5)};
         struct host_sim_cube_options wires = perfect;
@@ -109,10 +108,9 @@ static void others_chatter(struct machine *m, unsigned i) {
 }
 
 /* What was decided in a generation is written in it, and read in no other. */
-static void work_stays_in_its_generation(void **unused) {
+TEST(work_stays_in_its_generation) {
     uint32_t words[8];
     uint64_t late = 0;
-    (void)unused;
     for (unsigned k = 0; k < 10; k++) {
         struct cube_config c = {.window = 3};
         struct machine *m = build(3, &c, &perfect, k);
@@ -147,9 +145,8 @@ static void work_stays_in_its_generation(void **unused) {
 
 /* The peer has said farewell: who has looked for room has it, until it polls.
  */
-static void a_farewell_waits(void **unused) {
+TEST(a_farewell_waits) {
     struct cube_config c = {.window = 2};
-    (void)unused;
     struct machine *m = build(1, &c, &perfect, 1);
     settle(m, 1);
     struct cube *one = m->places[0].cube, *other = m->places[1].cube;
@@ -172,11 +169,6 @@ static void a_farewell_waits(void **unused) {
     destroy(m);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(messages_being_read_stay),
-        cmocka_unit_test(work_stays_in_its_generation),
-        cmocka_unit_test(a_farewell_waits),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(messages_being_read_stay),
+          cmocka_unit_test(work_stays_in_its_generation),
+          cmocka_unit_test(a_farewell_waits))

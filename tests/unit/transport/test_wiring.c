@@ -1,14 +1,9 @@
 /* The wiring of a cube: whatever the order in which ends hear of things, all
  * come to the same; its bytes are those of PROTOCOL.md. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/routes.h"
+#include "tests/unit/test.h"
 
 enum { DIMENSION = 4, NODES = 16 };
 
@@ -35,9 +30,8 @@ static void find_something(struct cube_wiring *w) {
 
 /* Ends that find things and tell each other at random agree in the end, on
  * what one would know that had been told all at once. */
-static void all_come_to_the_same(void **unused) {
+TEST(all_come_to_the_same) {
     enum { ENDS = 6 };
-    (void)unused;
     for (unsigned round = 0; round < 500; round++) {
         struct cube_wiring ends[ENDS], all;
         memset(ends, 0, sizeof ends);
@@ -67,8 +61,7 @@ static void all_come_to_the_same(void **unused) {
     }
 }
 
-static void what_is_newer_wins_entirely(void **unused) {
-    (void)unused;
+TEST(what_is_newer_wins_entirely) {
     for (unsigned round = 0; round < 500; round++) {
         struct cube_wiring a, b;
         memset(&a, 0, sizeof a);
@@ -93,12 +86,11 @@ static void what_is_newer_wins_entirely(void **unused) {
 }
 
 /* Around the circle: what follows is later, whatever its number. */
-static void generations_go_round(void **unused) {
+TEST(generations_go_round) {
     static const uint32_t far[] = {
         1,          2,          0x7fff,     0x8000,     0xffff,    0x10000,
         0x7fffffff, 0x80000000, 0x80000001, 0xfffffffe, 0xffffffff};
     enum { FAR = sizeof far / sizeof far[0] };
-    (void)unused;
     for (unsigned i = 0; i < FAR; i++) {
         uint32_t a = far[i], next = wiring_next(a);
         assert_true(next != 0 && wiring_after(next, a));
@@ -114,9 +106,8 @@ static void generations_go_round(void **unused) {
 }
 
 /* Of PROTOCOL.md's message. */
-static void a_stamp_stands_for_generation_and_host(void **unused) {
+TEST(a_stamp_stands_for_generation_and_host) {
     struct cube_wiring a = {.generation = 1, .host_epoch = 0x0badcafe}, b = a;
-    (void)unused;
     assert_int_equal(wiring_stamp(&a), 0x3fe7);
     b.generation = 0x10001;
     assert_int_not_equal(wiring_stamp(&b), 0x3fe7);
@@ -125,9 +116,8 @@ static void a_stamp_stands_for_generation_and_host(void **unused) {
     assert_int_not_equal(wiring_stamp(&b), 0x3fe7);
 }
 
-static void a_node_whose_links_are_dead_is_one_entry(void **unused) {
+TEST(a_node_whose_links_are_dead_is_one_entry) {
     struct cube_wiring w;
-    (void)unused;
     memset(&w, 0, sizeof w);
     for (unsigned d = 0; d < DIMENSION; d++) {
         struct cube_dead dead = {6, (uint8_t)d};
@@ -161,9 +151,8 @@ static const uint8_t vector[] = {3, 0, 0, 0, 0xfe, 0xca, 0xad, 0x0b, 0,
 
 /* The gateway may lose every link between nodes and still have its host's wire.
  */
-static void a_gateway_lives_while_its_hosts_wire_does(void **unused) {
+TEST(a_gateway_lives_while_its_hosts_wire_does) {
     struct cube_wiring w = {.generation = 2, .gateway = 4};
-    (void)unused;
     for (unsigned d = 0; d < DIMENSION; d++) {
         struct cube_dead dead = {4, (uint8_t)d};
         assert_true(wiring_add_dead(&w, dead, DIMENSION));
@@ -178,10 +167,9 @@ static void a_gateway_lives_while_its_hosts_wire_does(void **unused) {
     assert_int_equal(w.dead[0].dimension, CUBE_WHOLE_NODE);
 }
 
-static void its_bytes(void **unused) {
+TEST(its_bytes) {
     struct cube_wiring w, again;
     uint8_t bytes[WIRING_BYTES_MAX + 1];
-    (void)unused;
     assert_true(wiring_unpack(&w, vector, sizeof vector, 3));
     assert_int_equal(w.generation, 3);
     assert_int_equal(w.host_epoch, 0x0badcafe);
@@ -218,15 +206,10 @@ static void its_bytes(void **unused) {
     assert_false(wiring_unpack(&again, bytes, sizeof vector, 3));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_come_to_the_same),
-        cmocka_unit_test(what_is_newer_wins_entirely),
-        cmocka_unit_test(generations_go_round),
-        cmocka_unit_test(a_stamp_stands_for_generation_and_host),
-        cmocka_unit_test(a_node_whose_links_are_dead_is_one_entry),
-        cmocka_unit_test(a_gateway_lives_while_its_hosts_wire_does),
-        cmocka_unit_test(its_bytes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(all_come_to_the_same),
+          cmocka_unit_test(what_is_newer_wins_entirely),
+          cmocka_unit_test(generations_go_round),
+          cmocka_unit_test(a_stamp_stands_for_generation_and_host),
+          cmocka_unit_test(a_node_whose_links_are_dead_is_one_entry),
+          cmocka_unit_test(a_gateway_lives_while_its_hosts_wire_does),
+          cmocka_unit_test(its_bytes))

@@ -1,10 +1,6 @@
 /* How much memory is left, by control groups of both versions and by limits. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,8 +31,7 @@ static void put(const char *name, const char *text) {
     assert_int_equal(fclose(file), 0);
 }
 
-static void a_group_of_the_second_version(void **unused) {
-    (void)unused;
+TEST(a_group_of_the_second_version) {
     assert_int_equal(mkdir("two", 0777), 0);
     assert_int_equal(mkdir("two/a", 0777), 0);
     assert_int_equal(mkdir("two/a/b", 0777), 0);
@@ -54,8 +49,7 @@ static void a_group_of_the_second_version(void **unused) {
     assert_int_equal(host_memory_in_groups("list", "two"), 0);
 }
 
-static void a_group_of_the_first_version(void **unused) {
-    (void)unused;
+TEST(a_group_of_the_first_version) {
     assert_int_equal(mkdir("one", 0777), 0);
     assert_int_equal(mkdir("one/memory", 0777), 0);
     put("list", "5:devices:/\n4:memory:/seen/from/outside\n0::/\n");
@@ -87,8 +81,7 @@ static void expect_room(uint64_t available) {
     assert_in_range(available, room - ((uint64_t)4 << 20), room);
 }
 
-static void a_limit(void **unused) {
-    (void)unused;
+TEST(a_limit) {
     struct rlimit limit, before;
     assert_true(host_memory_available() > room); /* or nothing is built here */
     assert_int_equal(getrlimit(RLIMIT_AS, &before), 0);

@@ -1,16 +1,10 @@
 /* Sets of nodes as a person writes them, and as they are told. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/base/node_set.h"
+#include "tests/unit/test.h"
 
-static void test_written(void **unused) {
-    (void)unused;
+TEST(test_written) {
     static const struct {
         const char *text, *printed;
         unsigned nodes, count;
@@ -38,8 +32,7 @@ static void test_written(void **unused) {
     }
 }
 
-static void test_refused(void **unused) {
-    (void)unused;
+TEST(test_refused) {
     static const char *const bad[] = {"",
                                       ",",
                                       "0,",
@@ -75,8 +68,7 @@ static void test_refused(void **unused) {
 }
 
 /* Whatever room there is: a whole part, or two dots in place of the rest. */
-static void test_cut(void **unused) {
-    (void)unused;
+TEST(test_cut) {
     struct host_error error = {0};
     struct host_node_set set;
     static const char whole[] = "0-3,7,100-1000";
@@ -96,8 +88,7 @@ static void test_cut(void **unused) {
     assert_string_equal(text, "");
 }
 
-static void test_named(void **unused) {
-    (void)unused;
+TEST(test_named) {
     struct host_node_set set = {{0}};
     char text[24];
     host_node_set_add(&set, 3);
@@ -108,9 +99,5 @@ static void test_named(void **unused) {
     assert_string_equal(text, "nodes 3-4");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_written), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_cut), cmocka_unit_test(test_named)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_written), cmocka_unit_test(test_refused),
+          cmocka_unit_test(test_cut), cmocka_unit_test(test_named))

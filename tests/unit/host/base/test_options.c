@@ -1,14 +1,9 @@
 /* The arguments of a command: what is wrong with them, and what was meant. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/base/options.h"
+#include "tests/unit/test.h"
 
 enum { WORDS_MAX = 6 };
 
@@ -65,13 +60,12 @@ static int parse(const char *const words[], struct seen *seen,
     return host_options_parse(&argp, argc, argv, ARGP_NO_HELP, seen, error);
 }
 
-static void test_taken(void **unused) {
+TEST(test_taken) {
     struct seen seen;
     struct host_error error;
     static const char *const words[] = {"a",        "-qs4", "b",
                                         "--window", "9",    NULL};
     static const char *const dashes[] = {"--see=1", "-q", "--", "-x", NULL};
-    (void)unused;
     assert_int_equal(parse(words, &seen, &error), 0);
     assert_int_equal(seen.words, 2);
     assert_int_equal(seen.quiet, 1);
@@ -82,13 +76,12 @@ static void test_taken(void **unused) {
 }
 
 /* Its value is in the same word; the next one is for itself. */
-static void test_optional(void **unused) {
+TEST(test_optional) {
     struct seen seen;
     struct host_error error;
     static const char *const words[] = {"--dry", "--seed=5", "-d",
                                         "-d7",   "-d",       NULL};
     static const char *const next[] = {"--dry", "--seed", NULL};
-    (void)unused;
     assert_int_equal(parse(words, &seen, &error), 0);
     assert_int_equal(seen.dry, 13);
     assert_string_equal(seen.seed, "5");
@@ -96,7 +89,7 @@ static void test_optional(void **unused) {
     assert_non_null(strstr(error.text, "--seed: wants a value; "));
 }
 
-static void test_refused(void **unused) {
+TEST(test_refused) {
     static const struct {
         const char *word, *said;
     } wrong[] = {
@@ -120,7 +113,6 @@ static void test_refused(void **unused) {
                     "--window?"},
         {"-\x1b", "-\\x1b: no such option"},
         {"--\x1b", "--\\x1b: no such option"}};
-    (void)unused;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         const char *const words[] = {"a", wrong[i].word, NULL};
         struct seen seen;
@@ -131,10 +123,9 @@ static void test_refused(void **unused) {
     }
 }
 
-static void test_numbers(void **unused) {
+TEST(test_numbers) {
     uint64_t number = 7;
     struct host_error error = {0};
-    (void)unused;
     assert_int_equal(
         host_option_number("baud", "300", 300, 1000, &number, &error), 0);
     assert_int_equal(number, 300);
@@ -151,10 +142,9 @@ static void test_numbers(void **unused) {
     assert_string_equal(error.text, "--seed -1: not a number; give 1 or more");
 }
 
-static void test_the_one_argument(void **unused) {
+TEST(test_the_one_argument) {
     const char *argument = NULL;
     struct host_error error = {0};
-    (void)unused;
     assert_int_equal(
         host_option_argument(ARGP_KEY_END, "IMAGE", NULL, &argument, &error),
         HOST_USAGE);
@@ -174,21 +164,14 @@ static void test_the_one_argument(void **unused) {
 }
 
 /* -h ends a command that has done nothing, and is no error. */
-static void test_help(void **unused) {
+TEST(test_help) {
     static const char *const words[] = {"-h", "--zzz", NULL};
     struct seen seen;
     struct host_error error;
-    (void)unused;
     assert_int_not_equal(parse(words, &seen, &error), 0);
     assert_int_equal(error.code, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_taken),
-                                       cmocka_unit_test(test_optional),
-                                       cmocka_unit_test(test_refused),
-                                       cmocka_unit_test(test_numbers),
-                                       cmocka_unit_test(test_the_one_argument),
-                                       cmocka_unit_test(test_help)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_taken), cmocka_unit_test(test_optional),
+          cmocka_unit_test(test_refused), cmocka_unit_test(test_numbers),
+          cmocka_unit_test(test_the_one_argument), cmocka_unit_test(test_help))

@@ -1,16 +1,10 @@
 /* Numbers and sizes as a user may write them, and as not. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/base/text.h"
+#include "tests/unit/test.h"
 
-static void test_bytes(void **unused) {
-    (void)unused;
+TEST(test_bytes) {
     static const struct {
         const char *text;
         uint64_t bytes;
@@ -50,8 +44,7 @@ static void test_bytes(void **unused) {
         assert_int_equal(host_parse_bytes(bad[i], &bytes), -1);
 }
 
-static void test_numbers(void **unused) {
-    (void)unused;
+TEST(test_numbers) {
     uint64_t n;
     assert_int_equal(host_parse_number("7", 1, 7, &n), 0);
     assert_int_equal(n, 7);
@@ -67,7 +60,7 @@ static void test_numbers(void **unused) {
 }
 
 /* Whole numbers in exponent form, and no others. */
-static void test_exponents(void **unused) {
+TEST(test_exponents) {
     static const struct {
         const char *text;
         uint64_t number;
@@ -97,7 +90,6 @@ static void test_exponents(void **unused) {
                                       "0x1e6",
                                       "1e6.0"};
     uint64_t n;
-    (void)unused;
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         assert_int_equal(host_parse_number(good[i].text, 0, UINT64_MAX, &n), 0);
         assert_true(n == good[i].number);
@@ -107,7 +99,7 @@ static void test_exponents(void **unused) {
 }
 
 /* What is wrong with a number of nodes, and which ones there are. */
-static void test_nodes(void **unused) {
+TEST(test_nodes) {
     static const struct {
         const char *text, *said;
     } wrong[] = {{"3", "--nodes 3: not a power of two"},
@@ -116,7 +108,6 @@ static void test_nodes(void **unused) {
                          "8, 16, 32, 64, or fewer"},
                  {"-1", "not a number; allowed: 1, 2, 4, 8, 16, 32, 64"},
                  {"4294967298", "more nodes"}};
-    (void)unused;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct host_error error = {0};
         unsigned nodes = 7;
@@ -132,9 +123,5 @@ static void test_nodes(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bytes), cmocka_unit_test(test_numbers),
-        cmocka_unit_test(test_exponents), cmocka_unit_test(test_nodes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_bytes), cmocka_unit_test(test_numbers),
+          cmocka_unit_test(test_exponents), cmocka_unit_test(test_nodes))

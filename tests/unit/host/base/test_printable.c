@@ -1,20 +1,15 @@
 /* Words from elsewhere, for a terminal and for a shell. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/base/error.h"
 #include "host/base/text.h"
+#include "tests/unit/test.h"
 
 enum { TEXT = 400, RANDOM_WORDS = 200, WORDS = 256 + RANDOM_WORDS };
 
-static void test_printable(void **unused) {
+TEST(test_printable) {
     static const struct {
         const char *text, *printed;
     } cases[] = {
@@ -38,7 +33,6 @@ static void test_printable(void **unused) {
         {"\x80", "\\x80"},
         {"\xf8\x88\x80\x80\x80", "\\xf8\\x88\\x80\\x80\\x80"}};
     char out[TEXT], again[TEXT];
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         host_text_printable(out, sizeof out, cases[i].text);
         assert_string_equal(out, cases[i].printed);
@@ -48,12 +42,11 @@ static void test_printable(void **unused) {
 }
 
 /* Whole characters, and nothing past the end. */
-static void test_bounds(void **unused) {
+TEST(test_bounds) {
     static const char text[] = "a\xe2\x82\xac\x1b";
     static const char *const cut[] = {
         "", "a", "a", "a", "a\xe2\x82\xac", "a\xe2\x82\xac"};
     char out[16];
-    (void)unused;
     for (size_t size = 1; size <= 6; size++) {
         memset(out, '#', sizeof out);
         host_text_printable(out, size, text);
@@ -69,7 +62,7 @@ static void test_bounds(void **unused) {
     }
 }
 
-static void test_quoted_where_needed(void **unused) {
+TEST(test_quoted_where_needed) {
     static const struct {
         const char *text, *quoted;
     } cases[] = {{"/dev/ttyUSB0", "/dev/ttyUSB0"},
@@ -84,7 +77,6 @@ static void test_quoted_where_needed(void **unused) {
                  {"a\nb", "'a\nb'"},
                  {"\x1b", "\"$(printf '\\033')\""}};
     char out[TEXT];
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         assert_int_equal(host_text_quote(out, sizeof out, cases[i].text), 0);
         assert_string_equal(out, cases[i].quoted);
@@ -108,14 +100,13 @@ static void make_word(unsigned i, char word[TEXT / 20]) {
     word[length] = '\0';
 }
 
-static void test_what_a_shell_reads(void **unused) {
+TEST(test_what_a_shell_reads) {
     static char said[WORDS * 20];
     char quoted[TEXT], printable[TEXT], word[TEXT / 20];
     char path[] = "/tmp/incode-quoted-XXXXXX", command[64];
     static char words[WORDS][TEXT / 20];
     int fd = mkstemp(path);
     FILE *script = fdopen(fd, "w");
-    (void)unused;
     assert_non_null(script);
     for (unsigned i = 1; i < WORDS; i++) {
         make_word(i, word);
@@ -146,7 +137,7 @@ static const char *name_of(const void *names, unsigned i) {
     return ((const char *const *)names)[i];
 }
 
-static void test_nearest(void **unused) {
+TEST(test_nearest) {
     static const char *const names[] = {"run",    "gen",     "verify",
                                         "digest", "convert", NULL};
     static const struct {
@@ -162,7 +153,6 @@ static void test_nearest(void **unused) {
                  {"a.xyz", NULL}};
     static const char long_word[] = "a word that is longer than any name, and "
                                     "than the table of its distances";
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const char *found = host_text_nearest(cases[i].word, name_of, names);
         if (cases[i].nearest == NULL)
@@ -174,10 +164,9 @@ static void test_nearest(void **unused) {
 }
 
 /* A line of an error, and one that is said. */
-static void test_said(void **unused) {
+TEST(test_said) {
     char line[80] = "";
     struct host_error error = {0};
-    (void)unused;
     assert_int_equal(
         host_fail(&error, HOST_INPUT, "%s: no; give", "\x1b]0;a\x07\n"),
         HOST_INPUT);
@@ -190,13 +179,7 @@ static void test_said(void **unused) {
     assert_string_equal(line, "a\\x0a\\x1b is here\nb\\x0a");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_printable),
-        cmocka_unit_test(test_bounds),
-        cmocka_unit_test(test_quoted_where_needed),
-        cmocka_unit_test(test_what_a_shell_reads),
-        cmocka_unit_test(test_nearest),
-        cmocka_unit_test(test_said)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_printable), cmocka_unit_test(test_bounds),
+          cmocka_unit_test(test_quoted_where_needed),
+          cmocka_unit_test(test_what_a_shell_reads),
+          cmocka_unit_test(test_nearest), cmocka_unit_test(test_said))

@@ -1,13 +1,9 @@
 /* The line of progress on terminals of several widths: it stays one line, goes
  * away at the end, and what is noted meanwhile stands by itself. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <fcntl.h>
 #include <poll.h>
 #include <pty.h>
@@ -119,9 +115,8 @@ static const char *shown(uint64_t done, uint64_t total, uint64_t amount) {
     return screen.text[screen.row];
 }
 
-static void test_fits(void **unused) {
+TEST(test_fits) {
     static const unsigned short widths[] = {30, 12, 5, 80, 160};
-    (void)unused;
     for (size_t i = 0; i < sizeof widths / sizeof widths[0]; i++) {
         open_screen(widths[i]);
         host_progress_begin(true);
@@ -152,9 +147,8 @@ static void test_fits(void **unused) {
     }
 }
 
-static void test_follows_the_width(void **unused) {
+TEST(test_follows_the_width) {
     struct winsize narrow = {.ws_row = ROWS, .ws_col = 30};
-    (void)unused;
     open_screen(100);
     host_progress_begin(true);
     host_progress_phase("triangulating", "Mtet");
@@ -168,8 +162,7 @@ static void test_follows_the_width(void **unused) {
 }
 
 /* Of what has no total, the amount is shown. */
-static void test_counts(void **unused) {
-    (void)unused;
+TEST(test_counts) {
     open_screen(30);
     host_progress_begin(true);
     host_progress_phase("writing", "MB");
@@ -181,8 +174,7 @@ static void test_counts(void **unused) {
     close_screen();
 }
 
-static void test_notes(void **unused) {
-    (void)unused;
+TEST(test_notes) {
     open_screen(80);
     host_note("node %u: %s", 1, "before");
     host_progress_begin(true);
@@ -214,8 +206,7 @@ static void draw_rows(double part) {
 }
 
 /* A table stays where it is, makes room for notes, and goes away whole. */
-static void test_rows(void **unused) {
-    (void)unused;
+TEST(test_rows) {
     open_screen(60);
     assert_int_equal(host_progress_rows_max(), 0);
     host_progress_begin(true);
@@ -241,10 +232,9 @@ static void test_rows(void **unused) {
 }
 
 /* No line where it is not wanted, nor where nobody sees it; notes come. */
-static void test_quiet(void **unused) {
+TEST(test_quiet) {
     int ends[2];
     char said[64] = "";
-    (void)unused;
     open_screen(80);
     host_progress_begin(false);
     host_progress_phase("triangulating", "Mtet");
@@ -265,12 +255,11 @@ static void test_quiet(void **unused) {
 }
 
 /* Without a terminal, where that is asked for: whole lines, and few. */
-static void test_lines(void **unused) {
+TEST(test_lines) {
     int ends[2], before = dup(STDERR_FILENO);
     char said[256] = "";
     struct pollfd file;
     unsigned shown = 0;
-    (void)unused;
     assert_int_equal(pipe(ends), 0);
     assert_true(dup2(ends[1], STDERR_FILENO) >= 0);
     file = (struct pollfd){ends[0], POLLIN, 0};
@@ -297,12 +286,7 @@ static void test_lines(void **unused) {
     (void)close(ends[0]);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_fits),   cmocka_unit_test(test_follows_the_width),
-        cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
-        cmocka_unit_test(test_rows),   cmocka_unit_test(test_quiet),
-        cmocka_unit_test(test_lines),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_fits), cmocka_unit_test(test_follows_the_width),
+          cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
+          cmocka_unit_test(test_rows), cmocka_unit_test(test_quiet),
+          cmocka_unit_test(test_lines))

@@ -1,16 +1,11 @@
 /* Where a board's instructions go, of a map and counts that are known. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/bench/bench_boards.h"
+#include "tests/unit/test.h"
 
 /* As a linker writes it: what is left out before, long names on a line of their
  * own, sections that are no code behind. */
@@ -53,7 +48,7 @@ static int remove_folder(void **state) {
     return rmdir(folder);
 }
 
-static void test_counts(void **state) {
+TEST(test_counts) {
     /* Address, instructions, times; behind the first of none, nothing counts,
      * nor does what is below the image, a loader. */
     static const uint64_t blocks[][3] = {
@@ -62,7 +57,6 @@ static void test_counts(void **state) {
         {0, 1, 4},      {0, 0, 0},       {0x100, 1, 100000}};
     struct host_boards_row row = {.board = "x"};
     struct host_error error = {0};
-    (void)state;
     write_file(map, map_text, sizeof map_text - 1);
     write_file(counts, blocks, sizeof blocks);
     assert_int_equal(host_boards_count(map, folder, row.counted, &error), 0);
@@ -77,10 +71,9 @@ static void test_counts(void **state) {
     assert_int_equal(access(counts, F_OK), -1); /* they count once */
 }
 
-static void test_no_map(void **state) {
+TEST(test_no_map) {
     double counted[HOST_ROOMS] = {0};
     struct host_error error = {0};
-    (void)state;
     write_file(map, "nothing\n", 8);
     assert_int_equal(host_boards_count(map, folder, counted, &error),
                      HOST_BROKEN);

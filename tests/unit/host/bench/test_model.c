@@ -1,24 +1,18 @@
 /* The cost model on cases that can be done by hand: prices, messages, t_IO, the
  * fit of prices to runs, and wires that are one medium. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/bench/paper.h"
 #include "host/bench/model.h"
+#include "tests/unit/test.h"
 
 static const double prices[HOST_BENCH_COUNTS] = {[HOST_BENCH_CALLS] = 7,
                                                  [HOST_BENCH_BUILT] = 11,
                                                  [HOST_BENCH_CANDIDATES] = 0.5,
                                                  [HOST_BENCH_EXACT] = 100};
 
-static void test_node(void **state) {
-    (void)state;
+TEST(test_node) {
     const struct host_bench_machine machine = {
         .price = prices, .scale = 10, .message_us = 3};
     struct node_finished_message totals = {0};
@@ -31,8 +25,7 @@ static void test_node(void **state) {
     assert_true(host_bench_node_ns(&machine, &totals, 6) == 4790 + 18000);
 }
 
-static void test_io(void **state) {
-    (void)state;
+TEST(test_io) {
     const struct host_bench_machine machine = {
         .wire = {.bytes_per_s = 1000000, .latency_us = 40},
         .host_wire = {.bytes_per_s = 2000000, .latency_us = 10}};
@@ -43,8 +36,7 @@ static void test_io(void **state) {
 
 /* Prices that times were made of are found again, but for one that would have
  * to be negative. */
-static void test_fit(void **state) {
-    (void)state;
+TEST(test_fit) {
     static const double made[HOST_CALIBRATE_TERMS] = {3,  0,    0.25,
                                                       40, 2000, 90000};
     double a[HOST_CALIBRATE_RUNS][HOST_CALIBRATE_TERMS], x[6];
@@ -99,8 +91,7 @@ static void one_medium(bool shared, uint64_t last_us) {
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 1);
 }
 
-static void test_medium(void **state) {
-    (void)state;
+TEST(test_medium) {
     one_medium(false, 1600);
     one_medium(true, 2100);
 }
@@ -116,8 +107,7 @@ static void check_speed_up(const char *table, uint64_t points, unsigned nodes,
     assert_true(fabs(s->alone_s / row->t_max - speed_up) < 0.0101);
 }
 
-static void test_figures(void **state) {
-    (void)state;
+TEST(test_figures) {
     static const double uniform_10k[] = {1,    1.75,  3.03,  5.10,
                                          8.05, 12.80, 19.26, 24.91};
     static const double uniform_20k[] = {1,    1.80,  3.13,  5.34,
@@ -143,10 +133,6 @@ static void test_figures(void **state) {
     assert_null(host_paper_find("2", "Bubbles", 20000, ""));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_node), cmocka_unit_test(test_io),
-        cmocka_unit_test(test_fit), cmocka_unit_test(test_medium),
-        cmocka_unit_test(test_figures)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_node), cmocka_unit_test(test_io),
+          cmocka_unit_test(test_fit), cmocka_unit_test(test_medium),
+          cmocka_unit_test(test_figures))

@@ -1,16 +1,11 @@
 /* Runs in virtual time: that a node is charged what it has counted and no more,
  * that the same run takes the same time, and that more nodes take less. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "host/bench/bench_links.h"
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
+#include "tests/unit/test.h"
 
 enum { POINTS = 600, BUILT_US = 2000 };
 
@@ -50,8 +45,7 @@ static void triangulate(const char *strategy, unsigned nodes, bool routers,
 
 /* Every tetrahedron that a node has built takes it two milliseconds, and a step
  * that did nothing, one microsecond at most. */
-static void test_charge(void **state) {
-    (void)state;
+TEST(test_charge) {
     for (unsigned nodes = 1; nodes <= 8; nodes *= 2) {
         uint64_t built = 0;
         triangulate("spatial", nodes, true, false);
@@ -68,8 +62,7 @@ static void test_charge(void **state) {
     }
 }
 
-static void test_again(void **state) {
-    (void)state;
+TEST(test_again) {
     for (int machine = 0; machine < 4; machine++) {
         triangulate("spatial", 8, machine & 1, machine & 2);
         double t_min = run.result.t_min_s, t_max = run.result.t_max_s;
@@ -80,8 +73,7 @@ static void test_again(void **state) {
     }
 }
 
-static void test_more_nodes(void **state) {
-    (void)state;
+TEST(test_more_nodes) {
     triangulate("sequential", 1, true, false);
     double alone = run.result.t_max_s, io = run.result.time_io_s;
     uint64_t tetrahedra = run.result.tetrahedra;
@@ -94,8 +86,7 @@ static void test_more_nodes(void **state) {
 
 /* A node of half the speed takes twice as long alone, and holds an exchange up
  * by little, as the others take over from it. */
-static void test_slow_node(void **state) {
-    (void)state;
+TEST(test_slow_node) {
     slow = 1;
     triangulate("spatial", 4, true, false);
     double even = run.result.t_max_s;
@@ -114,9 +105,5 @@ static void test_slow_node(void **state) {
     assert_true(run.result.t_max_s < 1.7 * even);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_charge), cmocka_unit_test(test_again),
-        cmocka_unit_test(test_more_nodes), cmocka_unit_test(test_slow_node)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_charge), cmocka_unit_test(test_again),
+          cmocka_unit_test(test_more_nodes), cmocka_unit_test(test_slow_node))

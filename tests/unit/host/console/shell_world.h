@@ -3,18 +3,13 @@
 #ifndef TESTS_UNIT_CONSOLE_SHELL_WORLD_H
 #define TESTS_UNIT_CONSOLE_SHELL_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/console/commands.h"
 #include "host/sim/sim_world.h"
+#include "tests/unit/test.h"
 
 enum { SAID = 1 << 16, MEMORY = 1 << 20, DEAD_US = 5000000 };
 

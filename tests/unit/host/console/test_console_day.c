@@ -44,10 +44,9 @@ static void disturb(unsigned hour) {
     let_pass(SETTLE_S * UINT64_C(1000000));
 }
 
-static void a_day_passes(void **unused) {
+TEST(a_day_passes) {
     size_t first = 0;
     unsigned hours = emulated() || SANITIZED ? HOURS_EMULATED : HOURS;
-    (void)unused;
     begin(2, false);
     for (unsigned hour = 0; hour < hours; hour++) {
         uint64_t end_us = (hour + 1) * HOUR_US;
@@ -65,7 +64,4 @@ static void a_day_passes(void **unused) {
     end();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_day_passes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_day_passes))

@@ -4,8 +4,7 @@
 
 /* --- lines ---------------------------------------------------------------- */
 
-static void what_is_no_command_is_told(void **unused) {
-    (void)unused;
+TEST(what_is_no_command_is_told) {
     begin(2, false);
     assert_int_equal(says(""), 0);
     assert_int_equal(says("   # ping 0"), 0);
@@ -31,9 +30,8 @@ static void what_is_no_command_is_told(void **unused) {
     end();
 }
 
-static void a_line_may_have_too_many_words(void **unused) {
+TEST(a_line_may_have_too_many_words) {
     char line[4096] = "ping";
-    (void)unused;
     begin(0, false);
     for (unsigned i = 0; i < 2 * HOST_SHELL_WORDS; i++)
         strcat(line, " 0");
@@ -41,9 +39,8 @@ static void a_line_may_have_too_many_words(void **unused) {
     end();
 }
 
-static void help_has_every_command(void **unused) {
+TEST(help_has_every_command) {
     const struct host_shell_command *row;
-    (void)unused;
     begin(0, false);
     assert_int_equal(says("help"), 0);
     for (unsigned i = 0; (row = host_shell_command_row(i)) != NULL; i++) {
@@ -74,8 +71,7 @@ static void completes(const char *line, const char *expected, size_t from) {
         assert_int_equal(at, from);
 }
 
-static void words_are_completed(void **unused) {
-    (void)unused;
+TEST(words_are_completed) {
     begin(2, false);
     assert_int_equal(host_shell_open(&desk.shell, &desk.shell.error), 0);
     completes("li", "links ", 0);
@@ -101,10 +97,9 @@ static void fold_line(void *context, const char *text) {
     append(context, text);
 }
 
-static void equal_rows_are_folded(void **unused) {
+TEST(equal_rows_are_folded) {
     static char text[SAID];
     struct host_fold fold = {0};
-    (void)unused;
     for (unsigned i = 0; i < 8; i++)
         host_fold_add(&fold, i, i == 5 ? "down" : "up");
     host_fold_add(&fold, CUBE_HOST, "up");
@@ -123,9 +118,8 @@ static void equal_rows_are_folded(void **unused) {
     host_fold_free(&fold);
 }
 
-static void figures_are_short(void **unused) {
+TEST(figures_are_short) {
     char text[HOST_SHELL_FIGURE], bar[HOST_SHELL_BAR];
-    (void)unused;
     assert_string_equal(host_shell_bytes(0, text), "0");
     assert_string_equal(host_shell_bytes(999, text), "999");
     assert_string_equal(host_shell_bytes(4 << 20, text), "4.00M");
@@ -143,8 +137,7 @@ static void figures_are_short(void **unused) {
 
 /* --- over a cube ---------------------------------------------------------- */
 
-static void nodes_are_asked(void **unused) {
-    (void)unused;
+TEST(nodes_are_asked) {
     begin(3, false);
     assert_int_equal(says("ping all 2"), 0);
     assert_non_null(strstr(desk.said, "2 of 2"));
@@ -170,12 +163,11 @@ static void nodes_are_asked(void **unused) {
     end();
 }
 
-static void answers_are_objects(void **unused) {
+TEST(answers_are_objects) {
     static const char *const lines[] = {
         "ping 0-1 2", "links",  "stat",      "memory 3", "log",
         "top",        "nodes",  "trace 0 3", "wires",    "help",
         "exit",       "ping 9", "\"",        "nonsense", "\xff"};
-    (void)unused;
     begin(2, true);
     for (unsigned i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         int status = says(lines[i]);
@@ -205,8 +197,7 @@ static void answers_are_objects(void **unused) {
     end();
 }
 
-static void what_is_dead_is_marked(void **unused) {
-    (void)unused;
+TEST(what_is_dead_is_marked) {
     begin(2, false);
     assert_int_equal(says("wires"), 0);
     deafen(0, 1, true);
@@ -221,8 +212,7 @@ static void what_is_dead_is_marked(void **unused) {
     end();
 }
 
-static void who_is_gone_is_named(void **unused) {
-    (void)unused;
+TEST(who_is_gone_is_named) {
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
     host_world_kill(&desk.world, 3);
@@ -240,8 +230,7 @@ static void who_is_gone_is_named(void **unused) {
     end();
 }
 
-static void nodes_that_begin_anew_are_noted(void **unused) {
-    (void)unused;
+TEST(nodes_that_begin_anew_are_noted) {
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
     let_pass(1000000);
@@ -256,8 +245,7 @@ static void nodes_that_begin_anew_are_noted(void **unused) {
     end();
 }
 
-static void nodes_are_reset(void **unused) {
-    (void)unused;
+TEST(nodes_are_reset) {
     begin(2, false);
     assert_int_equal(says("reset 1-2"), 0);
     assert_non_null(strstr(desk.said, "1-2  begun anew"));
@@ -273,8 +261,7 @@ static void nodes_are_reset(void **unused) {
     end();
 }
 
-static void a_person_may_interrupt(void **unused) {
-    (void)unused;
+TEST(a_person_may_interrupt) {
     begin(2, false);
     assert_int_equal(says("ping all 1"), 0);
     desk.interrupt = true;
@@ -293,8 +280,7 @@ static bool take_picture(void *context, const char *text) {
     return ++desk.pictures < desk.enough;
 }
 
-static void top_goes_on_until_it_is_enough(void **unused) {
-    (void)unused;
+TEST(top_goes_on_until_it_is_enough) {
     begin(2, false);
     desk.sink.picture = take_picture;
     desk.enough = 5;
@@ -304,10 +290,9 @@ static void top_goes_on_until_it_is_enough(void **unused) {
     end();
 }
 
-static void bytes_that_are_no_frame_are_shown(void **unused) {
+TEST(bytes_that_are_no_frame_are_shown) {
     char text[5 * HOST_WATCH_BYTES];
     struct host_watch watch = {.used = 0};
-    (void)unused;
     begin(0, false);
     assert_int_equal(host_shell_open(&desk.shell, &desk.shell.error), 0);
     memcpy(watch.last, "Hi\r\n\x1b\\", 6);
@@ -317,23 +302,18 @@ static void bytes_that_are_no_frame_are_shown(void **unused) {
     end();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_no_command_is_told),
-        cmocka_unit_test(a_line_may_have_too_many_words),
-        cmocka_unit_test(help_has_every_command),
-        cmocka_unit_test(words_are_completed),
-        cmocka_unit_test(equal_rows_are_folded),
-        cmocka_unit_test(figures_are_short),
-        cmocka_unit_test(nodes_are_asked),
-        cmocka_unit_test(answers_are_objects),
-        cmocka_unit_test(what_is_dead_is_marked),
-        cmocka_unit_test(who_is_gone_is_named),
-        cmocka_unit_test(nodes_that_begin_anew_are_noted),
-        cmocka_unit_test(nodes_are_reset),
-        cmocka_unit_test(a_person_may_interrupt),
-        cmocka_unit_test(top_goes_on_until_it_is_enough),
-        cmocka_unit_test(bytes_that_are_no_frame_are_shown),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(what_is_no_command_is_told),
+          cmocka_unit_test(a_line_may_have_too_many_words),
+          cmocka_unit_test(help_has_every_command),
+          cmocka_unit_test(words_are_completed),
+          cmocka_unit_test(equal_rows_are_folded),
+          cmocka_unit_test(figures_are_short),
+          cmocka_unit_test(nodes_are_asked),
+          cmocka_unit_test(answers_are_objects),
+          cmocka_unit_test(what_is_dead_is_marked),
+          cmocka_unit_test(who_is_gone_is_named),
+          cmocka_unit_test(nodes_that_begin_anew_are_noted),
+          cmocka_unit_test(nodes_are_reset),
+          cmocka_unit_test(a_person_may_interrupt),
+          cmocka_unit_test(top_goes_on_until_it_is_enough),
+          cmocka_unit_test(bytes_that_are_no_frame_are_shown))

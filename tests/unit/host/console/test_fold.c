@@ -1,15 +1,10 @@
 /* Answers that are equal share a row, also where a time in them differs a bit.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/console/fold.h"
+#include "tests/unit/test.h"
 
 static char said[2000];
 
@@ -29,8 +24,7 @@ static const char *folded(const uint32_t *time_s, unsigned count) {
     return said;
 }
 
-static void times_that_are_near_share_a_row(void **unused) {
-    (void)unused;
+TEST(times_that_are_near_share_a_row) {
     assert_string_equal(folded((uint32_t[]){7, 7}, 2),
                         "NODES  TIME\n0-1    up       7 s all\n");
     assert_string_equal(folded((uint32_t[]){59, 58, 61, 60}, 4),
@@ -42,16 +36,14 @@ static void times_that_are_near_share_a_row(void **unused) {
 }
 
 /* One that has begun anew is seen. */
-static void times_that_are_not_do_not(void **unused) {
-    (void)unused;
+TEST(times_that_are_not_do_not) {
     assert_string_equal(folded((uint32_t[]){3600, 3605, 12}, 3),
                         "NODES  TIME\n0-1    up       1 h all\n"
                         "2      up      12 s all\n");
 }
 
-static void a_row_without_a_time_is_another(void **unused) {
+TEST(a_row_without_a_time_is_another) {
     struct host_fold fold = {0};
-    (void)unused;
     host_fold_add(&fold, 0, "no answer");
     host_fold_add_timed(&fold, 1, "no answer", 5);
     host_fold_add(&fold, 2, "no answer");
@@ -59,10 +51,6 @@ static void a_row_without_a_time_is_another(void **unused) {
     host_fold_free(&fold);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(times_that_are_near_share_a_row),
-        cmocka_unit_test(times_that_are_not_do_not),
-        cmocka_unit_test(a_row_without_a_time_is_another)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(times_that_are_near_share_a_row),
+          cmocka_unit_test(times_that_are_not_do_not),
+          cmocka_unit_test(a_row_without_a_time_is_another))

@@ -1,19 +1,13 @@
 /* A chip that is not there, whatever this machine has: libgpiod's own answer.
  * Chips that are, the virtual machine of tests/system/full/vm_lines.sh has. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/cube/gpio.h"
+#include "tests/unit/test.h"
 
-static void no_such_chip(void **unused) {
+TEST(no_such_chip) {
     static const char *const names[] = {"no such chip", "/dev/null",
                                         "/dev/no-such-chip"};
-    (void)unused;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         struct host_cube_pin pin = {.wire = -1};
         struct host_gpio *gpio = (struct host_gpio *)&pin;
@@ -27,7 +21,4 @@ static void no_such_chip(void **unused) {
     host_gpio_close(NULL);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(no_such_chip)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(no_such_chip))

@@ -2,10 +2,6 @@
  * nothing stays active, whatever happens meanwhile. */
 #include <errno.h>
 #include <fcntl.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,11 +9,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/base/error.h"
 #include "host/cube/gpio.h"
 #include "host/cube/lines.h"
+#include "tests/unit/test.h"
 
 /* --- chips ---------------------------------------------------------------- */
 
@@ -122,8 +117,7 @@ static void nothing_is_active(void) {
 
 /* --- resets --------------------------------------------------------------- */
 
-static void a_reset(void **unused) {
-    (void)unused;
+TEST(a_reset) {
     assert_true(host_lines_has(&file, 0, HOST_LINE_BOOT));
     assert_false(host_lines_has(&file, 1, HOST_LINE_BOOT));
     open_lines();
@@ -133,8 +127,7 @@ static void a_reset(void **unused) {
     host_lines_close(&lines);
 }
 
-static void a_loader_that_waits(void **unused) {
-    (void)unused;
+TEST(a_loader_that_waits) {
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 0, true, &error), 0);
     assert_string_equal(played->told, "+2 +1 -1 -2 ");
@@ -145,8 +138,7 @@ static void a_loader_that_waits(void **unused) {
     host_lines_close(&lines);
 }
 
-static void a_node_without_one(void **unused) {
-    (void)unused;
+TEST(a_node_without_one) {
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 3, false, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "a.cube: node 3 has no reset line; "));
@@ -154,8 +146,7 @@ static void a_node_without_one(void **unused) {
     host_lines_close(&lines);
 }
 
-static void a_line_in_use(void **unused) {
-    (void)unused;
+TEST(a_line_in_use) {
     played->fails_to_open = 3;
     assert_int_equal(host_lines_open(&lines, &file, NULL, &error), HOST_CUBE);
     assert_string_equal(error.text,
@@ -164,8 +155,7 @@ static void a_line_in_use(void **unused) {
     assert_int_equal(played->open, 0);
 }
 
-static void a_line_that_fails(void **unused) {
-    (void)unused;
+TEST(a_line_that_fails) {
     open_lines();
     played->fails_to_set = 1;
     assert_int_equal(host_lines_reset(&lines, 0, true, &error), HOST_CUBE);
@@ -206,9 +196,8 @@ static int reset_amid(int signal, unsigned on, void (*handler)(int)) {
 }
 
 /* Its handler comes when nothing is active any more. */
-static void a_signal_that_is_handled(void **unused) {
+TEST(a_signal_that_is_handled) {
     static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
-    (void)unused;
     for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
         memset(&error, 0, sizeof error);
         assert_int_equal(reset_amid(ends[i], 1 + i % 2, see), HOST_CUBE);
@@ -218,23 +207,20 @@ static void a_signal_that_is_handled(void **unused) {
 }
 
 /* Ctrl-Z waits for the end of the reset. */
-static void a_signal_that_stops(void **unused) {
-    (void)unused;
+TEST(a_signal_that_stops) {
     assert_int_equal(reset_amid(SIGTSTP, 1, see), 0);
     assert_int_equal(seen, SIGTSTP);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
-static void a_signal_that_is_ignored(void **unused) {
-    (void)unused;
+TEST(a_signal_that_is_ignored) {
     assert_int_equal(reset_amid(SIGHUP, 1, SIG_IGN), 0);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
 /* The program ends by it as it would have without. */
-static void a_signal_that_ends_the_program(void **unused) {
+TEST(a_signal_that_ends_the_program) {
     int status = 0;
-    (void)unused;
     pid_t child = fork();
     if (child == 0) {
         (void)reset_amid(SIGTERM, 1, SIG_DFL);
@@ -251,9 +237,8 @@ static void a_signal_that_ends_the_program(void **unused) {
 /* --- the host's port ------------------------------------------------------ */
 
 /* A terminal that has no such lines, in the hands of another. */
-static void a_port_without_them(void **unused) {
+TEST(a_port_without_them) {
     static struct host_remote remote;
-    (void)unused;
     int master = posix_openpt(O_RDWR | O_NOCTTY);
     assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
     host_cube_file_free(&file);
@@ -283,20 +268,21 @@ static void a_port_without_them(void **unused) {
     assert_non_null(strstr(error.text, "/dev/t: "));
 }
 
-#define TEST(name) cmocka_unit_test_setup_teardown(name, set_up, tear_down)
+#define SET_UP_TEST(name)                                                      \
+    cmocka_unit_test_setup_teardown(name, set_up, tear_down)
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        TEST(a_reset),
-        TEST(a_loader_that_waits),
-        TEST(a_node_without_one),
-        TEST(a_line_in_use),
-        TEST(a_line_that_fails),
-        TEST(a_signal_that_is_handled),
-        TEST(a_signal_that_stops),
-        TEST(a_signal_that_is_ignored),
-        TEST(a_signal_that_ends_the_program),
-        TEST(a_port_without_them),
+        SET_UP_TEST(a_reset),
+        SET_UP_TEST(a_loader_that_waits),
+        SET_UP_TEST(a_node_without_one),
+        SET_UP_TEST(a_line_in_use),
+        SET_UP_TEST(a_line_that_fails),
+        SET_UP_TEST(a_signal_that_is_handled),
+        SET_UP_TEST(a_signal_that_stops),
+        SET_UP_TEST(a_signal_that_is_ignored),
+        SET_UP_TEST(a_signal_that_ends_the_program),
+        SET_UP_TEST(a_port_without_them),
     };
     played = mmap(NULL, sizeof *played, PROT_READ | PROT_WRITE,
                   MAP_SHARED | MAP_ANONYMOUS, -1, 0);

@@ -1,13 +1,8 @@
 /* The words by which commands name a cube, as advice repeats them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/cube/site.h"
+#include "tests/unit/test.h"
 
 static const char *told(struct host_site_options options, size_t size) {
     static char text[200];
@@ -15,8 +10,7 @@ static const char *told(struct host_site_options options, size_t size) {
     return text;
 }
 
-static void words_are_those_that_were_given(void **unused) {
-    (void)unused;
+TEST(words_are_those_that_were_given) {
     assert_string_equal(
         told((struct host_site_options){.cube = "my lab.cube"}, 200),
         "--cube 'my lab.cube'");
@@ -36,8 +30,7 @@ static void words_are_those_that_were_given(void **unused) {
 }
 
 /* Half a word would be another. */
-static void what_does_not_fit_is_left_to_the_user(void **unused) {
-    (void)unused;
+TEST(what_does_not_fit_is_left_to_the_user) {
     for (size_t size = 12; size < 20; size++) {
         assert_string_equal(
             told((struct host_site_options){.cube = "a-long-name.cube"}, size),
@@ -45,9 +38,5 @@ static void what_does_not_fit_is_left_to_the_user(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(words_are_those_that_were_given),
-        cmocka_unit_test(what_does_not_fit_is_left_to_the_user)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(words_are_those_that_were_given),
+          cmocka_unit_test(what_does_not_fit_is_left_to_the_user))

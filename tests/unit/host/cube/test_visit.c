@@ -5,8 +5,7 @@
 static const struct place eight = {.dimension = 3, .seed = 1};
 static const struct place boards = {.dimension = 3, .seed = 2, .bare = true};
 
-static void nodes_say_who_they_are(void **state) {
-    (void)state;
+TEST(nodes_say_who_they_are) {
     open_place(&eight);
     come();
     wait_for(all(), S);
@@ -78,9 +77,8 @@ static void nodes_answer_all_questions(void **state) {
     close_place();
 }
 
-static void a_probe_of_who_is_silent_ends(void **state) {
+TEST(a_probe_of_who_is_silent_ends) {
     struct node_probe probe;
-    (void)state;
     open_place(&eight);
     come();
     wait_for(all(), S);
@@ -94,8 +92,7 @@ static void a_probe_of_who_is_silent_ends(void **state) {
     close_place();
 }
 
-static void the_next_host_comes_at_once(void **state) {
-    (void)state;
+TEST(the_next_host_comes_at_once) {
     open_place(&eight);
     for (unsigned k = 0; k < 5; k++) {
         come();
@@ -108,8 +105,7 @@ static void the_next_host_comes_at_once(void **state) {
     close_place();
 }
 
-static void a_host_that_vanished_is_waited_for(void **state) {
-    (void)state;
+TEST(a_host_that_vanished_is_waited_for) {
     open_place(&eight);
     come();
     wait_for(all(), S);
@@ -133,8 +129,7 @@ static void a_host_that_vanished_is_waited_for(void **state) {
     close_place();
 }
 
-static void starts_are_told_apart(void **state) {
-    (void)state;
+TEST(starts_are_told_apart) {
     open_place(&eight);
     come();
     wait_for(all(), S);
@@ -147,9 +142,8 @@ static void starts_are_told_apart(void **state) {
     close_place();
 }
 
-static void nodes_restart_when_told(void **state) {
+TEST(nodes_restart_when_told) {
     struct host_node_set set = all();
-    (void)state;
     open_place(&boards);
     come();
     wait_for(all(), 4 * S);
@@ -163,9 +157,8 @@ static void nodes_restart_when_told(void **state) {
 }
 
 /* Nodes that have just begun are asked of their wires before these are up. */
-static void wires_of_nodes_that_have_just_begun_are_waited_for(void **state) {
+TEST(wires_of_nodes_that_have_just_begun_are_waited_for) {
     struct host_node_set set = all();
-    (void)state;
     open_place(&boards);
     come();
     good(host_visit_settle(&place.visit, &set, 12 * S, &place.error));
@@ -217,9 +210,8 @@ static void pull_and_put_back(const struct place *as, unsigned node,
     close_place();
 }
 
-static void a_pulled_wire_is_gone_round(void **state) {
+TEST(a_pulled_wire_is_gone_round) {
     struct place patient = eight;
-    (void)state;
     pull_and_put_back(&boards, 0, 1);
     pull_and_put_back(&boards, 5, 1);
     pull_and_put_back(&eight, 0, 0);
@@ -227,8 +219,7 @@ static void a_pulled_wire_is_gone_round(void **state) {
     pull_and_put_back(&patient, 2, 0);
 }
 
-static void a_wire_that_was_never_there(void **state) {
-    (void)state;
+TEST(a_wire_that_was_never_there) {
     open_place(&boards);
     host_sim_cube_leave_out(&place.world.cube, wire_of(0, 2));
     host_sim_cube_leave_out(&place.world.cube, wire_of(1, 1));
@@ -262,17 +253,15 @@ static void come_late(const struct place *as, unsigned node) {
     close_place();
 }
 
-static void a_node_that_is_off(void **state) {
-    (void)state;
+TEST(a_node_that_is_off) {
     come_late(&eight, 7);
     come_late(&eight, 1);
     come_late(&boards, 4);
     come_late(&boards, 3);
 }
 
-static void a_cube_of_one(void **state) {
+TEST(a_cube_of_one) {
     const struct place one = {.dimension = 0, .seed = 5, .bare = true};
-    (void)state;
     open_place(&one);
     come();
     wait_for(all(), 2 * S);
@@ -280,8 +269,7 @@ static void a_cube_of_one(void **state) {
     close_place();
 }
 
-static void a_node_that_loses_power_and_comes_back(void **state) {
-    (void)state;
+TEST(a_node_that_loses_power_and_comes_back) {
     open_place(&boards);
     come();
     wait_for(all(), 4 * S);
@@ -297,21 +285,15 @@ static void a_node_that_loses_power_and_comes_back(void **state) {
     close_place();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nodes_say_who_they_are),
-        cmocka_unit_test(nodes_answer_all_questions),
-        cmocka_unit_test(a_probe_of_who_is_silent_ends),
-        cmocka_unit_test(the_next_host_comes_at_once),
-        cmocka_unit_test(a_host_that_vanished_is_waited_for),
-        cmocka_unit_test(starts_are_told_apart),
-        cmocka_unit_test(nodes_restart_when_told),
-        cmocka_unit_test(wires_of_nodes_that_have_just_begun_are_waited_for),
-        cmocka_unit_test(a_pulled_wire_is_gone_round),
-        cmocka_unit_test(a_wire_that_was_never_there),
-        cmocka_unit_test(a_node_that_is_off),
-        cmocka_unit_test(a_cube_of_one),
-        cmocka_unit_test(a_node_that_loses_power_and_comes_back),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(nodes_say_who_they_are),
+          cmocka_unit_test(nodes_answer_all_questions),
+          cmocka_unit_test(a_probe_of_who_is_silent_ends),
+          cmocka_unit_test(the_next_host_comes_at_once),
+          cmocka_unit_test(a_host_that_vanished_is_waited_for),
+          cmocka_unit_test(starts_are_told_apart),
+          cmocka_unit_test(nodes_restart_when_told),
+          cmocka_unit_test(wires_of_nodes_that_have_just_begun_are_waited_for),
+          cmocka_unit_test(a_pulled_wire_is_gone_round),
+          cmocka_unit_test(a_wire_that_was_never_there),
+          cmocka_unit_test(a_node_that_is_off), cmocka_unit_test(a_cube_of_one),
+          cmocka_unit_test(a_node_that_loses_power_and_comes_back))

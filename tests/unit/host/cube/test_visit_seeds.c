@@ -82,27 +82,18 @@ static void storms(unsigned dimension, unsigned seeds, bool bare) {
     }
 }
 
-static void small_cubes(void **state) {
-    (void)state;
+TEST(small_cubes) {
     storms(4, SEEDS, false);
 }
 
-static void boards(void **state) {
-    (void)state;
+TEST(boards) {
     storms(4, SEEDS, true);
 }
 
-static void large_cubes(void **state) {
-    (void)state;
+TEST(large_cubes) {
     storms(6, LARGE, false);
     storms(6, LARGE, true);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(small_cubes),
-        cmocka_unit_test(boards),
-        cmocka_unit_test(large_cubes),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(small_cubes), cmocka_unit_test(boards),
+          cmocka_unit_test(large_cubes))

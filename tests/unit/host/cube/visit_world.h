@@ -3,17 +3,12 @@
 #ifndef TESTS_VISIT_WORLD_H
 #define TESTS_VISIT_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/sim/sim_world.h"
 #include "host/cube/visit.h"
+#include "tests/unit/test.h"
 
 enum { MEMORY = 640 * 1024, S = 1000000 };
 

@@ -1,21 +1,16 @@
 /* What starts a node on a board: words of a shell and of systemd, and the
  * node's memory. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/deploy/deploy.h"
 #include "host/deploy/script.h"
 #include "host/deploy/answer.h"
+#include "tests/unit/test.h"
 
 static const char *const cube =
     "dimension = 0; memory = \"1M\";\n"
@@ -37,8 +32,7 @@ static int free_cube(void **unused) {
     return 0;
 }
 
-static void test_where(void **unused) {
-    (void)unused;
+TEST(test_where) {
     assert_string_equal(host_cube_ssh(&file, 0)->to, "pi@board");
     assert_string_equal(host_cube_ssh(&file, 0)->folder, "a b");
     assert_null(host_cube_ssh(&file, 1));
@@ -55,8 +49,7 @@ static char *text_of(const char *manager) {
     return text;
 }
 
-static void test_service(void **unused) {
-    (void)unused;
+TEST(test_service) {
     char *text = text_of("system");
     assert_non_null(
         strstr(text, "\nExecStart= \"/home/p i/node-0/incode-node\" \"--node\" "
@@ -75,8 +68,7 @@ static void test_service(void **unused) {
     free(text);
 }
 
-static void test_start(void **unused) {
-    (void)unused;
+TEST(test_start) {
     char *text = text_of("none");
     assert_int_equal(strncmp(text, "#!/bin/sh\n", 10), 0);
     assert_non_null(strstr(text, "echo $$ > '/home/p i/node-0/pid'\n"));
@@ -85,8 +77,7 @@ static void test_start(void **unused) {
 }
 
 /* A shell hands the script its words as they were. */
-static void test_command(void **unused) {
-    (void)unused;
+TEST(test_command) {
     char *command = host_script_command("look", 7, "a 'b' $c");
     assert_non_null(command);
     assert_int_equal(strncmp(command, "exec sh -c ", 11), 0);
@@ -95,8 +86,7 @@ static void test_command(void **unused) {
     free(command);
 }
 
-static void test_programs(void **unused) {
-    (void)unused;
+TEST(test_programs) {
     static struct host_programs programs;
     struct host_error error = {0};
     char digits[HOST_SHA256_DIGITS + 1];
@@ -116,8 +106,7 @@ static void test_programs(void **unused) {
 
 /* Where the folder lacks it, what make has made for this machine's processor,
  * and for no other. */
-static void test_own_program(void **unused) {
-    (void)unused;
+TEST(test_own_program) {
     static struct host_programs programs;
     struct host_error error = {0};
     struct utsname here;
@@ -147,8 +136,7 @@ static void test_own_program(void **unused) {
     host_programs_free(&programs);
 }
 
-static void test_refused(void **unused) {
-    (void)unused;
+TEST(test_refused) {
     static const char *const bad[] = {"ssh = \"\"",
                                       "ssh = \"-oProxyCommand=x\"",
                                       "ssh = \"a b\"",

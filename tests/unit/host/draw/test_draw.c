@@ -1,13 +1,9 @@
 /* Sections of a cube that is cut into tetrahedra cover its section once,
  * wherever the plane is; pictures show just that. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <expat.h>
 #include <math.h>
 #include <png.h>
@@ -84,14 +80,13 @@ static double section_area(struct host_plane plane, double unit) {
     return area;
 }
 
-static void test_covers_the_section_once(void **unused) {
+TEST(test_covers_the_section_once) {
     /* The widest has sides that are no double any more. */
     static const double units[] = {1.0, 1e307, 4.9e-324, 5e307};
     static const double from[] = {0.0, 0.0, 0.0, -3.0};
     static const double at[] = {0.25,   1.0, 2.0, 3.3333333333333335,
                                 5.9999, 6.0};
     double *xyz = points.xyz, scaled[3 * ROWS * ROWS * ROWS];
-    (void)unused;
     points.xyz = scaled;
     for (size_t u = 0; u < sizeof units / sizeof units[0]; u++) {
         for (uint64_t i = 0; i < 3 * points.count; i++)
@@ -108,9 +103,8 @@ static void test_covers_the_section_once(void **unused) {
     points.xyz = xyz;
 }
 
-static void test_beside(void **unused) {
+TEST(test_beside) {
     static const double at[] = {-1.0, 0.0, 6.0000001, 1e300};
-    (void)unused;
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
         struct host_section section;
         struct host_error error = {0};
@@ -123,8 +117,7 @@ static void test_beside(void **unused) {
     }
 }
 
-static void test_default_plane(void **unused) {
-    (void)unused;
+TEST(test_default_plane) {
     struct host_plane plane = host_plane_through_middle(&points);
     assert_true(plane.axis == 2 && plane.at == 3.0);
     for (uint64_t i = 0; i < points.count; i++)
@@ -242,9 +235,8 @@ static struct drawing parse_svg(const char *text, long bytes) {
     return drawing;
 }
 
-static void test_svg(void **unused) {
+TEST(test_svg) {
     long bytes;
-    (void)unused;
     char *text = written("a.svg", 402, &bytes);
     struct drawing drawing = parse_svg(text, bytes);
     assert_int_equal(drawing.width, 402);
@@ -255,13 +247,12 @@ static void test_svg(void **unused) {
 }
 
 /* Cells below a pixel are one path element a pixel, and no more. */
-static void test_svg_merges(void **unused) {
+TEST(test_svg_merges) {
     struct host_cell cells[500];
     struct host_section section = {cells, 500, 0.0, {1, 1}, {1, 1}};
     struct host_picture picture = host_picture_of(&section, 102);
     struct host_output out;
     struct host_error error = {0};
-    (void)unused;
     memset(cells, 0, sizeof cells);
     for (unsigned i = 0; i < 500; i++) {
         cells[i].corners = 3;
@@ -274,12 +265,11 @@ static void test_svg_merges(void **unused) {
     assert_int_equal(host_output_close(&out, 1, &error), 0);
 }
 
-static void test_png(void **unused) {
+TEST(test_png) {
     enum { WIDTH = 122 };
     static png_byte pixels[WIDTH][WIDTH][3];
     png_image image = {.version = PNG_IMAGE_VERSION};
     long bytes;
-    (void)unused;
     char *file = written("a.PNG", WIDTH, &bytes);
     assert_int_not_equal(
         png_image_begin_read_from_memory(&image, file, (size_t)bytes), 0);
@@ -300,7 +290,7 @@ static void test_png(void **unused) {
 }
 
 /* What is covered adds up, also where it reaches out of the raster. */
-static void test_raster(void **unused) {
+TEST(test_raster) {
     enum { N = 16 };
     static float pixels[N * N][HOST_CHANNELS];
     static const float one[HOST_CHANNELS] = {0, 0, 0, 1.0f, 0};
@@ -310,7 +300,6 @@ static void test_raster(void **unused) {
                             {{20, 20}, {-4, 20}, {3.3, 7.1}},
                             {{-4, 20}, {-4, -4}, {3.3, 7.1}}};
     double triangle[3][2] = {{2, 2}, {12, 2}, {2, 12}}, sum = 0.0;
-    (void)unused;
     for (unsigned i = 0; i < 4; i++)
         host_raster_add(&raster, split[i], 3, one);
     for (unsigned i = 0; i < N * N; i++)

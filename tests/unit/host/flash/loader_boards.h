@@ -6,15 +6,9 @@
 #ifndef TESTS_LOADER_BOARDS_H
 #define TESTS_LOADER_BOARDS_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/flash/spread.h"
 #include "host/sim/sim_cube.h"
@@ -22,6 +16,7 @@
 #include "node/loader/loader.h"
 #include "node/node.h"
 #include "tests/unit/node/loader/loader_chip.h"
+#include "tests/unit/test.h"
 
 enum {
     NODES_MAX = 16,

@@ -3,18 +3,13 @@
 #ifndef TESTS_PLAYED_BOARDS_H
 #define TESTS_PLAYED_BOARDS_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/flash/spread.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 enum {
     NODES = 4,

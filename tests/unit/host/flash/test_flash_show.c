@@ -1,9 +1,5 @@
 /* What is said of an image's way: nodes of which the same is true share a line,
  * or a row where a terminal has fewer than there are nodes. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,10 +9,9 @@
 #include <pty.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/base/progress.h"
 #include "host/flash/flash.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 8, TEXT = 4000 };
 
@@ -70,8 +65,7 @@ static void print_cut(void) {
 }
 
 /* Ctrl-C: what each board does now, and the command that goes on. */
-static void test_cut(void **unused) {
-    (void)unused;
+TEST(test_cut) {
     node[0].phase = HOST_SPREAD_TAKES;
     node[1].phase = HOST_SPREAD_WHOLE;
     node[2].phase = HOST_SPREAD_VERIFIED;
@@ -105,8 +99,7 @@ static void print_changes(void) {
     host_progress_end();
 }
 
-static void nodes_of_a_kind_share_a_line(void **unused) {
-    (void)unused;
+TEST(nodes_of_a_kind_share_a_line) {
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i == 2   ? HOST_SPREAD_PASSED
                         : i == 7 ? HOST_SPREAD_LOST
@@ -122,8 +115,7 @@ static void nodes_of_a_kind_share_a_line(void **unused) {
                         "nodes 5-6: had mps2-an500 1.2, number 3 already\n");
 }
 
-static void a_plan_tells_what_runs_now(void **unused) {
-    (void)unused;
+TEST(a_plan_tells_what_runs_now) {
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i < 2 ? HOST_SPREAD_LEAVES : HOST_SPREAD_BEGINS;
         memcpy(seen[i].who.version, i == 0 ? "0.9" : "1.0", 3);
@@ -138,8 +130,7 @@ static void a_plan_tells_what_runs_now(void **unused) {
               "its loader\n");
 }
 
-static void where_there_is_no_terminal_there_are_lines(void **unused) {
-    (void)unused;
+TEST(where_there_is_no_terminal_there_are_lines) {
     capture(STDERR_FILENO, print_changes);
     assert_string_equal(text, "incode: flash: node 3: takes blocks\n"
                               "incode: flash: node 3: runs it\n");
@@ -159,10 +150,9 @@ static void take_all(int master, int slave) {
     text[size] = '\0';
 }
 
-static void a_small_terminal_has_several_nodes_a_row(void **unused) {
+TEST(a_small_terminal_has_several_nodes_a_row) {
     struct winsize size = {.ws_row = 5, .ws_col = 70};
     int master, slave, before = dup(STDERR_FILENO);
-    (void)unused;
     assert_int_equal(openpty(&master, &slave, NULL, NULL, &size), 0);
     assert_int_equal(dup2(slave, STDERR_FILENO), STDERR_FILENO);
     for (unsigned i = 0; i < NODES; i++) {
@@ -185,13 +175,13 @@ static void a_small_terminal_has_several_nodes_a_row(void **unused) {
 }
 
 int main(void) {
-#define TEST(name) cmocka_unit_test_setup(name, prepare)
+#define SET_UP_TEST(name) cmocka_unit_test_setup(name, prepare)
     const struct CMUnitTest tests[] = {
-        TEST(nodes_of_a_kind_share_a_line),
-        TEST(a_plan_tells_what_runs_now),
-        TEST(where_there_is_no_terminal_there_are_lines),
-        TEST(test_cut),
-        TEST(a_small_terminal_has_several_nodes_a_row),
+        SET_UP_TEST(nodes_of_a_kind_share_a_line),
+        SET_UP_TEST(a_plan_tells_what_runs_now),
+        SET_UP_TEST(where_there_is_no_terminal_there_are_lines),
+        SET_UP_TEST(test_cut),
+        SET_UP_TEST(a_small_terminal_has_several_nodes_a_row),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

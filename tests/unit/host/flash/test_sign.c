@@ -1,9 +1,5 @@
 /* Signing pairs and images as files: what is made is good, and what is not is
  * refused with a way on. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,13 +7,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/flash/sign.h"
 #include "host/nodes/cube_file.h"
 #include "transport/bytes.h"
 #include "transport/drivers/sign_sodium.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 enum { CODE = 5000, WORDS_MAX = 16 };
 
@@ -99,9 +94,8 @@ static enum loader_fault signed_by(const char *public) {
     return fault;
 }
 
-static void a_binary_becomes_an_image(void **unused) {
+TEST(a_binary_becomes_an_image) {
     struct host_image file;
-    (void)unused;
     make_image("lab");
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
     assert_int_equal(file.image.bytes, CODE);
@@ -116,9 +110,8 @@ static void a_binary_becomes_an_image(void **unused) {
     assert_int_equal(signed_by("other.pub"), LOADER_WRONG_KEY);
 }
 
-static void an_image_is_signed_anew_in_its_place(void **unused) {
+TEST(an_image_is_signed_anew_in_its_place) {
     struct host_image file;
-    (void)unused;
     make_image("lab");
     const char *const words[] = {in("image"), "--key", in("other"), NULL};
     assert_int_equal(sign(words), 0);
@@ -132,14 +125,13 @@ static void an_image_is_signed_anew_in_its_place(void **unused) {
 }
 
 /* "abc", as b2sum -l 256 has it. */
-static void the_digest_is_blake2b_of_name_and_code(void **unused) {
+TEST(the_digest_is_blake2b_of_name_and_code) {
     static const uint8_t expected[SIGN_DIGEST_BYTES] = {
         0xbd, 0xdd, 0x81, 0x3c, 0x63, 0x42, 0x39, 0x72, 0x31, 0x71, 0xef,
         0x3f, 0xee, 0x98, 0x57, 0x9b, 0x94, 0x96, 0x4e, 0x3b, 0xb1, 0xcb,
         0x3e, 0x42, 0x72, 0x62, 0xc8, 0xc0, 0x68, 0xd5, 0x23, 0x19};
     _Alignas(64) uint8_t hash[SIGN_HASH_BYTES];
     uint8_t digest[SIGN_DIGEST_BYTES];
-    (void)unused;
     sign_sodium.begin(hash);
     sign_sodium.add(hash, "a", 1);
     sign_sodium.add(hash, "bc", 2);
@@ -147,11 +139,10 @@ static void the_digest_is_blake2b_of_name_and_code(void **unused) {
     assert_memory_equal(digest, expected, sizeof digest);
 }
 
-static void false_code_and_false_signatures_are_found(void **unused) {
+TEST(false_code_and_false_signatures_are_found) {
     struct host_image file;
     uint8_t bytes[LOADER_HEADER_BYTES + CODE];
     struct loader_image image;
-    (void)unused;
     make_image("lab");
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
     memcpy(bytes, file.source.data, sizeof bytes);
@@ -191,11 +182,10 @@ static enum loader_fault refusal(const uint8_t *bytes, size_t size,
 }
 
 /* The CRC is no secret: who changes a bit makes it right again. */
-static void every_bit_of_an_image_is_held(void **unused) {
+TEST(every_bit_of_an_image_is_held) {
     enum { CRC = LOADER_HEADER_BYTES - 4, SIZE = LOADER_HEADER_BYTES + CODE };
     struct host_image file;
     uint8_t bytes[SIZE], whole[SIZE], key[SIGN_PUBLIC_BYTES];
-    (void)unused;
     make_image("lab");
     assert_int_equal(host_sign_public_read(key, in("lab.pub"), &error), 0);
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
@@ -214,10 +204,9 @@ static void every_bit_of_an_image_is_held(void **unused) {
 }
 
 /* At every length, and with a byte too many. */
-static void an_image_that_is_not_whole_is_refused(void **unused) {
+TEST(an_image_that_is_not_whole_is_refused) {
     struct host_image file;
     uint8_t bytes[LOADER_HEADER_BYTES + CODE + 1] = {0};
-    (void)unused;
     make_image("lab");
     assert_int_equal(host_image_open(&file, in("image"), &error), 0);
     memcpy(bytes, file.source.data, sizeof bytes - 1);
@@ -235,11 +224,10 @@ static void an_image_that_is_not_whole_is_refused(void **unused) {
     assert_int_equal(host_image_open(&file, in("no"), &error), HOST_INPUT);
 }
 
-static void a_file_without_an_end_is_no_image(void **unused) {
+TEST(a_file_without_an_end_is_no_image) {
     const char *const words[] = {"/dev/zero", "--key",      in("lab"),
                                  "--board",   "mps2-an500", NULL};
     struct host_image file;
-    (void)unused;
     error = (struct host_error){0};
     assert_int_equal(host_image_open(&file, "/dev/zero", &error), HOST_INPUT);
     assert_non_null(strstr(error.text, "the most that an image has; "));
@@ -254,9 +242,8 @@ static void refuses_key(const char *name, const char *what) {
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void keys_of_the_other_kind_are_refused(void **unused) {
+TEST(keys_of_the_other_kind_are_refused) {
     uint8_t public[SIGN_PUBLIC_BYTES];
-    (void)unused;
     make_image("lab");
     refuses_key("cube", "a cube's key");
     refuses_key("lab.pub", "a public half");
@@ -268,9 +255,8 @@ static void keys_of_the_other_kind_are_refused(void **unused) {
     assert_non_null(strstr(error.text, "secret half"));
 }
 
-static void a_secret_half_is_its_owner_s_alone(void **unused) {
+TEST(a_secret_half_is_its_owner_s_alone) {
     struct stat about;
-    (void)unused;
     make_image("lab");
     assert_int_equal(stat(in("lab"), &about), 0);
     assert_int_equal(about.st_mode & 07777, 0600);
@@ -282,8 +268,7 @@ static void a_secret_half_is_its_owner_s_alone(void **unused) {
 }
 
 /* Neither half replaces a file, and one alone is not left. */
-static void a_pair_is_made_whole_or_not_at_all(void **unused) {
-    (void)unused;
+TEST(a_pair_is_made_whole_or_not_at_all) {
     error = (struct host_error){0};
     assert_int_equal(host_sign_key_make(in("lab"), &error), HOST_INPUT);
     put("new.pub", "", 0);
@@ -296,7 +281,7 @@ static void a_pair_is_made_whole_or_not_at_all(void **unused) {
                      HOST_INPUT);
 }
 
-static void wrong_usage_is_told(void **unused) {
+TEST(wrong_usage_is_told) {
     static const char *const wrong[][2] = {
         {"--board", "linux"},
         {"--board", "mps3"},
@@ -307,7 +292,6 @@ static void wrong_usage_is_told(void **unused) {
         {"--version", ""},
         {"--version", "a\nb"},
         {"--version", "0123456789012345678901234"}};
-    (void)unused;
     for (unsigned i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         const char *const words[] = {in("code"),  "--key",     in("lab"),
                                      wrong[i][0], wrong[i][1], NULL};

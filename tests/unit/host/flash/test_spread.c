@@ -96,9 +96,8 @@ static void all_are_in(enum host_spread_phase phase) {
 }
 
 /* What goes with a generation is not waited for. */
-static void a_lost_generation_costs_no_wait(void **unused) {
+TEST(a_lost_generation_costs_no_wait) {
     uint64_t seconds[2];
-    (void)unused;
     for (unsigned i = 0; i < 2; i++) {
         (void)prepare(NULL);
         machine.serial_baud = 115200;
@@ -115,8 +114,7 @@ static void a_lost_generation_costs_no_wait(void **unused) {
     assert_true(seconds[1] <= seconds[0] + 3);
 }
 
-static void every_block_goes_once_to_all(void **unused) {
-    (void)unused;
+TEST(every_block_goes_once_to_all) {
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
     assert_int_equal(spread.sent, BLOCKS);
@@ -131,8 +129,7 @@ static void every_block_goes_once_to_all(void **unused) {
 
 /* What broken transfers have left is not sent again; what one lacks alone goes
  * to it alone. */
-static void only_what_is_lacking_is_sent(void **unused) {
-    (void)unused;
+TEST(only_what_is_lacking_is_sent) {
     for (unsigned i = 0; i < NODES; i++)
         memset(board[i].map, 0xff, 1); /* blocks 0 .. 7 */
     board[2].map[0] = 0xf7;            /* but for 3 */
@@ -144,8 +141,7 @@ static void only_what_is_lacking_is_sent(void **unused) {
     host_spread_close(&spread);
 }
 
-static void nodes_that_are_left_out_are_left_alone(void **unused) {
-    (void)unused;
+TEST(nodes_that_are_left_out_are_left_alone) {
     options.nodes = (struct host_node_set){{0}};
     host_node_set_add(&options.nodes, 1);
     assert_int_equal(run(), 0);
@@ -157,8 +153,7 @@ static void nodes_that_are_left_out_are_left_alone(void **unused) {
     host_spread_close(&spread);
 }
 
-static void what_is_lost_is_sent_again(void **unused) {
-    (void)unused;
+TEST(what_is_lost_is_sent_again) {
     loss = 30;
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
@@ -167,8 +162,7 @@ static void what_is_lost_is_sent_again(void **unused) {
     host_spread_close(&spread);
 }
 
-static void where_the_image_is_nothing_happens(void **unused) {
-    (void)unused;
+TEST(where_the_image_is_nothing_happens) {
     for (unsigned i = 0; i < NODES; i++)
         board[i].digest = NEW;
     assert_int_equal(run(), 0);
@@ -188,8 +182,7 @@ static void where_the_image_is_nothing_happens(void **unused) {
 }
 
 /* A board in its loader as it has nothing else, or as it was told to wait. */
-static void empty_boards_are_filled_and_named(void **unused) {
-    (void)unused;
+TEST(empty_boards_are_filled_and_named) {
     for (unsigned i = 0; i < NODES; i++) {
         board[i].kind = NODE_KIND_LOADER;
         board[i].digest = 0;
@@ -207,8 +200,7 @@ static void empty_boards_are_filled_and_named(void **unused) {
     host_spread_close(&spread);
 }
 
-static void who_refuses_has_its_old_image_back(void **unused) {
-    (void)unused;
+TEST(who_refuses_has_its_old_image_back) {
     board[2].refuses = LOADER_WRONG_KEY;
     assert_int_equal(run(), HOST_INPUT);
     is_in(2, HOST_SPREAD_REFUSED);
@@ -220,8 +212,7 @@ static void who_refuses_has_its_old_image_back(void **unused) {
     host_spread_close(&spread);
 }
 
-static void every_refusal_says_what_to_do(void **unused) {
-    (void)unused;
+TEST(every_refusal_says_what_to_do) {
     for (unsigned f = LOADER_GOOD + 1; f <= LOADER_FAULTS; f++) {
         (void)prepare(NULL);
         for (unsigned i = 0; i < NODES; i++)
@@ -239,8 +230,7 @@ static const char *known_board(void *unused, unsigned node) {
     return node == 1 ? "raspi3b" : node == 2 ? "linux" : "mps2-an500";
 }
 
-static void other_boards_are_passed_over_or_refused(void **unused) {
-    (void)unused;
+TEST(other_boards_are_passed_over_or_refused) {
     for (unsigned known = 0; known < 2; known++) {
         (void)prepare(NULL);
         board[1].name = "raspi3b";
@@ -261,8 +251,7 @@ static void other_boards_are_passed_over_or_refused(void **unused) {
     }
 }
 
-static void who_is_off_is_waited_for(void **unused) {
-    (void)unused;
+TEST(who_is_off_is_waited_for) {
     board[3].on = false;
     off_until_us[3] = 12000000;
     assert_int_equal(run(), 0);
@@ -271,8 +260,7 @@ static void who_is_off_is_waited_for(void **unused) {
     host_spread_close(&spread);
 }
 
-static void who_stays_off_is_named_and_the_others_are_done(void **unused) {
-    (void)unused;
+TEST(who_stays_off_is_named_and_the_others_are_done) {
     board[1].on = board[3].on = false;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -285,8 +273,7 @@ static void who_stays_off_is_named_and_the_others_are_done(void **unused) {
 }
 
 /* Whatever block it was at: it goes on from there. */
-static void lost_power_loses_nothing_that_is_written(void **unused) {
-    (void)unused;
+TEST(lost_power_loses_nothing_that_is_written) {
     for (uint32_t at = 1; at <= BLOCKS; at++) {
         (void)prepare(NULL);
         lose_power_at = at;
@@ -298,8 +285,7 @@ static void lost_power_loses_nothing_that_is_written(void **unused) {
     }
 }
 
-static void an_image_that_does_not_come_up_is_told(void **unused) {
-    (void)unused;
+TEST(an_image_that_does_not_come_up_is_told) {
     board[0].end = FALLS_BACK;
     board[1].end = STAYS;
     assert_int_equal(run(), HOST_CUBE);
@@ -314,8 +300,7 @@ static void an_image_that_does_not_come_up_is_told(void **unused) {
     host_spread_close(&spread);
 }
 
-static void a_loader_that_says_nothing_is_given_up(void **unused) {
-    (void)unused;
+TEST(a_loader_that_says_nothing_is_given_up) {
     board[2].mute = true;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -325,8 +310,7 @@ static void a_loader_that_says_nothing_is_given_up(void **unused) {
 }
 
 /* Its links are up, and pings are answered. */
-static void a_loader_that_takes_nothing_is_given_up(void **unused) {
-    (void)unused;
+TEST(a_loader_that_takes_nothing_is_given_up) {
     board[2].deaf = true;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -335,8 +319,7 @@ static void a_loader_that_takes_nothing_is_given_up(void **unused) {
     host_spread_close(&spread);
 }
 
-static void who_restarts_for_ever_is_given_up(void **unused) {
-    (void)unused;
+TEST(who_restarts_for_ever_is_given_up) {
     board[1].restless = true;
     options.patience_us = 1000000000;
     assert_int_equal(run(), HOST_CUBE);
@@ -346,8 +329,7 @@ static void who_restarts_for_ever_is_given_up(void **unused) {
     host_spread_close(&spread);
 }
 
-static void another_version_is_refused(void **unused) {
-    (void)unused;
+TEST(another_version_is_refused) {
     come_up(1);
     seen[1].who = (struct node_who){.protocol = NODE_PROTOCOL + 1};
     assert_int_equal(run(), HOST_INPUT);
@@ -356,8 +338,7 @@ static void another_version_is_refused(void **unused) {
     host_spread_close(&spread);
 }
 
-static void a_look_changes_nothing(void **unused) {
-    (void)unused;
+TEST(a_look_changes_nothing) {
     board[1].digest = NEW;
     board[2].on = false;
     for (unsigned i = 0; i < NODES; i++)
@@ -374,8 +355,7 @@ static void a_look_changes_nothing(void **unused) {
     host_spread_close(&spread);
 }
 
-static void a_cube_that_is_lost_ends_it(void **unused) {
-    (void)unused;
+TEST(a_cube_that_is_lost_ends_it) {
     lost = true;
     assert_int_equal(run(), HOST_CUBE);
     assert_string_equal(error.text, "host: no wire; plug it in");
@@ -383,8 +363,7 @@ static void a_cube_that_is_lost_ends_it(void **unused) {
 }
 
 /* Power, losses and absences by chance: each is done in the end. */
-static void chance_does_not_stop_it(void **unused) {
-    (void)unused;
+TEST(chance_does_not_stop_it) {
     for (uint32_t seed = 1; seed <= 300; seed++) {
         (void)prepare(NULL);
         random_state = seed;
@@ -405,29 +384,29 @@ static void chance_does_not_stop_it(void **unused) {
 }
 
 int main(void) {
-#define TEST(name) cmocka_unit_test_setup(name, prepare)
+#define SET_UP_TEST(name) cmocka_unit_test_setup(name, prepare)
     const struct CMUnitTest tests[] = {
-        TEST(every_block_goes_once_to_all),
-        TEST(a_lost_generation_costs_no_wait),
-        TEST(only_what_is_lacking_is_sent),
-        TEST(nodes_that_are_left_out_are_left_alone),
-        TEST(what_is_lost_is_sent_again),
-        TEST(where_the_image_is_nothing_happens),
-        TEST(empty_boards_are_filled_and_named),
-        TEST(who_refuses_has_its_old_image_back),
-        TEST(every_refusal_says_what_to_do),
-        TEST(other_boards_are_passed_over_or_refused),
-        TEST(who_is_off_is_waited_for),
-        TEST(who_stays_off_is_named_and_the_others_are_done),
-        TEST(lost_power_loses_nothing_that_is_written),
-        TEST(an_image_that_does_not_come_up_is_told),
-        TEST(a_loader_that_says_nothing_is_given_up),
-        TEST(a_loader_that_takes_nothing_is_given_up),
-        TEST(who_restarts_for_ever_is_given_up),
-        TEST(another_version_is_refused),
-        TEST(a_look_changes_nothing),
-        TEST(a_cube_that_is_lost_ends_it),
-        TEST(chance_does_not_stop_it),
+        SET_UP_TEST(every_block_goes_once_to_all),
+        SET_UP_TEST(a_lost_generation_costs_no_wait),
+        SET_UP_TEST(only_what_is_lacking_is_sent),
+        SET_UP_TEST(nodes_that_are_left_out_are_left_alone),
+        SET_UP_TEST(what_is_lost_is_sent_again),
+        SET_UP_TEST(where_the_image_is_nothing_happens),
+        SET_UP_TEST(empty_boards_are_filled_and_named),
+        SET_UP_TEST(who_refuses_has_its_old_image_back),
+        SET_UP_TEST(every_refusal_says_what_to_do),
+        SET_UP_TEST(other_boards_are_passed_over_or_refused),
+        SET_UP_TEST(who_is_off_is_waited_for),
+        SET_UP_TEST(who_stays_off_is_named_and_the_others_are_done),
+        SET_UP_TEST(lost_power_loses_nothing_that_is_written),
+        SET_UP_TEST(an_image_that_does_not_come_up_is_told),
+        SET_UP_TEST(a_loader_that_says_nothing_is_given_up),
+        SET_UP_TEST(a_loader_that_takes_nothing_is_given_up),
+        SET_UP_TEST(who_restarts_for_ever_is_given_up),
+        SET_UP_TEST(another_version_is_refused),
+        SET_UP_TEST(a_look_changes_nothing),
+        SET_UP_TEST(a_cube_that_is_lost_ends_it),
+        SET_UP_TEST(chance_does_not_stop_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,9 +4,8 @@
 #include "loader_boards.h"
 
 /* From empty boards, and again over a program that runs. */
-static void the_wire_is_kept_full(void **unused) {
+TEST(the_wire_is_kept_full) {
     double seconds[2];
-    (void)unused;
     for (unsigned i = 0; i < 2; i++) {
         open_world(4 * i, 1);
         seconds[i] = flash(&old);
@@ -22,9 +21,8 @@ static void the_wire_is_kept_full(void **unused) {
 
 /* Wires that carry a sixth of what is said of them, and drivers that take a
  * little, or whatever the links' windows hold, ahead of the wire. */
-static void of_slow_wires_answers_take_little(void **unused) {
+TEST(of_slow_wires_answers_take_little) {
     static const uint32_t rooms[] = {512, 8192};
-    (void)unused;
     for (unsigned k = 0; k < 2; k++) {
         double seconds[2];
         wires_are(115200, 19200, rooms[k]);
@@ -45,8 +43,7 @@ static void of_slow_wires_answers_take_little(void **unused) {
     wires_are(BAUD, BAUD, 512);
 }
 
-static void a_second_image_takes_the_first_s_place(void **unused) {
-    (void)unused;
+TEST(a_second_image_takes_the_first_s_place) {
     open_world(2, 2);
     (void)flash(&old);
     (void)flash(&new);
@@ -63,8 +60,7 @@ static void a_second_image_takes_the_first_s_place(void **unused) {
 /* A slot that had another image has to be erased, for longer than the wire
  * takes: what comes meanwhile waits in the links' windows.  Its way into the
  * loader, a second, included. */
-static void erasing_goes_beside_the_wire(void **unused) {
-    (void)unused;
+TEST(erasing_goes_beside_the_wire) {
     open_world(0, 3);
     (void)flash(&old);
     (void)flash(&new);
@@ -101,13 +97,12 @@ static bool is_named(const struct board *b, const uint8_t *serial) {
 }
 
 /* A board takes a name only with an image that the board's signer signed. */
-static void a_name_counts_within_a_transfer_alone(void **unused) {
+TEST(a_name_counts_within_a_transfer_alone) {
     struct loader_do_message name = {.what = LOADER_NAME,
                                      .serial = {1, 2, 3, 4, 5, 6, 7, 8}};
     struct loader_begin_message begin = {.transfer = 9, .bytes = old.bytes};
     struct loader_image forged = old.image;
     struct host_node_set all;
-    (void)unused;
     open_world(2, 4);
     host_node_set_all(&all, 4);
     assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
@@ -134,10 +129,9 @@ static void a_name_counts_within_a_transfer_alone(void **unused) {
     close_world();
 }
 
-static void a_loader_answers_as_a_node(void **unused) {
+TEST(a_loader_answers_as_a_node) {
     struct node_setup_message setup = {.protocol = NODE_PROTOCOL, .nodes = 4};
     struct host_node_set all;
-    (void)unused;
     open_world(2, 4);
     host_node_set_all(&all, 4);
     assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
@@ -174,10 +168,9 @@ static void a_loader_answers_as_a_node(void **unused) {
 }
 
 /* Its neighbours are flashed and run; it says what is wrong with it. */
-static void a_board_with_a_worn_flash_waits_and_says_so(void **unused) {
+TEST(a_board_with_a_worn_flash_waits_and_says_so) {
     struct node_setup_message setup = {.protocol = NODE_PROTOCOL, .nodes = 4};
     struct host_node_set all, worn = {{0}};
-    (void)unused;
     open_world(2, 4);
     host_node_set_all(&all, 4);
     host_node_set_add(&worn, 1);
@@ -239,8 +232,7 @@ static void befall(void) {
     strike_us = now_us + draw(400000);
 }
 
-static void losses_cost_time_alone(void **unused) {
-    (void)unused;
+TEST(losses_cost_time_alone) {
     for (uint64_t seed = 1; seed <= 12; seed++) {
         open_world((unsigned)seed % 4, seed);
         strike_us = 0;
@@ -270,10 +262,9 @@ static void hold_up(void) {
     strike_us = until_us + 1000 * draw(10000);
 }
 
-static void pauses_cost_time_alone(void **unused) {
+TEST(pauses_cost_time_alone) {
     static const uint32_t rooms[] = {512, 8192, 65536};
     double worst = 0;
-    (void)unused;
     for (uint64_t seed = 1; seed <= 8; seed++) {
         wires_are(115200, 19200, rooms[seed % 3]);
         faults.chance[SIM_LOSS] = seed % 4 == 1 ? 0.02 : 0;

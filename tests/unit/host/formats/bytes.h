@@ -6,18 +6,13 @@
 #define TESTS_BYTES_H
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/formats/read.h"
+#include "tests/unit/test.h"
 
 /* A file's bytes, put together piece by piece. */
 struct bytes {

@@ -2,8 +2,7 @@
 #include "bytes.h"
 #include "tests/unit/reference.h"
 
-static void ply_of_every_coding(void **unused) {
-    (void)unused;
+TEST(ply_of_every_coding) {
     static const char *const codings[] = {"ascii", "binary_little_endian",
                                           "binary_big_endian"};
     for (int coding = 0; coding < 3; coding++) {
@@ -69,8 +68,7 @@ static void ply_of_every_coding(void **unused) {
 }
 
 /* Four vertices and two faces, of which the header tells otherwise. */
-static void ply_is_as_long_as_it_says(void **unused) {
-    (void)unused;
+TEST(ply_is_as_long_as_it_says) {
     static const struct {
         int vertices, faces;
         const char *wrong;
@@ -115,8 +113,7 @@ static void put_npy(struct bytes *b, int version, const char *type,
     put_text(b, header);
 }
 
-static void npy_of_every_kind(void **unused) {
-    (void)unused;
+TEST(npy_of_every_kind) {
     static struct bytes b;
     for (unsigned bits = 0; bits < 64; bits++) {
         bool big = (bits & 1) != 0, wide = (bits & 2) != 0;
@@ -147,8 +144,7 @@ static void npy_of_every_kind(void **unused) {
 }
 
 /* Of another number of columns than points and tetrahedra have. */
-static void npy_of_other_shapes(void **unused) {
-    (void)unused;
+TEST(npy_of_other_shapes) {
     static const struct {
         const char *type, *columns, *why;
     } wrong[] = {{"<f8", "2", "2 columns where"},
@@ -194,8 +190,7 @@ static void npy_of_other_shapes(void **unused) {
     assert_non_null(strstr(error.text, "4 columns of floating-point numbers"));
 }
 
-static void binary_nan_is_named(void **unused) {
-    (void)unused;
+TEST(binary_nan_is_named) {
     struct bytes b = {.n = 0};
     put_text(&b, "ply\nformat binary_little_endian 1.0\nelement vertex 4\n"
                  "property float x\nproperty float y\nproperty float z\n"
@@ -213,8 +208,7 @@ static void binary_nan_is_named(void **unused) {
         strstr(error.text, "a.ply: point 2 (counted from 0): y is NaN; "));
 }
 
-static void plot3d_of_every_variant(void **unused) {
-    (void)unused;
+TEST(plot3d_of_every_variant) {
     for (int bits = 0; bits < 32; bits++) {
         bool big = (bits & 1) != 0, marks = (bits & 2) != 0;
         bool wide = (bits & 4) != 0, iblank = (bits & 16) != 0;
@@ -260,8 +254,7 @@ static void plot3d_of_every_variant(void **unused) {
 }
 
 /* Real files in more than one form hold the same points. */
-static void real_data(void **unused) {
-    (void)unused;
+TEST(real_data) {
     struct host_points points = {0};
     struct host_error error = {0};
     if (!reference_data("bluntfin.xyz.gz", &points)) {

@@ -16,8 +16,7 @@ static const char *list_of(enum host_use use) {
 }
 
 /* What help and messages say is what there is. */
-static void listed(void **unused) {
-    (void)unused;
+TEST(listed) {
     char text[HOST_FORMAT_LIST_MAX], small[16];
     static const enum host_use uses[] = {HOST_READ_POINTS, HOST_WRITE_POINTS,
                                          HOST_READ_TETRAHEDRA,
@@ -51,8 +50,7 @@ static void listed(void **unused) {
 }
 
 /* No extension is in two rows, nor ends another that is found before it. */
-static void found_by_extension(void **unused) {
-    (void)unused;
+TEST(found_by_extension) {
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
         assert_non_null(f->name);
@@ -90,8 +88,7 @@ static void found_by_extension(void **unused) {
 }
 
 /* By a name that an option gives, which is that of an extension. */
-static void told_by_name(void **unused) {
-    (void)unused;
+TEST(told_by_name) {
     struct host_error error = {0};
     const struct host_format *f;
     for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++) {
@@ -121,8 +118,7 @@ static void told_by_name(void **unused) {
     assert_non_null(strstr(error.text, "--format laz: its points are com"));
 }
 
-static void written_and_read_back(void **unused) {
-    (void)unused;
+TEST(written_and_read_back) {
     char list[HOST_FORMAT_LIST_MAX];
     struct host_points points, again;
     struct host_error error = {0};
@@ -153,8 +149,7 @@ static void written_and_read_back(void **unused) {
     host_points_free(&points);
 }
 
-static void packed_files(void **unused) {
-    (void)unused;
+TEST(packed_files) {
     const char *text = "-3 -2.5 -2\n-1.5 -1 -.5\n";
     struct bytes b = {.n = 0};
     for (int member = 0; member < 2; member++) {
@@ -194,8 +189,7 @@ static void packed_files(void **unused) {
     b.n = 0;
 }
 
-static void files_that_are_not_there(void **unused) {
-    (void)unused;
+TEST(files_that_are_not_there) {
     struct host_points points;
     struct host_error error = {0};
     assert_int_equal(host_points_read("/nowhere/a.xyz", &points, &error),

@@ -1,13 +1,9 @@
 /* All outputs get their names or none, and what fails leaves nothing new: not
  * by a signal, nor beyond the limit of a file's size. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -137,8 +133,7 @@ static int ended(int number, int closed, void (*ignored)(int)) {
     return status;
 }
 
-static void a_signal_leaves_no_parts(void **unused) {
-    (void)unused;
+TEST(a_signal_leaves_no_parts) {
     static const int numbers[] = {SIGINT, SIGTERM, SIGHUP};
     for (int i = 0; i < 3; i++) {
         for (int closed = 0; closed <= OUTPUTS; closed += 2) {
@@ -177,8 +172,7 @@ static const char *last_words(int number, const char *path) {
     return said;
 }
 
-static void a_signal_says_what_is_written(void **unused) {
-    (void)unused;
+TEST(a_signal_says_what_is_written) {
     assert_string_equal(last_words(SIGINT, names[0]),
                         "incode: interrupted; no output was written\n");
     assert_string_equal(last_words(SIGTERM, names[0]),
@@ -190,8 +184,7 @@ static void a_signal_says_what_is_written(void **unused) {
     assert_int_equal(files(), 0);
 }
 
-static void an_ignored_signal_stays_ignored(void **unused) {
-    (void)unused;
+TEST(an_ignored_signal_stays_ignored) {
     int status = ended(SIGHUP, 0, SIG_IGN);
     assert_true(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     assert_int_equal(files(), OUTPUTS);
@@ -199,8 +192,7 @@ static void an_ignored_signal_stays_ignored(void **unused) {
         take(names[k], "not whole");
 }
 
-static void a_signal_amid_the_names_is_too_late(void **unused) {
-    (void)unused;
+TEST(a_signal_amid_the_names_is_too_late) {
     for (int at = 1; at <= OUTPUTS; at++) {
         raise_at = at;
         int status = ended(0, OUTPUTS, SIG_DFL);
@@ -213,8 +205,7 @@ static void a_signal_amid_the_names_is_too_late(void **unused) {
 }
 
 /* More than one command line can ask for. */
-static void however_many_there_are(void **unused) {
-    (void)unused;
+TEST(however_many_there_are) {
     enum { MANY = 100 };
     int status = -1;
     pid_t child = fork();
@@ -237,8 +228,7 @@ static void however_many_there_are(void **unused) {
     assert_int_equal(files(), 0);
 }
 
-static void what_was_there_outlives_a_failure(void **unused) {
-    (void)unused;
+TEST(what_was_there_outlives_a_failure) {
     struct host_output out[OUTPUTS];
     struct host_error error = {0};
     put(names[1], "former");
@@ -261,8 +251,7 @@ static void fail_amid_the_names(struct host_error *error) {
     assert_int_equal(rmdir(names[2]), 0);
 }
 
-static void all_get_their_names_or_none(void **unused) {
-    (void)unused;
+TEST(all_get_their_names_or_none) {
     struct host_error error = {0};
     fail_amid_the_names(&error);
     assert_string_equal(error.text, "a.face: cannot be written (Is a "
@@ -271,8 +260,7 @@ static void all_get_their_names_or_none(void **unused) {
     take(names[0], "former");
 }
 
-static void what_cannot_be_kept_is_told(void **unused) {
-    (void)unused;
+TEST(what_cannot_be_kept_is_told) {
     struct host_error error = {0};
     no_links = true;
     fail_amid_the_names(&error);
@@ -281,8 +269,7 @@ static void what_cannot_be_kept_is_told(void **unused) {
     assert_int_equal(files(), 0);
 }
 
-static void what_a_killed_process_left_is_no_hindrance(void **unused) {
-    (void)unused;
+TEST(what_a_killed_process_left_is_no_hindrance) {
     struct host_output out[OUTPUTS], again;
     struct host_error error = {0}, other = {0};
     put(names[0], "former");
@@ -307,8 +294,7 @@ static void write_one(const char *path) {
     assert_int_equal(host_output_commit(&error), 0);
 }
 
-static void links_to_what_is_not_yet_are_followed(void **unused) {
-    (void)unused;
+TEST(links_to_what_is_not_yet_are_followed) {
     struct host_output out;
     struct host_error error = {0};
     assert_int_equal(mkdir("sub", 0777), 0);
@@ -338,8 +324,7 @@ static void leave_whole(const char *name, const char *former) {
         put(beside(name, "kept", lost), former);
 }
 
-static void cleaning_takes_no_more_than_was_made(void **unused) {
-    (void)unused;
+TEST(cleaning_takes_no_more_than_was_made) {
     assert_int_equal(mkdir("sub", 0777), 0);
     assert_int_equal(symlink("sub/file", "link"), 0);
     assert_int_equal(mkfifo("pipe", 0666), 0);
@@ -364,8 +349,7 @@ static void cleaning_takes_no_more_than_was_made(void **unused) {
 }
 
 /* Changed, or put there anew, while a run went on that failed. */
-static void cleaning_leaves_the_files_of_others(void **unused) {
-    (void)unused;
+TEST(cleaning_leaves_the_files_of_others) {
     put("file", "former");
     assert_int_equal(chmod("file", 0600), 0);
     put(beside("file", "part", lost), "part");
@@ -381,8 +365,7 @@ static void cleaning_leaves_the_files_of_others(void **unused) {
 }
 
 /* Nor does the process itself take more back than it has put there. */
-static void a_name_taken_over_is_left(void **unused) {
-    (void)unused;
+TEST(a_name_taken_over_is_left) {
     struct host_output out[OUTPUTS];
     struct host_error error = {0};
     open_all(out, &error);
@@ -396,8 +379,7 @@ static void a_name_taken_over_is_left(void **unused) {
     take(names[0], "of somebody else");
 }
 
-static void a_limit_is_an_error(void **unused) {
-    (void)unused;
+TEST(a_limit_is_an_error) {
     struct rlimit limit, little;
     struct host_output out[OUTPUTS];
     struct host_error error = {0};

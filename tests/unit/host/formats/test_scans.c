@@ -9,8 +9,7 @@ static void expect_text(const char *path, const char *text, uint64_t n) {
     expect_rows(path, &b, n);
 }
 
-static void pts_with_and_without_a_count(void **unused) {
-    (void)unused;
+TEST(pts_with_and_without_a_count) {
     static const char *const two[] = {
         "2\n-3 -2.5 -2 55 52 44 65\n-1.5 -1 -.5 228 228 230 225\n",
         "  2 \r\n-3 -2.5 -2\r\n-1.5 -1 -.5 -1200\r\n\r\n",
@@ -26,8 +25,7 @@ static void pts_with_and_without_a_count(void **unused) {
     refused("a.pts", "0\n", "holds no point");
 }
 
-static void obj_of_every_habit(void **unused) {
-    (void)unused;
+TEST(obj_of_every_habit) {
     static const char *const two[] = {
         ("# made here\nmtllib a.mtl\no v 1\nv -3 -2.5 -2\nv -1.5 -1 -.5\n"
          "vn 0 0 1\nvt 0 1\nvp 7 7 7\nf 1//1 2//1 1//1\n"),
@@ -50,8 +48,7 @@ static const char facet[] = "facet normal 0 -nan 1e999\n  outer loop\n"
                             "    vertex -3 -2.5 -2\n    vertex -1.5 -1 -.5\n"
                             "    vertex 0 .5 1\n  endloop\nendfacet\n";
 
-static void stl_as_text(void **unused) {
-    (void)unused;
+TEST(stl_as_text) {
     static const char *const forms[] = {
         "solid\n%sendsolid\n", "\r\nsolid a # solid\r\n%sEndSolid a\r\n",
         "solid a\nendsolid\nSOLID b\n%sendsolid b"};
@@ -81,8 +78,7 @@ static void stl_as_text(void **unused) {
 }
 
 /* A header of any bytes, also those with which text begins. */
-static void stl_in_binary(void **unused) {
-    (void)unused;
+TEST(stl_in_binary) {
     static const char *const headers[] = {"made here", "solid made here\n", ""};
     for (size_t i = 0; i < sizeof headers / sizeof headers[0]; i++) {
         struct bytes b = {.n = 0};
@@ -166,8 +162,7 @@ static void put_las(struct bytes *b, const struct las *las) {
     }
 }
 
-static void las_of_every_version(void **unused) {
-    (void)unused;
+TEST(las_of_every_version) {
     static struct bytes b;
     for (unsigned minor = 0; minor <= 4; minor++) {
         for (unsigned format = 0; format <= (minor < 4 ? 5 : 10); format++) {
@@ -193,8 +188,7 @@ static void las_of_every_version(void **unused) {
 }
 
 /* Rounded once by the product and once by the sum, in that order. */
-static void las_is_rounded_as_specified(void **unused) {
-    (void)unused;
+TEST(las_is_rounded_as_specified) {
     static struct bytes b;
     const struct las las = {
         .minor = 2, .header = 227, .length = 20, .rows = 1, .few = 1};
@@ -220,8 +214,7 @@ static void las_is_rounded_as_specified(void **unused) {
 }
 
 /* Of 1.0, whose points begin behind a signature: within the offset or not. */
-static void las_with_a_signature(void **unused) {
-    (void)unused;
+TEST(las_with_a_signature) {
     static struct bytes b;
     struct las las = {
         .header = 227, .length = 20, .rows = 3, .few = 3, .signature = true};
@@ -231,8 +224,7 @@ static void las_with_a_signature(void **unused) {
     expect_rows("a.las", &b, 3);
 }
 
-static void las_that_is_wrong(void **unused) {
-    (void)unused;
+TEST(las_that_is_wrong) {
     static const struct {
         struct las las;
         const char *why;

@@ -1,12 +1,8 @@
 /* A file, packed or not, that is larger than the memory allows is refused where
  * that is known, and says how large it is. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -63,8 +59,7 @@ static void pack(const char *name, int n) {
     assert_int_equal(gzclose(file), Z_OK);
 }
 
-static void what_unpacks_beyond_the_memory(void **unused) {
-    (void)unused;
+TEST(what_unpacks_beyond_the_memory) {
     struct host_source source;
     struct host_error error = {0};
     pack("large.xyz.gz", 70);
@@ -90,8 +85,7 @@ static void what_unpacks_beyond_the_memory(void **unused) {
 
 /* A window is enough for text, whatever it unpacks to: here all but the end is
  * blank, so that points take nothing. */
-static void text_beyond_the_memory(void **unused) {
-    (void)unused;
+TEST(text_beyond_the_memory) {
     static const char *const names[] = {"blank.xyz.gz", "blank.csv.gz",
                                         "blank.obj.gz"};
     static char lines[1 << 20];
@@ -118,8 +112,7 @@ static void text_beyond_the_memory(void **unused) {
 /* Of text that is unpacked piece by piece, each number and the place of a
  * mistake are as in a plain file, wherever a piece ends; so are rows of bytes.
  */
-static void pieces_are_as_the_whole(void **unused) {
-    (void)unused;
+TEST(pieces_are_as_the_whole) {
     enum { ROWS = 300000 };
     struct host_points points;
     struct host_error error = {0};
@@ -177,8 +170,7 @@ static void pieces_are_as_the_whole(void **unused) {
 }
 
 /* A header is whole, however little of a pipe comes at a time. */
-static void a_pipe_that_brings_little(void **unused) {
-    (void)unused;
+TEST(a_pipe_that_brings_little) {
     struct host_points points;
     struct host_error error = {0};
     gzFile file = gzopen("packed", "wb1");
@@ -206,8 +198,7 @@ static void a_pipe_that_brings_little(void **unused) {
 }
 
 /* A line that never ends is no text. */
-static void a_line_without_an_end(void **unused) {
-    (void)unused;
+TEST(a_line_without_an_end) {
     static char letters[1 << 20];
     struct host_points points;
     struct host_error error = {0};
@@ -228,8 +219,7 @@ static void a_line_without_an_end(void **unused) {
 }
 
 /* What is little is read however little is left: it may be more than half. */
-static void what_is_little(void **unused) {
-    (void)unused;
+TEST(what_is_little) {
     struct host_source source;
     struct host_error error = {0};
     pack("little.xyz.gz", 12);
@@ -242,8 +232,7 @@ static void what_is_little(void **unused) {
     assert_int_equal(unlink("little.xyz.gz"), 0);
 }
 
-static void a_plain_file_beyond_the_memory(void **unused) {
-    (void)unused;
+TEST(a_plain_file_beyond_the_memory) {
     struct host_source source;
     struct host_error error = {0};
     int file = open("huge.las", O_WRONLY | O_CREAT, 0666);
@@ -256,8 +245,7 @@ static void a_plain_file_beyond_the_memory(void **unused) {
     assert_int_equal(unlink("huge.las"), 0);
 }
 
-static void what_is_longer_than_its_caller_takes(void **unused) {
-    (void)unused;
+TEST(what_is_longer_than_its_caller_takes) {
     struct host_source source;
     struct host_error error = {0};
     assert_int_equal(host_source_open_bounded(&source, "/dev/zero", 5000,
@@ -311,8 +299,7 @@ static char *zeros_in_vtk(size_t points, size_t *bytes) {
     return file;
 }
 
-static void an_array_beyond_the_memory(void **unused) {
-    (void)unused;
+TEST(an_array_beyond_the_memory) {
     struct host_points points;
     struct host_error error = {0};
     size_t bytes;
@@ -333,8 +320,7 @@ static void an_array_beyond_the_memory(void **unused) {
 
 /* Numbers of a byte each become points of 24: these tell how many there were.
  */
-static void points_beyond_the_memory(void **unused) {
-    (void)unused;
+TEST(points_beyond_the_memory) {
     enum { ROWS = 4096 };
     static const double some[3 * ROWS];
     struct host_points points = {0};

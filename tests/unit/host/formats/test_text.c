@@ -2,8 +2,7 @@
  * its place. */
 #include "bytes.h"
 
-static void numbers_are_correctly_rounded(void **unused) {
-    (void)unused;
+TEST(numbers_are_correctly_rounded) {
     static const char *const hard[] = {
         "0",
         "-0",
@@ -85,8 +84,7 @@ static void read_cuts(const char *path, const struct bytes *b) {
     }
 }
 
-static void text_in_all_its_habits(void **unused) {
-    (void)unused;
+TEST(text_in_all_its_habits) {
     struct bytes b = {.n = 0};
     put_text(&b, "\xef\xbb\xbf# a comment\r\n\r\n-3 -2.5\t-2 # behind\r\n"
                  "  -1.5,-1 , -.5\n\n\n0;.5e0;1D0");
@@ -133,8 +131,7 @@ static void text_in_all_its_habits(void **unused) {
 }
 
 /* A line of names, // before comments, lines that end in CR alone. */
-static void text_of_other_tools(void **unused) {
-    (void)unused;
+TEST(text_of_other_tools) {
     static const struct {
         const char *path, *text;
         bool named;
@@ -172,8 +169,7 @@ static void text_of_other_tools(void **unused) {
 
 /* Commas that are decimal ones are refused; where they may be columns, that is
  * noted. */
-static void decimal_commas(void **unused) {
-    (void)unused;
+TEST(decimal_commas) {
     static const struct {
         const char *text;
         bool doubtful;
@@ -207,8 +203,7 @@ static void decimal_commas(void **unused) {
 }
 
 /* The first three count, whatever the others hold and however many they are. */
-static void columns_after_the_third(void **unused) {
-    (void)unused;
+TEST(columns_after_the_third) {
     static const struct {
         const char *path, *text;
         bool wide;
@@ -235,8 +230,7 @@ static void columns_after_the_third(void **unused) {
     }
 }
 
-static void text_faults_have_their_place(void **unused) {
-    (void)unused;
+TEST(text_faults_have_their_place) {
     refused("a.xyz", "1 2 3\n4 5 six\n", "a.xyz:2:5: 'six' is no number; ");
     refused("a.xyz", "1 2 3\n4 5 6x\n", "a.xyz:2:5: '6x' is no number; ");
     refused("a.xyz", "1 2 3\n\n4 nan 6\n", "a.xyz:3:3: NaN");
@@ -304,8 +298,7 @@ static void text_faults_have_their_place(void **unused) {
 }
 
 /* Bytes of zero are told as such, where they are. */
-static void binary_is_no_text(void **unused) {
-    (void)unused;
+TEST(binary_is_no_text) {
     static const struct {
         const char *path, *bytes, *where;
         size_t n;
@@ -326,8 +319,7 @@ static void binary_is_no_text(void **unused) {
 }
 
 /* What a header counts is what there is. */
-static void text_is_as_long_as_it_says(void **unused) {
-    (void)unused;
+TEST(text_is_as_long_as_it_says) {
     struct bytes b = {.n = 0};
     refused("a.node", "2 3 0 0\n1 1 2 3\n2 1 2 4\n# end\n\n3 1 2 5\n",
             "a.node:6:1: a row beyond the number of points");

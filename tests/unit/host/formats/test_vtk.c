@@ -3,8 +3,7 @@
 
 #include "bytes.h"
 
-static void vtk_legacy(void **unused) {
-    (void)unused;
+TEST(vtk_legacy) {
     struct bytes b = {.n = 0};
     put_text(&b, "# vtk DataFile Version 3.0\ntitle # with a hash\nASCII\n"
                  "DATASET POLYDATA\nPOINTS 3 float\n-3 -2.5 -2 -1.5 -1\n"
@@ -124,8 +123,7 @@ static void put_xml(struct bytes *b, int way, bool wide_header, bool packed,
     put_text(b, "</VTKFile>\n");
 }
 
-static void vtk_xml_of_every_coding(void **unused) {
-    (void)unused;
+TEST(vtk_xml_of_every_coding) {
     for (int way = 0; way < 5; way++) {
         for (int bits = 0; bits < 8; bits++) {
             struct bytes b = {.n = 0};

@@ -2,11 +2,7 @@
  * of wrong input refused with its place. */
 #include <dirent.h>
 #include <math.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,14 +10,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/formats/output.h"
 #include "host/formats/convert.h"
 #include "host/formats/read.h"
 #include "host/formats/write.h"
 #include "host/mesh/gen.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 struct folder {
     char name[64];
@@ -74,8 +69,7 @@ static void write_whole(const char *path, const struct host_points *points,
     assert_int_equal(host_output_commit(&error), 0);
 }
 
-static void written_and_read_back(void **unused) {
-    (void)unused;
+TEST(written_and_read_back) {
     static const char *const names[] = {"a.vtu",  "a.vtk", "a.msh",
                                         "a.mesh", "a.npy", "a.ele"};
     struct host_points points, read;
@@ -113,8 +107,7 @@ static void written_and_read_back(void **unused) {
 }
 
 /* .neigh and .face against all pairs of tetrahedra. */
-static void neighbours_are_right(void **unused) {
-    (void)unused;
+TEST(neighbours_are_right) {
     struct host_points points;
     struct host_tetrahedra tets;
     struct folder folder = make_folder();
@@ -163,8 +156,7 @@ static void neighbours_are_right(void **unused) {
     assert_int_equal(remove_folder(&folder), 4);
 }
 
-static void failures_leave_nothing(void **unused) {
-    (void)unused;
+TEST(failures_leave_nothing) {
     struct host_points points;
     struct host_tetrahedra tets;
     struct folder folder = make_folder();
@@ -202,8 +194,7 @@ static void failures_leave_nothing(void **unused) {
     assert_int_equal(remove_folder(&folder), 0);
 }
 
-static void links_are_followed(void **unused) {
-    (void)unused;
+TEST(links_are_followed) {
     struct host_points points;
     struct host_tetrahedra tets, again;
     struct host_error error = {0};
@@ -238,8 +229,7 @@ static void refused(const char *path, const char *text, const char *expected) {
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void faults_have_their_place(void **unused) {
-    (void)unused;
+TEST(faults_have_their_place) {
     refused("a.ele", "2 4 0\n0 0 1 2 3\n1 0 1 2\n", "a.ele:3:8: fewer than 4");
     refused("a.ele", "2 4 0\n0 0 1 2 3\n", "a.ele:3:1: the file ends");
     refused("a.ele", "1 4 0\n0 0 1 2 x\n", "a.ele:2:9: a whole number is due");
@@ -290,8 +280,7 @@ static void faults_have_their_place(void **unused) {
     refused("a.xyz", "1 2 3\n", "no format of tetrahedra");
 }
 
-static void other_writers_files(void **unused) {
-    (void)unused;
+TEST(other_writers_files) {
     static const char *const files[][2] = {
         {"a.vtk", "# vtk DataFile Version 5.1\nt\nASCII\n"
                   "DATASET UNSTRUCTURED_GRID\nPOINTS 5 float\n"
@@ -335,8 +324,7 @@ static void other_writers_files(void **unused) {
     }
 }
 
-static void conversion(void **unused) {
-    (void)unused;
+TEST(conversion) {
     struct host_points points;
     struct host_tetrahedra tets, again;
     struct host_error error = {0};
@@ -448,8 +436,7 @@ static void draw_numbers(double *x, int n, uint64_t *state) {
     }
 }
 
-static void fewest_digits(void **unused) {
-    (void)unused;
+TEST(fewest_digits) {
     enum { MANY = 4096, TEXT = 64 * MANY };
     static const struct {
         double x;
@@ -507,8 +494,7 @@ static void fewest_digits(void **unused) {
 
 /* The .node of the points stays as it is beside their .ele, whatever it is
  * called there; others are written. */
-static void input_is_left(void **unused) {
-    (void)unused;
+TEST(input_is_left) {
     struct host_points points;
     struct host_tetrahedra tets;
     struct host_error error = {0};

@@ -1,15 +1,11 @@
 /* Generated point sets: the same everywhere (known digests), and what their
  * names promise. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <nettle/sha2.h>
 
 #include "host/mesh/gen.h"
@@ -25,8 +21,7 @@ static struct host_points made(const char *kind, uint64_t n, uint64_t seed) {
     return points;
 }
 
-static void digests_are_known(void **unused) {
-    (void)unused;
+TEST(digests_are_known) {
     static const char *const known[][2] = {
         {"uniform", "93dad7296d99889e"},  {"bubbles", "1d3a6942e6d59fe0"},
         {"bluntfin", "c462303f05f2c400"}, {"sphere", "9dadb48db2822cbf"},
@@ -56,8 +51,7 @@ static double length(const double *p) {
     return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
 }
 
-static void shapes_are_as_named(void **unused) {
-    (void)unused;
+TEST(shapes_are_as_named) {
     struct host_points u = made("uniform", 5000, 1);
     double sum = 0;
     for (uint64_t i = 0; i < 15000; i++) {
@@ -86,8 +80,7 @@ static void shapes_are_as_named(void **unused) {
     host_points_free(&r);
 }
 
-static void surfaces_are_as_named(void **unused) {
-    (void)unused;
+TEST(surfaces_are_as_named) {
     struct host_points s = made("shell", 5000, 1);
     struct host_points c = made("cylinder", 5000, 1);
     struct host_points t = made("torus", 5000, 1);
@@ -103,8 +96,7 @@ static void surfaces_are_as_named(void **unused) {
     host_points_free(&t);
 }
 
-static void the_rest_is_as_named(void **unused) {
-    (void)unused;
+TEST(the_rest_is_as_named) {
     struct host_points t = made("terrain", 400, 1);
     struct host_points s = made("scales", 3000, 1);
     struct host_points l = made("lines", 400, 1);
@@ -129,8 +121,7 @@ static void the_rest_is_as_named(void **unused) {
 }
 
 /* As --help says it. */
-static void some_kinds_have_no_chance_in_them(void **unused) {
-    (void)unused;
+TEST(some_kinds_have_no_chance_in_them) {
     static const struct {
         const char *kind;
         bool chance;
@@ -151,8 +142,7 @@ static void some_kinds_have_no_chance_in_them(void **unused) {
     }
 }
 
-static void seeds_differ_and_points_do_not_repeat(void **unused) {
-    (void)unused;
+TEST(seeds_differ_and_points_do_not_repeat) {
     static const char *const kinds[] = {
         "uniform",  "bubbles", "sphere",  "hub",    "shell",
         "cylinder", "torus",   "terrain", "scales", "lines"};
@@ -174,8 +164,7 @@ static void seeds_differ_and_points_do_not_repeat(void **unused) {
     host_points_free(&fin);
 }
 
-static void wrong_requests_are_refused(void **unused) {
-    (void)unused;
+TEST(wrong_requests_are_refused) {
     struct host_points points;
     struct host_error error = {0};
     assert_int_equal(host_gen("cube", 100, 1, &points, &error), HOST_USAGE);

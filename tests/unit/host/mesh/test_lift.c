@@ -2,18 +2,13 @@
  * function of a sphere has less at a point than its bound; and the bounds are
  * close where the points are flat. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/lift.h"
 #include "host/mesh/order.h"
 #include "tests/unit/emulated.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 1;
 
@@ -231,8 +226,7 @@ static double check_all(making *make, size_t n) {
     return share;
 }
 
-static void no_point_is_outside(void **unused) {
-    (void)unused;
+TEST(no_point_is_outside) {
     static const struct {
         making *make;
         double least, most; /* share of lifted boxes of bricks */
@@ -318,16 +312,14 @@ static double excluding(making *make,
     return share;
 }
 
-static void flat_boxes_exclude(void **unused) {
-    (void)unused;
+TEST(flat_boxes_exclude) {
     assert_true(excluding(plane, balls_beside) > 0.99);
     assert_true(excluding(line, balls_beside) > 0.99);
     assert_true(excluding(sphere, ball_within) > 0.99);
 }
 
 /* A lump has the same shape whether it is of points or of lumps. */
-static void lumps_join(void **unused) {
-    (void)unused;
+TEST(lumps_join) {
     static _Alignas(64) struct incode_brick brick[INCODE_FANOUT];
     struct host_lump lump[INCODE_FANOUT], all, one;
     for (int b = 0; b < INCODE_FANOUT; b++) {

@@ -1,17 +1,12 @@
 /* How many tetrahedra are open at a time: few of a sheet, more of a volume, a
  * part of all where they reach across; none where there is no triangulation. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/gen.h"
 #include "host/mesh/order.h"
+#include "tests/unit/test.h"
 
 static uint64_t open_of(const double *xyz, uint64_t count) {
     struct host_order order = {0};
@@ -34,8 +29,7 @@ static uint64_t open_of_kind(const char *kind, uint64_t count) {
 }
 
 /* 8 n^(2/3) of a volume are not final; those open in the end are fewer. */
-static void test_growth(void **unused) {
-    (void)unused;
+TEST(test_growth) {
     double before = 0;
     for (uint64_t n = 4000; n <= 64000; n *= 4) {
         double open = (double)open_of_kind("uniform", n);
@@ -49,8 +43,7 @@ static void test_growth(void **unused) {
 
 /* Points on two lines askew: a tetrahedron for each pair of their intervals,
  * more than are counted. */
-static void test_across(void **unused) {
-    (void)unused;
+TEST(test_across) {
     enum { SIDE = 1000 };
     static double xyz[2 * SIDE][3];
     for (unsigned i = 0; i < SIDE; i++) {
@@ -60,19 +53,12 @@ static void test_across(void **unused) {
     assert_true(open_of(xyz[0], 2 * SIDE) > 10 * SIDE);
 }
 
-static void test_few(void **unused) {
-    (void)unused;
+TEST(test_few) {
     static const double xyz[5][3] = {
         {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}};
     assert_true(open_of(xyz[0], 5) <= 3);
     assert_true(open_of(xyz[0], 4) <= 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_growth),
-        cmocka_unit_test(test_across),
-        cmocka_unit_test(test_few),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_growth), cmocka_unit_test(test_across),
+          cmocka_unit_test(test_few))

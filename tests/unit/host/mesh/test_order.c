@@ -1,18 +1,13 @@
 /* The order of the points against plain definitions: every row once, regions
  * and boxes as stated, pages as nodes will see them. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/duplicates.h"
 #include "host/mesh/order.h"
 #include "incode/pages/pager.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 7;
 
@@ -219,8 +214,7 @@ static void check_all(double *xyz, size_t n, enum host_partition partition,
     host_order_free(&order);
 }
 
-static void every_row_once(void **unused) {
-    (void)unused;
+TEST(every_row_once) {
     const size_t sizes[] = {4, 5, 9, 63, 64, 65, 129, 1000, 2049, 70000};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         for (int levels = 0; levels <= 12; levels += 6) {
@@ -238,8 +232,7 @@ static void every_row_once(void **unused) {
 }
 
 /* Bricks as tight as a k-d arrangement makes them, and box pages too. */
-static void bricks_are_compact(void **unused) {
-    (void)unused;
+TEST(bricks_are_compact) {
     size_t n = 100000;
     double *xyz = random_points(n, 0);
     struct host_order order;
@@ -273,8 +266,7 @@ static void bricks_are_compact(void **unused) {
 }
 
 /* A region is a function of the points, whatever their order in the input. */
-static void shuffling_changes_no_region(void **unused) {
-    (void)unused;
+TEST(shuffling_changes_no_region) {
     size_t n = 5000;
     double *xyz = random_points(n, 9);
     struct host_order a, b;
@@ -309,8 +301,7 @@ static void shuffling_changes_no_region(void **unused) {
     free(xyz);
 }
 
-static void signed_zeros_are_one(void **unused) {
-    (void)unused;
+TEST(signed_zeros_are_one) {
     const double xyz[] = {0.0, 0.0, 0.0,  1, 0, 0, 0, 1, 0,   0, 0, 1,
                           -0., 0.0, -0.0, 1, 0, 0, 0, 1, -0., 2, 2, 2};
     struct host_order order;
@@ -331,8 +322,7 @@ static void signed_zeros_are_one(void **unused) {
 }
 
 /* Each thread counts its rows. */
-static void signed_zeros_are_counted(void **unused) {
-    (void)unused;
+TEST(signed_zeros_are_counted) {
     const size_t rows = (1 << 17) + 5;
     double *xyz = random_points(rows, 0);
     struct host_distinct distinct;
@@ -348,8 +338,7 @@ static void signed_zeros_are_counted(void **unused) {
     free(xyz);
 }
 
-static void extreme_coordinates(void **unused) {
-    (void)unused;
+TEST(extreme_coordinates) {
     double *xyz = random_points(3000, 0);
     for (size_t i = 0; i < 9000; i++) {
         int power = i % 7 == 0 ? 1023 : i % 7 == 1 ? -1074 : 0;
@@ -360,8 +349,7 @@ static void extreme_coordinates(void **unused) {
     free(xyz);
 }
 
-static void flat_input_is_refused(void **unused) {
-    (void)unused;
+TEST(flat_input_is_refused) {
     struct host_order order;
     struct host_error error = {0};
     double xyz[3 * 200];

@@ -1,15 +1,10 @@
 /* Spilled faces come back in order, brick by brick, from memory and from the
  * temporary file alike; against a plain model of lists. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/spill.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 3, BRICKS = 40, FACES_MAX = 4000 };
 
@@ -78,20 +73,17 @@ static void run(uint32_t blocks_memory) {
     host_spill_free(&spill);
 }
 
-static void test_in_memory(void **unused) {
-    (void)unused;
+TEST(test_in_memory) {
     run(0);
 }
 
-static void test_in_file(void **unused) {
-    (void)unused;
+TEST(test_in_file) {
     run(1);
     run(300);
 }
 
 /* A list taken out is apart from what is put afterwards. */
-static void test_detached(void **unused) {
-    (void)unused;
+TEST(test_detached) {
     struct host_spill spill;
     struct host_error error = {0};
     struct incode_face first = {{64, 1, 2}}, second = {{65, 3, 4}}, got;
@@ -117,8 +109,7 @@ static void test_detached(void **unused) {
 
 /* Marks of a vertex that come many times over are one; they come back before
  * the faces, and the faces of one node can be seen without taking them. */
-static void test_marks(void **unused) {
-    (void)unused;
+TEST(test_marks) {
     struct host_spill spill;
     struct host_error error = {0};
     struct incode_face got[8], *faces = NULL;
@@ -153,12 +144,5 @@ static void test_marks(void **unused) {
     host_spill_free(&spill);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_in_memory),
-        cmocka_unit_test(test_in_file),
-        cmocka_unit_test(test_detached),
-        cmocka_unit_test(test_marks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_in_memory), cmocka_unit_test(test_in_file),
+          cmocka_unit_test(test_detached), cmocka_unit_test(test_marks))

@@ -1,16 +1,11 @@
 /* The list of tetrahedra: canonical order against a plain sort, the digest
  * against a known one. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/adjacency.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 3;
 
@@ -90,8 +85,7 @@ static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd) {
     free(key);
 }
 
-static void order_is_canonical(void **unused) {
-    (void)unused;
+TEST(order_is_canonical) {
     check_sort(1, 4, 4);
     check_sort(24, 4, 4);
     check_sort(1000, 12, 3);
@@ -101,8 +95,7 @@ static void order_is_canonical(void **unused) {
     check_sort(300000, 20000000, 5);
 }
 
-static void every_permutation_keeps_its_sign(void **unused) {
-    (void)unused;
+TEST(every_permutation_keeps_its_sign) {
     for (int code = 0; code < 256; code++) {
         uint32_t v[4] = {(uint32_t)code & 3, (uint32_t)code >> 2 & 3,
                          (uint32_t)code >> 4 & 3, (uint32_t)code >> 6};
@@ -122,8 +115,7 @@ static void every_permutation_keeps_its_sign(void **unused) {
     }
 }
 
-static void digests_are_known(void **unused) {
-    (void)unused;
+TEST(digests_are_known) {
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
     host_digest(&tets, &digest);
@@ -139,8 +131,7 @@ static void digests_are_known(void **unused) {
     host_tetrahedra_free(&tets);
 }
 
-static void mapping_and_cutting(void **unused) {
-    (void)unused;
+TEST(mapping_and_cutting) {
     struct host_tetrahedra tets = {0};
     const uint32_t map[5] = {50, 40, 30, 20, 10};
     for (int i = 0; i < 1000; i++)
@@ -158,8 +149,7 @@ static void mapping_and_cutting(void **unused) {
 }
 
 /* Beyond what numbers a neighbour: told before a tetrahedron is looked at. */
-static void too_many_for_neighbours(void **unused) {
-    (void)unused;
+TEST(too_many_for_neighbours) {
     const struct host_tetrahedra tets = {.count = UINT32_MAX};
     struct host_adjacency adjacency;
     struct host_error error = {0};

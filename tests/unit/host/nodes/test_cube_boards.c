@@ -1,15 +1,10 @@
 /* Bare boards in a cube file: which nodes they are, what they need, and what
  * their links are called. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/nodes/cube_file.h"
+#include "tests/unit/test.h"
 
 #define HOST_WIRE "{ node = 0; to = \"host\"; unix = \"h\"; }"
 #define M7 "board = \"mps2-an500\"; "
@@ -23,10 +18,9 @@ static int parse(const char *text) {
 }
 
 /* No link between them is needed in the file. */
-static void all_nodes_are_of_a_board(void **unused) {
+TEST(all_nodes_are_of_a_board) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     char line[400];
-    (void)unused;
     assert_int_equal(parse("dimension = 4; " M7 "links = (" HOST_WIRE ");"), 0);
     assert_string_equal(file.board->name, "mps2-an500");
     for (unsigned i = 0; i < 16; i++)
@@ -48,9 +42,8 @@ static const char *const mixed =
     "  { node = 1; to = 3; serial = [\"/dev/ttyUSB0\", \"/dev/ttyUSB1\"]; },\n"
     "  { node = 2; to = 3; unix = \"23\"; } );\n";
 
-static void nodes_are_of_several_boards(void **unused) {
+TEST(nodes_are_of_several_boards) {
     char line[400];
-    (void)unused;
     assert_int_equal(parse(mixed), 0);
     assert_string_equal(file.board->name, "mixed");
     assert_string_equal(file.board_of[0]->name, "mps2-an385");
@@ -65,8 +58,7 @@ static void nodes_are_of_several_boards(void **unused) {
 }
 
 /* The whole is named, or where nothing is said of a board, linux. */
-static void one_board_is_no_mixture(void **unused) {
-    (void)unused;
+TEST(one_board_is_no_mixture) {
     assert_int_equal(parse("dimension = 0; " M7
                            "nodes = ( { node = 0; board = \"linux\"; "
                            "} ); links = (" HOST_WIRE ");"),
@@ -76,7 +68,7 @@ static void one_board_is_no_mixture(void **unused) {
     host_cube_file_free(&file);
 }
 
-static void what_a_board_has_not(void **unused) {
+TEST(what_a_board_has_not) {
     static const struct {
         const char *text, *said;
     } cases[] = {
@@ -120,7 +112,6 @@ static void what_a_board_has_not(void **unused) {
         {"dimension = 0;\nnodes = ( { node = 0; bord = 1; } ); links = "
          "(" HOST_WIRE ");",
          "a.cube:2: bord: "}};
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         assert_int_equal(parse(cases[i].text), HOST_INPUT);
         if (strstr(error.text, cases[i].said) == NULL ||
@@ -129,12 +120,7 @@ static void what_a_board_has_not(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(all_nodes_are_of_a_board),
-        cmocka_unit_test(nodes_are_of_several_boards),
-        cmocka_unit_test(one_board_is_no_mixture),
-        cmocka_unit_test(what_a_board_has_not),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(all_nodes_are_of_a_board),
+          cmocka_unit_test(nodes_are_of_several_boards),
+          cmocka_unit_test(one_board_is_no_mixture),
+          cmocka_unit_test(what_a_board_has_not))

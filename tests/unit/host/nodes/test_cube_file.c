@@ -1,18 +1,13 @@
 /* The cube file: what it says is what nodes are started with, and what is wrong
  * in it is named with its line. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/nodes/cube_file.h"
+#include "tests/unit/test.h"
 
 static char directory[] = "/tmp/incode-cube.XXXXXX";
 static char path[64], key_path[64];
@@ -64,11 +59,10 @@ static bool named(char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES],
     return found;
 }
 
-static void nodes_are_started_as_it_says(void **unused) {
+TEST(nodes_are_started_as_it_says) {
     static struct host_cube_file file;
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};
-    (void)unused;
     write_file(path, good);
     assert_int_equal(host_cube_file_read(&file, path, &error), 0);
     assert_int_equal(file.nodes, 2);
@@ -111,7 +105,7 @@ static const char *const local =
 
 /* Paths beside the file or from the root, wires that are insecure, and what
  * the statistics call them all. */
-static void wires_without_a_key(void **unused) {
+TEST(wires_without_a_key) {
     static const struct {
         const char *one, *two, *first, *second, *insecure, *link;
     } cases[] = {
@@ -127,7 +121,6 @@ static void wires_without_a_key(void **unused) {
     static char options[HOST_NODE_OPTIONS_MAX][HOST_NODE_OPTION_BYTES];
     struct host_error error = {0};
     char text[1024], second[HOST_NODE_OPTION_BYTES];
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         snprintf(text, sizeof text, local, cases[i].one, cases[i].two);
         write_file(path, text);
@@ -222,9 +215,8 @@ static const struct {
      ":4: ", "no.such.host.invalid", 4},
 };
 
-static void mistakes_are_named(void **unused) {
+TEST(mistakes_are_named) {
     static struct host_cube_file file;
-    (void)unused;
     for (size_t i = 0; i < sizeof mistakes / sizeof mistakes[0]; i++) {
         char where[96];
         struct host_error error = {0};
@@ -242,7 +234,7 @@ static void mistakes_are_named(void **unused) {
 
 /* Of each setting a value of another type, and one that is another number
  * where it is cut to an int.  Lines as in the good file. */
-static void other_types_are_no_values(void **unused) {
+TEST(other_types_are_no_values) {
     static const struct {
         const char *old, *new, *what;
     } cases[] = {
@@ -289,7 +281,6 @@ static void other_types_are_no_values(void **unused) {
         {"rtscts = true", "rtscts = \"true\"", ":6: rtscts: "},
     };
     static struct host_cube_file file;
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         char expected[128];
         struct host_error error = {0};
@@ -303,7 +294,7 @@ static void other_types_are_no_values(void **unused) {
 }
 
 /* What the library would follow, or not come back from, it never sees. */
-static void what_the_library_is_not_given(void **unused) {
+TEST(what_the_library_is_not_given) {
     static const struct {
         const char *text, *said;
     } cases[] = {
@@ -323,7 +314,6 @@ static void what_the_library_is_not_given(void **unused) {
     static struct host_cube_file file;
     static char many[4096];
     struct host_error error = {0};
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         error = (struct host_error){0};
         assert_int_equal(
@@ -338,7 +328,7 @@ static void what_the_library_is_not_given(void **unused) {
     assert_non_null(strstr(error.text, ":1: more settings"));
 }
 
-static void files_that_are_not_taken(void **unused) {
+TEST(files_that_are_not_taken) {
     static const struct {
         const char *path, *what;
     } others[] = {{"/no/such.cube", "No such file"},
@@ -347,7 +337,6 @@ static void files_that_are_not_taken(void **unused) {
                   {"/dev/null", "a pipe or device; "}};
     static struct host_cube_file file;
     struct host_error error = {0};
-    (void)unused;
     for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
         error = (struct host_error){0};
         assert_int_equal(host_cube_file_read(&file, others[i].path, &error), 3);

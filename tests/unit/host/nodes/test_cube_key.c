@@ -1,8 +1,4 @@
 /* A cube's key: a file of its own, for its owner alone, or none. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,10 +8,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/nodes/cube_file.h"
 #include "transport/drivers/secure_sodium.h"
+#include "tests/unit/test.h"
 
 static char directory[] = "/tmp/incode-key.XXXXXX";
 static char path[64];
@@ -32,11 +27,10 @@ static int tear_down(void **unused) {
     return rmdir(directory);
 }
 
-static void a_key_is_for_its_owner_alone(void **unused) {
+TEST(a_key_is_for_its_owner_alone) {
     static const mode_t masks[] = {0, 022, 0777};
     uint8_t key[3][SECURE_KEY_BYTES];
     struct stat about;
-    (void)unused;
     for (unsigned i = 0; i < 3; i++) {
         struct host_error error = {0};
         mode_t before = umask(masks[i]);
@@ -53,11 +47,10 @@ static void a_key_is_for_its_owner_alone(void **unused) {
     assert_memory_not_equal(key[1], key[2], SECURE_KEY_BYTES);
 }
 
-static void a_file_that_is_there_stays(void **unused) {
+TEST(a_file_that_is_there_stays) {
     uint8_t key[SECURE_KEY_BYTES], same[SECURE_KEY_BYTES];
     struct host_error error = {0};
     char link[80];
-    (void)unused;
     assert_int_equal(host_key_make(path, &error), 0);
     assert_int_equal(key_file_read(path, key), KEY_FILE_GOOD);
     assert_int_equal(host_key_make(path, &error), HOST_INPUT);
@@ -75,10 +68,9 @@ static void a_file_that_is_there_stays(void **unused) {
 }
 
 /* A disk without room for it: as a limit of the size of files shows it. */
-static void what_cannot_be_written_leaves_nothing(void **unused) {
+TEST(what_cannot_be_written_leaves_nothing) {
     struct rlimit before, none;
     struct host_error error = {0};
-    (void)unused;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
     none = before;
     none.rlim_cur = 10; /* a part of it can be */

@@ -1,15 +1,10 @@
 /* Reset and boot lines in a cube file: of GPIO chips, and DTR and RTS of the
  * host's ports. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/nodes/cube_file.h"
+#include "tests/unit/test.h"
 
 static struct host_cube_file file;
 static struct host_error error;
@@ -23,8 +18,7 @@ static int parse(const char *text) {
 #define LINKS                                                                  \
     "links = (" HOST_WIRE ", { node = 0; to = 1; unix = \"01\"; } );\n"
 
-static void lines_of_chips(void **unused) {
-    (void)unused;
+TEST(lines_of_chips) {
     assert_int_equal(
         parse("dimension = 1;\n"
               "nodes = ( { node = 0; board = \"linux\"; },\n"
@@ -56,8 +50,7 @@ static void lines_of_chips(void **unused) {
 #define SERIAL "serial = [\"/dev/uart\", \"/dev/ttyUSB0\"]; "
 
 /* The second wire of the host has lines of its own. */
-static void lines_of_ports(void **unused) {
-    (void)unused;
+TEST(lines_of_ports) {
     assert_int_equal(
         parse("dimension = 1; links = (\n"
               "{ node = 0; to = 1; unix = \"01\"; },\n"
@@ -89,10 +82,9 @@ static void lines_of_ports(void **unused) {
 }
 
 /* Many boards, each with both. */
-static void room_for_all(void **unused) {
+TEST(room_for_all) {
     static char text[64 * 200];
     size_t used = 0;
-    (void)unused;
     used += (size_t)snprintf(
         text, sizeof text, "dimension = 4; board = \"mps2-an500\"; nodes = (");
     for (unsigned i = 0; i < 16; i++) {
@@ -119,7 +111,7 @@ static void refuse(const char *text, const char *said) {
         fail_msg("%s: %s", text, error.text);
 }
 
-static void what_is_wrong_with_a_chips(void **unused) {
+TEST(what_is_wrong_with_a_chips) {
     static const char *const cases[][2] = {
         {"reset = 17;", "a.cube:2: reset: no group in braces; "},
         {"reset = { line = 1; };", "a.cube:2: reset: chip: not given"},
@@ -147,7 +139,6 @@ static void what_is_wrong_with_a_chips(void **unused) {
          "a.cube:2: reset: chip: not given, or no name of 1 to 63"},
     };
     char text[600];
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         snprintf(text, sizeof text,
                  "dimension = 1; nodes = ( {\n%s node = 0; } ); " LINKS,
@@ -156,7 +147,7 @@ static void what_is_wrong_with_a_chips(void **unused) {
     }
 }
 
-static void what_is_wrong_with_a_ports(void **unused) {
+TEST(what_is_wrong_with_a_ports) {
     static const char *const cases[][2] = {
         {"{ node = 0; to = \"host\"; " SERIAL "dtr = \"rst\"; }",
          "a.cube:2: dtr: does neither; give "},
@@ -174,7 +165,6 @@ static void what_is_wrong_with_a_ports(void **unused) {
          "a.cube:2: rts: not at a wire of the host"},
     };
     char text[600];
-    (void)unused;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         snprintf(text, sizeof text, "dimension = 1; links = (\n%s );",
                  cases[i][0]);
@@ -187,13 +177,7 @@ static void what_is_wrong_with_a_ports(void **unused) {
            "a.cube:3: reset: node 0 has one in line 2; leave one of them out");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(lines_of_chips),
-        cmocka_unit_test(lines_of_ports),
-        cmocka_unit_test(room_for_all),
-        cmocka_unit_test(what_is_wrong_with_a_chips),
-        cmocka_unit_test(what_is_wrong_with_a_ports),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(lines_of_chips), cmocka_unit_test(lines_of_ports),
+          cmocka_unit_test(room_for_all),
+          cmocka_unit_test(what_is_wrong_with_a_chips),
+          cmocka_unit_test(what_is_wrong_with_a_ports))

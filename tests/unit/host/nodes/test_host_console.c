@@ -1,14 +1,9 @@
 /* What a board's console says is heard among frames, and a fault is kept. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/nodes/port.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 #define START "incode: mps2-an500: started, version 1, after power on\r\n"
 #define REPORT                                                                 \
@@ -22,9 +17,8 @@ static void hear_record(struct host_console *console, const char *text) {
     host_console_hear(console, end, sizeof end);
 }
 
-static void a_fault_is_kept(void **unused) {
+TEST(a_fault_is_kept) {
     struct host_console console;
-    (void)unused;
     host_console_init(&console, 3, "mps2-an500");
     assert_null(host_console_fault(&console));
     hear_record(&console, START);
@@ -38,12 +32,11 @@ static void a_fault_is_kept(void **unused) {
 }
 
 /* Frames that hold the same bytes, whole and in pieces, are no records. */
-static void frames_are_passed_over(void **unused) {
+TEST(frames_are_passed_over) {
     static uint8_t wire[FRAME_ENCODED(LINK_MESSAGE_MAX) + FRAME_SLACK];
     static uint8_t payload[LINK_MESSAGE_MAX];
     struct frame_header header = {.session = 0x01010101, .size = 1500};
     struct host_console console;
-    (void)unused;
     host_console_init(&console, 0, "mps2-an500");
     for (unsigned round = 0; round < 300; round++) {
         memset(payload, 0xff, sizeof payload);
@@ -60,11 +53,10 @@ static void frames_are_passed_over(void **unused) {
 }
 
 /* No text is too long. */
-static void a_long_record_is_cut(void **unused) {
+TEST(a_long_record_is_cut) {
     static const char end[] = "; restarting";
     static char text[3 * HOST_CONSOLE_TEXT];
     struct host_console console;
-    (void)unused;
     host_console_init(&console, 1, "board");
     memset(text, 'x', sizeof text - 1);
     for (size_t i = 0; i < sizeof end - 1; i++)
@@ -88,12 +80,11 @@ static int take(void *context, const uint8_t *bytes, size_t size) {
     return (int)size;
 }
 
-static void a_pipe_stays_as_it_is(void **unused) {
+TEST(a_pipe_stays_as_it_is) {
     struct host_console console;
     uint8_t bytes[7];
     size_t at = 0, got = 0;
     int n;
-    (void)unused;
     host_console_init(&console, 0, "mps2-an500");
     struct link_pipe pipe =
         host_console_pipe(&console, (struct link_pipe){&at, take, bring});
@@ -105,12 +96,7 @@ static void a_pipe_stays_as_it_is(void **unused) {
     assert_int_equal(console.faults, 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_fault_is_kept),
-        cmocka_unit_test(frames_are_passed_over),
-        cmocka_unit_test(a_long_record_is_cut),
-        cmocka_unit_test(a_pipe_stays_as_it_is),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_fault_is_kept),
+          cmocka_unit_test(frames_are_passed_over),
+          cmocka_unit_test(a_long_record_is_cut),
+          cmocka_unit_test(a_pipe_stays_as_it_is))

@@ -1,16 +1,11 @@
 /* An emulator's monitor: asked, late, lost, and another than before. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #include "host/base/error.h"
 #include "host/nodes/emulator.h"
 #include "transport/drivers/unix_file.h"
+#include "tests/unit/test.h"
 
 #define GREETING "{\"QMP\": {\"version\": {}, \"capabilities\": []}}\r\n"
 #define EVENT "{\"event\": \"RESET\", \"data\": {\"guest\": false}}\r\n"
@@ -44,8 +39,7 @@ static void heard(const char *expected) {
     assert_string_equal(text, expected);
 }
 
-static void requests_are_answered(void **unused) {
-    (void)unused;
+TEST(requests_are_answered) {
     say(GREETING GOOD EVENT GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
     heard("{\"execute\":\"qmp_capabilities\"}\n{\"execute\":\"stop\"}\n");
@@ -54,8 +48,7 @@ static void requests_are_answered(void **unused) {
     heard("{\"execute\":\"cont\"}\n");
 }
 
-static void a_refusal_is_told(void **unused) {
-    (void)unused;
+TEST(a_refusal_is_told) {
     say(GREETING GOOD BAD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_RESET, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "refuses"));
@@ -63,9 +56,8 @@ static void a_refusal_is_told(void **unused) {
 
 /* Nothing waits for ever, nor as long as usual where less was asked for.
  * Where the machine is held up for ten seconds, it has more turns. */
-static void silence_ends(void **unused) {
+TEST(silence_ends) {
     uint64_t took_us = HOST_QMP_US;
-    (void)unused;
     qmp.wait_us = 200000;
     say(GREETING);
     for (unsigned turn = 0; turn < 20 && took_us >= HOST_QMP_US; turn++) {
@@ -78,16 +70,14 @@ static void silence_ends(void **unused) {
     assert_true(took_us < HOST_QMP_US);
 }
 
-static void its_end_is_told(void **unused) {
-    (void)unused;
+TEST(its_end_is_told) {
     close(ends[1]);
     ends[1] = dup(ends[0]);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_RESET, &error), HOST_CUBE);
 }
 
 /* What is left of the process before is passed over. */
-static void another_process_is_greeted(void **unused) {
-    (void)unused;
+TEST(another_process_is_greeted) {
     say(GREETING GOOD GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
     say(EVENT "{\"ret");
@@ -99,9 +89,8 @@ static void another_process_is_greeted(void **unused) {
 }
 
 /* A line that has no room is passed over whole. */
-static void a_long_line_is_passed_over(void **unused) {
+TEST(a_long_line_is_passed_over) {
     static char line[2 * HOST_QMP_LINE];
-    (void)unused;
     memset(line, ' ', sizeof line - 1);
     say(line);
     say("{\"QMP\": 1}\r\n" GREETING GOOD GOOD);
@@ -109,17 +98,12 @@ static void a_long_line_is_passed_over(void **unused) {
     heard("{\"execute\":\"qmp_capabilities\"}\n{\"execute\":\"stop\"}\n");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(requests_are_answered, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_refusal_is_told, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(silence_ends, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(its_end_is_told, set_up, tear_down),
-        cmocka_unit_test_setup_teardown(another_process_is_greeted, set_up,
-                                        tear_down),
-        cmocka_unit_test_setup_teardown(a_long_line_is_passed_over, set_up,
-                                        tear_down),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup_teardown(requests_are_answered, set_up,
+                                          tear_down),
+          cmocka_unit_test_setup_teardown(a_refusal_is_told, set_up, tear_down),
+          cmocka_unit_test_setup_teardown(silence_ends, set_up, tear_down),
+          cmocka_unit_test_setup_teardown(its_end_is_told, set_up, tear_down),
+          cmocka_unit_test_setup_teardown(another_process_is_greeted, set_up,
+                                          tear_down),
+          cmocka_unit_test_setup_teardown(a_long_line_is_passed_over, set_up,
+                                          tear_down))

@@ -1,14 +1,9 @@
 /* The wires of a cube on this machine: which ends there are, and that each
  * leads to its other end. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/nodes/cluster.h"
+#include "tests/unit/test.h"
 
 static void assert_joined(int a, int b, char mark) {
     char got = 0;
@@ -46,21 +41,13 @@ static void check(unsigned host_ports) {
     }
 }
 
-static void test_one(void **state) {
-    (void)state;
+TEST(test_one) {
     check(1);
 }
 
-static void test_many(void **state) {
-    (void)state;
+TEST(test_many) {
     check(4);
     check(8);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_one),
-        cmocka_unit_test(test_many),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_one), cmocka_unit_test(test_many))

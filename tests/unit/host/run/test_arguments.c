@@ -1,18 +1,13 @@
 /* What `incode run` takes, and what it refuses with a reason. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/points.h"
 #include "host/run/arguments.h"
 #include "host/service/strategies/strategies.h"
+#include "tests/unit/test.h"
 
 enum { WORDS_MAX = 13 };
 
@@ -31,8 +26,7 @@ static int parse(const char *const *words, struct host_run_options *options,
     return host_arguments_run(argc, argv, options, error);
 }
 
-static void test_defaults(void **unused) {
-    (void)unused;
+TEST(test_defaults) {
     struct host_run_options o;
     struct host_error error;
     static const char *const words[] = {"a.xyz", NULL};
@@ -52,8 +46,7 @@ static void test_defaults(void **unused) {
     assert_int_equal(o.threads, 0);
 }
 
-static void test_direct(void **unused) {
-    (void)unused;
+TEST(test_direct) {
     struct host_run_options o;
     struct host_error error;
     static const char *const threads[] = {"a.xyz",   "--threads=3", "--verify",
@@ -73,8 +66,7 @@ static void test_direct(void **unused) {
     }
 }
 
-static void test_options(void **unused) {
-    (void)unused;
+TEST(test_options) {
     struct host_run_options o;
     struct host_error error;
     static const char *const words[] = {"--strategy=spatial",
@@ -108,13 +100,12 @@ static void test_options(void **unused) {
 }
 
 /* The Linda programs, and what they heed, in any order. */
-static void test_linda(void **unused) {
+TEST(test_linda) {
     static const char *const words[][4] = {
         {"a.xyz", "--strategy=linda", "--faces-per-job=7", NULL},
         {"a.xyz", "--linda=master-slaves", "--strategy=linda", NULL},
         {"a.xyz", "--linda=spatial", "--strategy=linda", NULL}};
     static const char *const names[] = {"linda", "linda", "linda-spatial"};
-    (void)unused;
     for (size_t i = 0; i < 3; i++) {
         struct host_run_options o;
         struct host_error error;
@@ -125,8 +116,7 @@ static void test_linda(void **unused) {
 }
 
 /* Exit status 2, and the message says what is allowed. */
-static void test_refused(void **unused) {
-    (void)unused;
+TEST(test_refused) {
     static const struct {
         const char *word, *said;
     } wrong[] = {
@@ -169,8 +159,7 @@ static void test_refused(void **unused) {
 }
 
 /* What would change nothing is refused, and what goes with it is not. */
-static void test_in_vain(void **unused) {
-    (void)unused;
+TEST(test_in_vain) {
     static const struct {
         const char *vain, *beside, *with;
     } cases[] = {{"--memory=1M", "--cube=lab.cube", "--nodes=2"},
@@ -200,7 +189,7 @@ static void test_in_vain(void **unused) {
 }
 
 /* Each value of an enumeration has a name, which the options know it by. */
-static void test_names(void **unused) {
+TEST(test_names) {
     const struct {
         const char *option;
         const char *const *names;
@@ -209,7 +198,6 @@ static void test_names(void **unused) {
                   {"--index", host_indexes, INCODE_KD},
                   {"--face-rule", host_face_rules, INCODE_FACE_PAPER},
                   {"--build", host_builds, INCODE_BUILD_POINTS}};
-    (void)unused;
     for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++) {
         for (int value = 0; value <= tables[i].last; value++) {
             struct host_run_options o;
@@ -228,8 +216,7 @@ static void test_names(void **unused) {
 
 /* Every row of the tables of links and boards is known by its name, and an
  * error about any other lists it. */
-static void test_rows(void **unused) {
-    (void)unused;
+TEST(test_rows) {
     struct host_run_options o;
     struct host_error error, refusal;
     const char *words[] = {"--link", "wet-string", "a.xyz", NULL};
@@ -260,8 +247,7 @@ static void test_rows(void **unused) {
 }
 
 /* What a bare board has settles what else may be asked for. */
-static void test_bare_boards(void **unused) {
-    (void)unused;
+TEST(test_bare_boards) {
     static const struct {
         const char *words[4], *said;
     } wrong[] = {
@@ -328,8 +314,7 @@ static void printed(const char *word, char *text, size_t size) {
 
 /* The strategies of the table, and auto, are those that the option takes, its
  * help explains, and the error about any other lists. */
-static void test_strategies(void **unused) {
-    (void)unused;
+TEST(test_strategies) {
     static char help[16384];
     struct host_run_options o;
     struct host_error refusal, error;
@@ -350,13 +335,8 @@ static void test_strategies(void **unused) {
     assert_string_equal(host_strategy_name(i - 1), "auto");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_defaults),    cmocka_unit_test(test_direct),
-        cmocka_unit_test(test_options),     cmocka_unit_test(test_linda),
-        cmocka_unit_test(test_bare_boards), cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_in_vain),     cmocka_unit_test(test_names),
-        cmocka_unit_test(test_rows),        cmocka_unit_test(test_strategies),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_defaults), cmocka_unit_test(test_direct),
+          cmocka_unit_test(test_options), cmocka_unit_test(test_linda),
+          cmocka_unit_test(test_bare_boards), cmocka_unit_test(test_refused),
+          cmocka_unit_test(test_in_vain), cmocka_unit_test(test_names),
+          cmocka_unit_test(test_rows), cmocka_unit_test(test_strategies))

@@ -1,13 +1,8 @@
 /* What `auto` makes of points that fill a volume, and of points that do not. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "host/run/settle.h"
+#include "tests/unit/test.h"
 
 enum { POINTS = 5000, NODES = 2 };
 
@@ -39,8 +34,7 @@ static bool settle(struct host_run_options *options, const char *kind,
     return again;
 }
 
-static void volumes_and_others(void **unused) {
-    (void)unused;
+TEST(volumes_and_others) {
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
@@ -62,8 +56,7 @@ static void volumes_and_others(void **unused) {
     assert_ptr_not_equal(result.strategy, &host_sequential);
 }
 
-static void what_is_asked_for_stays(void **unused) {
-    (void)unused;
+TEST(what_is_asked_for_stays) {
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
@@ -76,8 +69,7 @@ static void what_is_asked_for_stays(void **unused) {
 }
 
 /* One node does by itself, unless somebody has said how many. */
-static void one_alone(void **unused) {
-    (void)unused;
+TEST(one_alone) {
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
@@ -91,8 +83,7 @@ static void one_alone(void **unused) {
 
 /* What is open of a surface has to fit, or its faces are sought; the user's
  * word stands. */
-static void what_does_not_fit(void **unused) {
-    (void)unused;
+TEST(what_does_not_fit) {
     struct host_run_options options;
     uint32_t regions;
     host_run_defaults(&options);
@@ -109,12 +100,6 @@ static void what_does_not_fit(void **unused) {
     assert_int_equal(result.build, INCODE_BUILD_POINTS);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(volumes_and_others),
-        cmocka_unit_test(what_is_asked_for_stays),
-        cmocka_unit_test(one_alone),
-        cmocka_unit_test(what_does_not_fit),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(volumes_and_others),
+          cmocka_unit_test(what_is_asked_for_stays),
+          cmocka_unit_test(one_alone), cmocka_unit_test(what_does_not_fit))

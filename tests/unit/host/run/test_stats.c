@@ -1,15 +1,11 @@
 /* The statistics have every name that scripts rely on, and its value. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <jansson.h>
 #include <sys/wait.h>
 
@@ -108,8 +104,7 @@ static json_t *written(const struct host_run_result *result) {
     return o;
 }
 
-static void test_names(void **unused) {
-    (void)unused;
+TEST(test_names) {
     static struct host_run_result result;
     fill(&result);
     json_t *o = written(&result);
@@ -195,8 +190,7 @@ static unsigned unwritten(const char *table, json_t *run, json_t *node) {
 }
 
 /* README.md has a row for each field that is written, and for no other. */
-static void test_documented(void **unused) {
-    (void)unused;
+TEST(test_documented) {
     static struct host_run_result result;
     static char text[1 << 18];
     FILE *file = fopen("host/README.md", "r");
@@ -216,8 +210,7 @@ static void test_documented(void **unused) {
     json_decref(run);
 }
 
-static void test_candidates(void **unused) {
-    (void)unused;
+TEST(test_candidates) {
     static struct host_run_result result;
     fill(&result);
     assert_true(host_candidates_mean(&result) == 64.0);
@@ -226,8 +219,7 @@ static void test_candidates(void **unused) {
     assert_true(host_candidates_p99(&result) < 182.0);
 }
 
-static void test_unwritable(void **unused) {
-    (void)unused;
+TEST(test_unwritable) {
     static struct host_run_result result;
     struct host_error error = {0};
     fill(&result);
@@ -240,8 +232,7 @@ static void test_unwritable(void **unused) {
 /* In a process that a large one became, as a shell or a script starts it. */
 static char *self;
 
-static void test_peak_is_its_own(void **unused) {
-    (void)unused;
+TEST(test_peak_is_its_own) {
     const size_t large = (size_t)192 << 20;
     int pair[2], status = -1;
     uint64_t peak = 0;

@@ -1,13 +1,8 @@
 /* What a run tells of its nodes together: who counts for which figure. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/run/run.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 5 };
 
@@ -32,8 +27,7 @@ static void sum(void) {
 /* A holder has no time at work; what it sends again counts all the same.  An
  * idle worker is the fastest.  A node that was lost before it told of its time
  * is not, but what came of it counts. */
-static void test_sums(void **unused) {
-    (void)unused;
+TEST(test_sums) {
     memset(reports, 0, sizeof reports);
     sum();
     assert_true(result.t_min_s == 0.0 && result.t_max_s == 0.0);
@@ -53,7 +47,4 @@ static void test_sums(void **unused) {
     assert_int_equal(result.node[1].statistics.wall_us, 6000000);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_sums)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_sums))

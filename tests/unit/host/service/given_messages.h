@@ -3,21 +3,16 @@
 #ifndef TESTS_UNIT_GIVEN_MESSAGES_H
 #define TESTS_UNIT_GIVEN_MESSAGES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
 #include "node/result.h"
 #include "transport/drivers/sim.h"
 #include "small_order.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 4 };
 

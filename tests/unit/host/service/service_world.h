@@ -4,20 +4,15 @@
 #ifndef TESTS_UNIT_SERVICE_WORLD_H
 #define TESTS_UNIT_SERVICE_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "host/run/run.h"
 #include "host/service/strategies/strategies.h"
 #include "host/sim/sim_world.h"
+#include "tests/unit/test.h"
 
 enum {
     DIMENSION = 3,

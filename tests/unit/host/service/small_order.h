@@ -3,15 +3,9 @@
 #ifndef TESTS_SMALL_ORDER_H
 #define TESTS_SMALL_ORDER_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
 #include "host/mesh/gen.h"
 #include "host/mesh/order.h"
+#include "tests/unit/test.h"
 
 /* regions: a power of two. */
 static inline struct host_order small_order(unsigned regions) {

@@ -238,8 +238,7 @@ static bool is_open(uint32_t brick) {
 
 /* Node 1 alone; one tetrahedron that node 3 sent was of node 1's finding, and
  * it has committed a brick of which node 2 has found all. */
-static void test_alone(void **unused) {
-    (void)unused;
+TEST(test_alone) {
     static const char *const texts[] = {
         "it left out the tetrahedron of rows ",
         "it sent twice the tetrahedron of rows ",
@@ -271,8 +270,7 @@ static void test_alone(void **unused) {
 
 /* Of nodes that worked together none is at fault, and what is near is done
  * again: by nodes alone, until it is right. */
-static void test_together(void **unused) {
-    (void)unused;
+TEST(test_together) {
     for (unsigned i = 0; i < 3; i++) {
         int64_t *faults[] = {&given.left_out, &given.twice, &given.exchanged};
         prepare();
@@ -300,8 +298,7 @@ static void test_together(void **unused) {
 }
 
 /* A node that both found and sent what is wrong is named once. */
-static void test_suspect(void **unused) {
-    (void)unused;
+TEST(test_suspect) {
     prepare();
     given.exchanged = inside(1);
     work_all();
@@ -311,8 +308,7 @@ static void test_suspect(void **unused) {
 }
 
 /* One node that did such points alone left them out; of two, or many, none. */
-static void test_no_tetrahedra(void **unused) {
-    (void)unused;
+TEST(test_no_tetrahedra) {
     for (unsigned i = 0; i < 3; i++) {
         prepare();
         given.only = 1;
@@ -333,8 +329,7 @@ static void test_no_tetrahedra(void **unused) {
 /* A point far away has one tetrahedron, at the base of a pyramid that holds all
  * others, and it is of another node's brick: what is left without it is convex,
  * but that other node is at fault, and not the one whose point it is. */
-static void test_far_point(void **unused) {
-    (void)unused;
+TEST(test_far_point) {
     static const double pyramid[5][3] = {
         {0, 0, 0}, {1, 1, 0}, {1, -0.5, 0.75}, {1, -0.5, -0.75}, {100, 0, 0}};
     const struct host_order near = order;
@@ -381,8 +376,7 @@ static void spoil(unsigned node) {
 }
 
 /* What is near, then all that nodes did together, then everything. */
-static void test_unclear(void **unused) {
-    (void)unused;
+TEST(test_unclear) {
     bool again[64] = {false};
     prepare();
     assert_true(order.bricks <= 64);
@@ -417,8 +411,7 @@ static void test_unclear(void **unused) {
 }
 
 /* As long as there are two, a brick goes to the other node. */
-static void test_redo(void **unused) {
-    (void)unused;
+TEST(test_redo) {
     struct incode_job job;
     prepare();
     work_all();
@@ -447,8 +440,7 @@ static void test_redo(void **unused) {
     finish();
 }
 
-static void test_no_other(void **unused) {
-    (void)unused;
+TEST(test_no_other) {
     prepare();
     assert_true(host_audit_is_other(&service, 1));
     service.node[0].aside = true;
@@ -467,8 +459,7 @@ static void test_no_other(void **unused) {
 }
 
 /* A run gives up after a bounded number of checks, and reports one offence. */
-static void test_no_end(void **unused) {
-    (void)unused;
+TEST(test_no_end) {
     prepare();
     work_all();
     spoil(1);
@@ -519,8 +510,7 @@ static void lost_is_exact(enum host_verifying verifying, bool during) {
     finish();
 }
 
-static void test_exact(void **unused) {
-    (void)unused;
+TEST(test_exact) {
     is_exact(HOST_VERIFY_WHERE_DUE, false, false);
     is_exact(HOST_VERIFY_WHERE_DUE, true, true);
     is_exact(HOST_VERIFY_ALWAYS, false, true);

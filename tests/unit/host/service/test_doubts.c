@@ -1,16 +1,11 @@
 /* Which node is doubted, and when: nodes that answer each after its own time,
  * and whose neighbours say so where one is silent for long, in virtual time. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/service/parts.h"
+#include "tests/unit/test.h"
 
 enum {
     DIMENSION = 3,
@@ -106,9 +101,8 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
 }
 
 /* More nodes than processors: all are slow, and one is for once slower. */
-static void a_busy_machine_is_no_reason(void **unused) {
+TEST(a_busy_machine_is_no_reason) {
     uint64_t slow[NODES];
-    (void)unused;
     for (unsigned i = 0; i < NODES; i++)
         slow[i] = 900000 + 30000 * i;
     pass(10 * SECOND, slow);
@@ -148,11 +142,6 @@ static void one_that_stands_still_is_named(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_busy_machine_is_no_reason, set_up,
-                                        tear_down),
-        cmocka_unit_test(one_that_stands_still_is_named),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup_teardown(a_busy_machine_is_no_reason, set_up,
+                                          tear_down),
+          cmocka_unit_test(one_that_stands_still_is_named))

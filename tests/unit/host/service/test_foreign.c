@@ -1,19 +1,14 @@
 /* A host whose node tells of generations that the host did not begin: it
  * answers them, and does not do so for ever. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/run/run.h"
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 #include "host/sim/sim_cube.h"
 #include "transport/routes.h"
+#include "tests/unit/test.h"
 
 enum { HOST = 1, SECONDS = 20 };
 
@@ -118,9 +113,8 @@ static void begin(void) {
 
 /* It is answered once, and takes the answer: what the host waits for then is
  * the node's answer to its ping. */
-static void one_is_answered(void **unused) {
+TEST(one_is_answered) {
     static const uint32_t told[] = {1, 2, 0x7fffffff, 0xfffffffe, 0xffffffff};
-    (void)unused;
     for (unsigned i = 0; i < sizeof told / sizeof told[0]; i++) {
         begin();
         node.told = told[i];
@@ -140,9 +134,8 @@ static void ends_soon(void) {
     assert_true(node.now_us < 2000000);
 }
 
-static void one_that_comes_again_ends_the_run(void **unused) {
+TEST(one_that_comes_again_ends_the_run) {
     static const uint32_t beyond[] = {1, 0x7fff, 0x8000, 0x70000000};
-    (void)unused;
     for (unsigned i = 0; i < sizeof beyond / sizeof beyond[0]; i++) {
         begin();
         node.told = 1;
@@ -152,10 +145,5 @@ static void one_that_comes_again_ends_the_run(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(one_is_answered),
-        cmocka_unit_test(one_that_comes_again_ends_the_run),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(one_is_answered),
+          cmocka_unit_test(one_that_comes_again_ends_the_run))

@@ -12,8 +12,7 @@ static uint32_t draw(uint32_t below) {
     return (uint32_t)(state >> 32) % below;
 }
 
-static void test_any_bytes(void **unused) {
-    (void)unused;
+TEST(test_any_bytes) {
     for (uint32_t round = 0; round < 2000; round++) {
         begin();
         for (uint32_t k = 0; k < 40; k++) {
@@ -54,8 +53,7 @@ static size_t batch(uint8_t *data, uint32_t epoch, uint32_t brick) {
 }
 
 /* Results of a job that is no more are counted as read, and dropped. */
-static void test_epochs(void **unused) {
-    (void)unused;
+TEST(test_epochs) {
     uint8_t data[128];
     struct host_error error = {0};
     begin();
@@ -79,8 +77,7 @@ static void test_epochs(void **unused) {
 }
 
 /* What comes after a message that was lost does not count, and is a loss. */
-static void test_gaps(void **unused) {
-    (void)unused;
+TEST(test_gaps) {
     static struct node_finished_message finished;
     uint8_t data[128];
     struct host_error error = {0};
@@ -113,8 +110,7 @@ static void answer(uint32_t start, uint32_t pinged, uint32_t received,
 
 /* Messages that are missing, either way, and another start are losses; pings
  * that got lost before the first answer are none. */
-static void test_answers(void **unused) {
-    (void)unused;
+TEST(test_answers) {
     static const struct {
         uint32_t start, pinged, received, sent;
         bool loss;
@@ -134,8 +130,7 @@ static void test_answers(void **unused) {
 
 /* Statistics replace those of the same start, and add to those of others; of
  * what no statistics tell, the tetrahedra that came are counted. */
-static void test_starts(void **unused) {
-    (void)unused;
+TEST(test_starts) {
     static struct node_finished_message told;
     const struct incode_statistics *sum;
     struct host_error error = {0};
@@ -168,8 +163,7 @@ static void test_starts(void **unused) {
     end();
 }
 
-static void test_fault(void **unused) {
-    (void)unused;
+TEST(test_fault) {
     struct host_error error = {0};
     begin();
     assert_int_equal(send(3, NODE_FAULT, "no memory", 9, &error), HOST_CUBE);
@@ -191,10 +185,9 @@ static int pong_of(unsigned i, uint32_t pinged, uint32_t start,
  * a ping that was sent after it; a node that has started again is the loss.
  * What counts ends what nodes do together, then the node's part, then the
  * run. */
-static void test_doubtful_fault(void **unused) {
+TEST(test_doubtful_fault) {
     static const char text[] = "page 1 to all, expected the one below 8";
     enum { A_LOSS, TOGETHER, ALONE, LAST, CASES };
-    (void)unused;
     for (unsigned k = 0; k < CASES; k++) {
         struct host_error error = {0};
         begin();
@@ -237,10 +230,9 @@ static void test_doubtful_fault(void **unused) {
 
 /* A list that nodes share may be too small where one that is a node's alone is
  * not: what is left is done by each node alone, and only then the run fails. */
-static void test_shared_list_too_small(void **unused) {
+TEST(test_shared_list_too_small) {
     static const char text[] = "the active face list of one brick does not "
                                "fit; give the nodes more memory";
-    (void)unused;
     for (unsigned alone = 0; alone < 2; alone++) {
         struct host_error error = {0};
         begin();
@@ -263,11 +255,10 @@ static void test_shared_list_too_small(void **unused) {
 }
 
 /* What to do about it is said once, also where the node says it itself. */
-static void test_fault_with_its_cure(void **unused) {
+TEST(test_fault_with_its_cure) {
     static const char *const texts[] = {
         "the list is too small; give the nodes more memory",
         "no memory for the list"};
-    (void)unused;
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         struct host_error error = {0};
         begin();
@@ -300,8 +291,7 @@ static int take_own(struct host_work *work, const struct cube_message *message,
 
 /* A strategy has the messages of its roles, none of which follows a gap or is
  * of a job that is no more; what it says of a wrong one is kept. */
-static void test_strategy(void **unused) {
-    (void)unused;
+TEST(test_strategy) {
     struct host_strategy strategy = host_spatial;
     strategy.take = take_own;
     for (uint32_t sent = 0; sent < 2; sent++) {
@@ -340,8 +330,7 @@ static void test_strategy(void **unused) {
 
 /* Pages that one node leaves to the host go to another, behind those that this
  * one has asked for itself. */
-static void test_passed(void **unused) {
-    (void)unused;
+TEST(test_passed) {
     const uint32_t own = 1, passed[3] = {2, 0, 3};
     struct host_error error = {0};
     begin();
@@ -359,8 +348,7 @@ static void test_passed(void **unused) {
 
 /* A wrong page of another node's puts an end to pages between nodes, and names
  * both, as either may be at fault; one of the host's is refused. */
-static void test_wrong_pages(void **unused) {
-    (void)unused;
+TEST(test_wrong_pages) {
     static const struct {
         struct node_wrong_page_message wrong;
         bool alone; /* pages come from the host alone already */
@@ -400,8 +388,7 @@ static void test_wrong_pages(void **unused) {
 }
 
 /* What no node of this version sends is told in figures. */
-static void test_texts(void **unused) {
-    (void)unused;
+TEST(test_texts) {
     static struct node_ready_message ready = {.protocol = NODE_PROTOCOL - 1};
     static uint32_t many[HOST_PAGES_QUEUED_MAX + 1];
     static struct {

@@ -1,19 +1,13 @@
 /* Commits count once, for the node that has the job, under its epoch; a loss
  * takes the uncommitted tetrahedra with it, and no others, and their bricks are
  * given out again. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/service/ledger.h"
+#include "tests/unit/test.h"
 
-static void test_commits(void **unused) {
-    (void)unused;
+TEST(test_commits) {
     struct host_ledger ledger;
     struct host_error error = {0};
     assert_int_equal(host_ledger_init(&ledger, 100, 2, &error), 0);
@@ -78,8 +72,7 @@ static void fill(struct host_tetrahedra *tets) {
     }
 }
 
-static void test_abandon(void **unused) {
-    (void)unused;
+TEST(test_abandon) {
     struct host_order order = make_order();
     struct host_ledger ledger;
     struct host_tetrahedra tets = {0};
@@ -129,8 +122,7 @@ static void test_abandon(void **unused) {
 
 /* What is left is given out again, once, in ranges that are in order, within a
  * region, and no larger than they should be. */
-static void test_ranges(void **unused) {
-    (void)unused;
+TEST(test_ranges) {
     struct host_order order = make_order();
     struct host_tetrahedra none = {0};
     static const struct {
@@ -175,11 +167,5 @@ static void test_ranges(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_commits),
-        cmocka_unit_test(test_abandon),
-        cmocka_unit_test(test_ranges),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_commits), cmocka_unit_test(test_abandon),
+          cmocka_unit_test(test_ranges))

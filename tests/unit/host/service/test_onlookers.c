@@ -79,10 +79,9 @@ static void look_on(void) {
     world.onlookers = &onlookers;
 }
 
-static void test_each_strategy(void **unused) {
+TEST(test_each_strategy) {
     static const struct host_strategy *const strategies[] = {
         &host_sequential, &host_spatial, &host_exchange};
-    (void)unused;
     for (size_t k = 0; k < sizeof strategies / sizeof strategies[0]; k++) {
         look_on();
         survives(strategies[k]);
@@ -98,8 +97,7 @@ static void test_each_strategy(void **unused) {
 
 /* Who starts again has forgotten what it was asked, and is asked again; who is
  * gone is left out. */
-static void test_losses(void **unused) {
-    (void)unused;
+TEST(test_losses) {
     static const enum what events[] = {RESTART, KILL, CUT};
     for (unsigned k = 0; k < 12; k++) {
         unsigned tenths = 1 + k / 3;
@@ -113,8 +111,7 @@ static void test_losses(void **unused) {
 }
 
 /* A part of the nodes, and one question alone: the others hear nothing. */
-static void test_some(void **unused) {
-    (void)unused;
+TEST(test_some) {
     look_on();
     memset(&onlooker.nodes, 0, sizeof onlooker.nodes);
     host_node_set_add(&onlooker.nodes, 5);
@@ -131,11 +128,10 @@ static bool asks_not(void *context, uint64_t now_us,
     return false;
 }
 
-static void test_nobody(void **unused) {
+TEST(test_nobody) {
     static const struct host_onlookers nobody = {NULL, asks_not, answer,
                                                  answered, holder};
     uint64_t took_us[2], before = state;
-    (void)unused;
     for (unsigned k = 0; k < 2; k++) {
         look_on();
         state = before;

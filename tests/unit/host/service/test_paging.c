@@ -1,14 +1,9 @@
 /* When the user is told that a run spends its time on pages, and what then. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/service/parts.h"
+#include "tests/unit/test.h"
 
 /* Of 200,000 points on a sphere, two nodes of 4M. */
 enum { NODES = 2, PAGES = 3226, FRAMES = 1105 };
@@ -48,8 +43,7 @@ static void send(uint64_t pages) {
         host_paging_sent(&service);
 }
 
-static void test_told_once(void **unused) {
-    (void)unused;
+TEST(test_told_once) {
     begin(4 << 20, 1000);
     send(NODES * PAGES + HOST_PAGING_AGAIN_MIN - 1);
     assert_int_equal(lines, 0);
@@ -62,8 +56,7 @@ static void test_told_once(void **unused) {
               "--memory 16M would hold all of them");
 }
 
-static void test_not_told(void **unused) {
-    (void)unused;
+TEST(test_not_told) {
     begin(4 << 20, 1200000); /* more came of it than it cost */
     send(NODES * PAGES + 199999);
     host_paging_end(&service);
@@ -80,16 +73,14 @@ static void test_not_told(void **unused) {
 }
 
 /* What nodes have from each other shows at the end. */
-static void test_other_nodes(void **unused) {
-    (void)unused;
+TEST(test_other_nodes) {
     begin(4 << 20, 1000);
     reports[0].statistics.statistics.page_requests = 1000000;
     host_paging_end(&service);
     assert_int_equal(lines, 1);
 }
 
-static void test_cube(void **unused) {
-    (void)unused;
+TEST(test_cube) {
     begin(4 << 20, 1000);
     service.memory_of = "boxes.cube";
     send(1000000);
@@ -101,8 +92,7 @@ static void test_cube(void **unused) {
               "again; nodes with 16M would hold all of them");
 }
 
-static void test_advice(void **unused) {
-    (void)unused;
+TEST(test_advice) {
     assert_int_equal(host_paging_memory(4 << 20, 1105, 1106), 8 << 20);
     assert_int_equal(host_paging_memory(4 << 20, 1105, 4420), 16 << 20);
     assert_int_equal(host_paging_memory(1433600, 335, 336), 2 << 20);
@@ -118,11 +108,6 @@ static void test_advice(void **unused) {
     assert_non_null(strstr(told, "; --memory 1G would hold more of them"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_told_once),   cmocka_unit_test(test_not_told),
-        cmocka_unit_test(test_other_nodes), cmocka_unit_test(test_cube),
-        cmocka_unit_test(test_advice),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_told_once), cmocka_unit_test(test_not_told),
+          cmocka_unit_test(test_other_nodes), cmocka_unit_test(test_cube),
+          cmocka_unit_test(test_advice))

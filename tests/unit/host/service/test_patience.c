@@ -31,8 +31,7 @@ static void told_at(const char *text, uint64_t us) {
 
 /* A node that answers and never works: its work is done by others, as soon as
  * the patience is over. */
-static void test_idle(void **unused) {
-    (void)unused;
+TEST(test_idle) {
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned i = 0; i < NODES; i += 5) {
             char text[80];
@@ -53,8 +52,7 @@ static void test_idle(void **unused) {
 
 /* A node that keeps pages and sends none holds up the one that waits for them,
  * who is not the idle one. */
-static void test_idle_holder(void **unused) {
-    (void)unused;
+TEST(test_idle_holder) {
     prepare();
     world.events[0] = (struct event){IDLE, 0.0, 3, 0};
     survives(&host_sequential);
@@ -83,10 +81,9 @@ static void idles_in(const struct host_strategy *strategy, unsigned node,
     }
 }
 
-static void test_idle_in_each_strategy(void **unused) {
+TEST(test_idle_in_each_strategy) {
     static const struct host_sharing usual;
     const struct host_strategy *row;
-    (void)unused;
     for (unsigned k = 0; (row = host_strategy_row(k)) != NULL; k++) {
         struct host_error error = {0};
         bool builds = row == &host_master_slaves || row == &host_linda;
@@ -111,8 +108,7 @@ static void cut_off(unsigned node) {
 /* One that is killed, stopped or cut off is named within two seconds, and
  * given up when the patience is over, neither before nor later: whatever its
  * links are found to be meanwhile. */
-static void test_silent(void **unused) {
-    (void)unused;
+TEST(test_silent) {
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned how = 0; how < 3; how++) {
             uint64_t patience_us = patiences[k] * SECOND;
@@ -142,8 +138,7 @@ static void test_silent(void **unused) {
 }
 
 /* One that comes back in time is told of as well, and nothing is lost. */
-static void test_back(void **unused) {
-    (void)unused;
+TEST(test_back) {
     prepare();
     world.dead_us = 0;
     world.stop_us = 3 * SECOND;
@@ -170,8 +165,7 @@ static void test_back(void **unused) {
 }
 
 /* The same of node 0: without it the cube cannot go on. */
-static void test_silent_gateway(void **unused) {
-    (void)unused;
+TEST(test_silent_gateway) {
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         prepare();
         world.patience_s = patiences[k];
@@ -186,8 +180,7 @@ static void test_silent_gateway(void **unused) {
 
 /* --- nodes that never come ------------------------------------------------ */
 
-static void test_never_started(void **unused) {
-    (void)unused;
+TEST(test_never_started) {
     for (unsigned k = 0; k < sizeof patiences / sizeof patiences[0]; k++) {
         for (unsigned i = 0; i < NODES; i += 3) {
             char text[80];
@@ -226,8 +219,7 @@ static uint64_t well_fed_us(void *unused, unsigned node) {
 /* Of nodes that this machine has started: on a busy one they may take a minute,
  * where the processors were what they waited for; a program that says nothing
  * is found after nine seconds. */
-static void test_started_here(void **unused) {
-    (void)unused;
+TEST(test_started_here) {
     prepare();
     world.starved_us = starving_us;
     start_world();
@@ -244,8 +236,7 @@ static void test_started_here(void **unused) {
 }
 
 /* Those who come late are told of, and who is still to come. */
-static void test_late(void **unused) {
-    (void)unused;
+TEST(test_late) {
     prepare();
     world.absent_s = 3;
     start_world();
@@ -263,8 +254,7 @@ static void test_late(void **unused) {
 
 /* Where nobody works, the run ends; of the last one nobody says that others do
  * its work. */
-static void test_all_idle(void **unused) {
-    (void)unused;
+TEST(test_all_idle) {
     prepare();
     for (unsigned i = 0; i < NODES; i++)
         world.events[i] = (struct event){IDLE, 0.4, i, 0};

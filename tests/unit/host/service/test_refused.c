@@ -49,8 +49,7 @@ static void refuses(const uint32_t v[4], uint32_t brick, const char *text) {
     refuses_message(NODE_RESULT, data, size, text);
 }
 
-static void test_refused_results(void **unused) {
-    (void)unused;
+TEST(test_refused_results) {
     uint32_t first = order.region[1].first, v = first * INCODE_BRICK_POINTS;
     uint32_t loose = first, last = order.bricks - 1;
     char text[80];
@@ -75,8 +74,7 @@ static void test_refused_results(void **unused) {
 }
 
 /* A node that has not committed all its bricks is not done. */
-static void test_unfinished(void **unused) {
-    (void)unused;
+TEST(test_unfinished) {
     static struct node_finished_message finished;
     struct host_error error = {0};
     char text[80];
@@ -91,8 +89,7 @@ static void test_unfinished(void **unused) {
 }
 
 /* Spilled faces are of points, and marks of points of the job. */
-static void test_spilled(void **unused) {
-    (void)unused;
+TEST(test_spilled) {
     struct {
         struct node_spill_header header;
         struct incode_face faces[2];
@@ -160,8 +157,7 @@ static void floods(uint8_t type, const void *data, size_t size,
     end();
 }
 
-static void test_floods(void **unused) {
-    (void)unused;
+TEST(test_floods) {
     uint32_t v = order.region[1].first * INCODE_BRICK_POINTS;
     const uint32_t row[4] = {v, v + 1, v + 2, v + 3};
     uint8_t data[128];

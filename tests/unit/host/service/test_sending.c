@@ -1,17 +1,12 @@
 /* What the host sends first where more is due than the wire takes. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
 #include "transport/drivers/sim.h"
 #include "small_order.h"
+#include "tests/unit/test.h"
 
 enum { NODE = 1, NODES = 2, WINDOW = 16, NODE_OWN = 100 };
 
@@ -65,8 +60,7 @@ static void end(void) {
 
 /* A strategy that always has something to send has every other message, until
  * what the node has asked for is sent. */
-static void test_turns(void **unused) {
-    (void)unused;
+TEST(test_turns) {
     struct host_strategy strategy = *host_strategy_named("spatial");
     struct host_error error = {0};
     strategy.send = send_always;
@@ -90,8 +84,7 @@ static void test_turns(void **unused) {
 }
 
 /* What a node has to know first comes first. */
-static void test_order(void **unused) {
-    (void)unused;
+TEST(test_order) {
     struct host_strategy strategy = *host_strategy_named("spatial");
     struct host_error error = {0};
     strategy.send = send_always;

@@ -18,8 +18,7 @@ static void survives_restart(unsigned node, double when,
 
 /* Boards that reset themselves: each in turn, while all are at work, and at any
  * time. */
-static void test_restarts(void **unused) {
-    (void)unused;
+TEST(test_restarts) {
     for (unsigned i = 0; i < NODES; i++) {
         survives_restart(i, 0.05 * (i + 1), &host_spatial);
         assert_int_equal(result.generations, 2);
@@ -33,16 +32,14 @@ static void test_restarts(void **unused) {
 }
 
 /* While the pages go to all, those behind the gap must blame nobody. */
-static void test_restarts_at_first(void **unused) {
-    (void)unused;
+TEST(test_restarts_at_first) {
     for (unsigned when = 1; when <= 15; when++)
         for (unsigned node = 0; node < 4; node++)
             survives_restart(node, 0.004 * when, &host_exchange);
 }
 
 /* Any mixture of them; SERVICE_ROUNDS for more than a few. */
-static void test_mixtures(void **unused) {
-    (void)unused;
+TEST(test_mixtures) {
     const char *wanted = getenv("SERVICE_ROUNDS");
     for (long rounds = wanted == NULL ? 8 : atol(wanted); rounds > 0;
          rounds--) {
@@ -65,8 +62,7 @@ static void test_mixtures(void **unused) {
 }
 
 /* A node that is only stopped is waited for. */
-static void test_stopped(void **unused) {
-    (void)unused;
+TEST(test_stopped) {
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
         world.dead_us = 0;
@@ -78,8 +74,7 @@ static void test_stopped(void **unused) {
 }
 
 /* One that never comes back is done without. */
-static void test_gone(void **unused) {
-    (void)unused;
+TEST(test_gone) {
     for (unsigned i = 1; i < NODES; i++) {
         prepare();
         world.dead_us = i % 2 == 0 ? 0 : DEAD_US;
@@ -96,8 +91,7 @@ static void test_gone(void **unused) {
 }
 
 /* Node 0 is done without where another has a wire to the host. */
-static void test_gateway(void **unused) {
-    (void)unused;
+TEST(test_gateway) {
     prepare();
     world.events[0] = (struct event){STOP, 0.4, 0, 0};
     start_world();
@@ -112,10 +106,9 @@ static void test_gateway(void **unused) {
 }
 
 /* A board that resets itself whenever it has work does not go on for ever. */
-static void test_for_ever(void **unused) {
+TEST(test_for_ever) {
     struct host_digest digest;
     struct host_error error;
-    (void)unused;
     prepare();
     start_world();
     world.sick = true;
@@ -125,8 +118,7 @@ static void test_for_ever(void **unused) {
 }
 
 /* Nodes that were left in the midst of a run serve the next host. */
-static void test_next_host(void **unused) {
-    (void)unused;
+TEST(test_next_host) {
     for (unsigned k = 1; k < 7; k++) {
         struct host_digest digest;
         struct host_error error;
@@ -147,9 +139,8 @@ static void test_next_host(void **unused) {
 }
 
 /* Links that go dead are gone round. */
-static void test_cut(void **unused) {
+TEST(test_cut) {
     unsigned lost = 0;
-    (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
         world.events[0] = (struct event){CUT, 0.3, i, i % DIMENSION};
@@ -161,9 +152,8 @@ static void test_cut(void **unused) {
 
 /* Wires that were never there are gone round as well, once all else is; one
  * that is on no node's way from or to node 0 is named all the same. */
-static void test_missing_wire(void **unused) {
+TEST(test_missing_wire) {
     unsigned missed = 0;
-    (void)unused;
     for (unsigned i = 0; i < NODES; i++) {
         for (unsigned d = 0; d < DIMENSION; d++) {
             if ((i >> d & 1) == 0) {
@@ -199,8 +189,7 @@ static void test_missing_wire(void **unused) {
 
 /* A node that comes late moves the search on, and not into the end of the
  * patience with nodes. */
-static void test_missing_wire_and_late_node(void **unused) {
-    (void)unused;
+TEST(test_missing_wire_and_late_node) {
     prepare();
     world.absent_s = 3;
     start_world();
@@ -213,8 +202,7 @@ static void test_missing_wire_and_late_node(void **unused) {
 }
 
 /* The host's own wire to node 0, where it has another. */
-static void test_missing_host_port(void **unused) {
-    (void)unused;
+TEST(test_missing_host_port) {
     prepare();
     world.absent_s = 3;
     world.spare = 5;
@@ -235,8 +223,7 @@ static void test_missing_host_port(void **unused) {
 
 /* A wire that nothing needs and that comes up late is no missing one, and what
  * a node sleeps is not its wire's time. */
-static void test_late_wire(void **unused) {
-    (void)unused;
+TEST(test_late_wire) {
     for (unsigned k = 0; k < 2; k++) {
         uint64_t late_us = k == 0 ? 2500000 : 7000000;
         double when = (double)late_us / (double)spatial_us;
@@ -255,8 +242,7 @@ static void test_late_wire(void **unused) {
 }
 
 /* A node that is late is waited for, and all of its wires are used. */
-static void test_late_node(void **unused) {
-    (void)unused;
+TEST(test_late_node) {
     for (unsigned i = 0; i < NODES; i++) {
         prepare();
         world.absent_s = 3;
@@ -284,8 +270,7 @@ static void swap(unsigned node, unsigned link, unsigned other,
 }
 
 /* A wire in the wrong place is named before anything is given out. */
-static void test_wrong_wire(void **unused) {
-    (void)unused;
+TEST(test_wrong_wire) {
     prepare();
     start_world();
     swap(5, 2, 3, 1); /* 5 was to lead to 1, and 3 to 1 */
@@ -298,8 +283,7 @@ static void test_wrong_wire(void **unused) {
 
 /* However the ends of nodes and host fall together, nobody waits for a farewell
  * in vain: half a second at a node, two at the host. */
-static void test_ends_at_once(void **unused) {
-    (void)unused;
+TEST(test_ends_at_once) {
     for (unsigned k = 0; k < 100; k++) {
         struct host_run_options options;
         struct host_tetrahedra tets = {0};

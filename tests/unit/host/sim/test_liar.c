@@ -1,17 +1,12 @@
 /* A node that lies: in each way it alters what that way is about, as often as
  * it is to, nothing else, and always so that what leaves is a message. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/sim/liar.h"
 #include "node/setup.h"
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
+#include "tests/unit/test.h"
 
 enum {
     STARS = 10,
@@ -135,7 +130,7 @@ static unsigned times(uint32_t k, const uint32_t v[4]) {
 
 /* Rows of the true ones that are not there, and rows that are not of them, a
  * lie, for each way. */
-static void results_are_altered(void **unused) {
+TEST(results_are_altered) {
     static const struct {
         enum host_lie way;
         int more, strange; /* rows a lie */
@@ -143,7 +138,6 @@ static void results_are_altered(void **unused) {
                 {HOST_LIE_EXCHANGE, 0, 1},
                 {HOST_LIE_REPEAT, 1, 0},
                 {HOST_LIE_INVENT, 1, 1}};
-    (void)unused;
     for (unsigned w = 0; w < sizeof ways / sizeof ways[0]; w++) {
         uint64_t lies = 0;
         begin(ways[w].way, ONE_IN);
@@ -173,11 +167,10 @@ static void results_are_altered(void **unused) {
 }
 
 /* An exchanged apex turns half of the tetrahedra over, or may. */
-static void both_orientations_are_told(void **unused) {
+TEST(both_orientations_are_told) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     unsigned swapped = 0, kept = 0;
     struct seen seen;
-    (void)unused;
     begin(HOST_LIE_EXCHANGE, 1);
     size_t size = results(1, data);
     size = host_liar_alter(&liar, CUBE_HOST, NODE_RESULT, data, size);
@@ -192,12 +185,11 @@ static void both_orientations_are_told(void **unused) {
 }
 
 /* What is full stays as it is, and so does what is no batch. */
-static void what_does_not_fit_is_not_told(void **unused) {
+TEST(what_does_not_fit_is_not_told) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK] = {0};
     struct node_result_writer writer;
     uint32_t v = 5;
     size_t head = sizeof(struct node_result_header);
-    (void)unused;
     node_result_begin(&writer, data + head, CUBE_PAYLOAD_MAX - head, SELF);
     const uint32_t far[1][3] = {{1u << 30, 1u << 31, 3u << 30}};
     while (node_result_star(&writer, v, far, 1) == 1)
@@ -250,11 +242,10 @@ static struct incode_answers answers_of(void) {
     return answers;
 }
 
-static void answers_are_altered(void **unused) {
+TEST(answers_are_altered) {
     const struct incode_answers answers = answers_of();
     const size_t size = incode_answers_bytes(LISTED);
     unsigned hull = LISTED / 4;
-    (void)unused;
     begin(HOST_LIE_DROP, 1);
     assert_int_equal(differ(NODE_ANSWERS, &answers, size, 2, 4, 3),
                      LISTED - hull);
@@ -271,10 +262,9 @@ static void answers_are_altered(void **unused) {
     }
 }
 
-static void what_is_lent_is_altered(void **unused) {
+TEST(what_is_lent_is_altered) {
     struct incode_list list = {INCODE_LIST_FACES, LISTED, {{0}}};
     struct incode_loan loan = {1, 2, LISTED, {{0}}};
-    (void)unused;
     fill(list.v[0], LISTED, 3);
     fill(loan.v[0], LISTED, 3);
     for (int way = 0; way < HOST_LIES; way++) {
@@ -288,11 +278,10 @@ static void what_is_lent_is_altered(void **unused) {
 }
 
 /* A tuple is still a tuple, and another in its list or answers alone. */
-static void tuples_are_altered(void **unused) {
+TEST(tuples_are_altered) {
     const struct incode_answers answers = answers_of();
     uint8_t data[CUBE_PAYLOAD_MAX] = {4};
     struct tuple tuple = {.count = 2, .keyed = true};
-    (void)unused;
     tuple.field[0] = TUPLE_UINT32(77);
     tuple.field[1] = TUPLE_BYTES(&answers, incode_answers_bytes(LISTED));
     size_t size = tuple_write(&tuple, data + TUPLES_HEADER_BYTES,
@@ -316,13 +305,12 @@ static void tuples_are_altered(void **unused) {
     assert_memory_equal(liar.out, data, size);
 }
 
-static void findings_are_altered(void **unused) {
+TEST(findings_are_altered) {
     static const int more[] = {
         [HOST_LIE_DROP] = -LISTED,  [HOST_LIE_EXCHANGE] = 0,
         [HOST_LIE_REPEAT] = LISTED, [HOST_LIE_INVENT] = LISTED / 4,
         [HOST_LIE_PAGE] = 0,        [HOST_LIE_LOAN] = 0};
     struct node_found_message found = {1, {LISTED, {{0}}}}, said;
-    (void)unused;
     fill(found.found.v[0], LISTED, 4);
     for (int way = 0; way <= HOST_LIE_LOAN; way++) {
         size_t size = node_found_bytes(&found);
@@ -338,9 +326,8 @@ static void findings_are_altered(void **unused) {
     }
 }
 
-static void shared_ones_are_altered(void **unused) {
+TEST(shared_ones_are_altered) {
     struct node_shared shared[LISTED];
-    (void)unused;
     fill(shared[0].v, LISTED, 4);
     for (int way = 0; way < HOST_LIES; way++) {
         begin((enum host_lie)way, 1);
@@ -362,11 +349,10 @@ static size_t page_bytes(uint8_t *data, size_t bytes) {
 
 /* One coordinate of one of its ten points and the repeated one, whatever stands
  * before the points; never on its way to the host, nor that of a box. */
-static void pages_are_altered(void **unused) {
+TEST(pages_are_altered) {
     uint8_t data[CUBE_PAYLOAD_MAX] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
     unsigned kinds[3] = {0}, lies = 0;
     const size_t head = sizeof(struct node_page_head);
-    (void)unused;
     begin(HOST_LIE_PAGE, 1);
     for (unsigned k = 0; k < MESSAGES; k++) {
         size_t size = page_bytes(data, INCODE_BRICK_BYTES);
@@ -395,9 +381,8 @@ static void pages_are_altered(void **unused) {
     assert_memory_equal(liar.out, data, size);
 }
 
-static void other_messages_are_true(void **unused) {
+TEST(other_messages_are_true) {
     const struct node_finished_message finished = {.epoch = 3};
-    (void)unused;
     for (int way = 0; way < HOST_LIES; way++) {
         begin((enum host_lie)way, 1);
         assert_int_equal(host_liar_alter(&liar, PEER, NODE_LOAN_ASK, NULL, 0),
@@ -413,12 +398,11 @@ static void other_messages_are_true(void **unused) {
 /* --- what leaves ---------------------------------------------------------- */
 
 /* A lie counts once its message has left. */
-static void lies_are_counted(void **unused) {
+TEST(lies_are_counted) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     struct cube cube = {.room = 0};
     struct node_counted counted = {.cube = &cube};
     size_t size = results(0, data);
-    (void)unused;
     begin(HOST_LIE_DROP, 1);
     assert_int_equal(
         host_liar_write(&liar, &counted, CUBE_HOST, NODE_RESULT, data, size),
@@ -433,7 +417,7 @@ static void lies_are_counted(void **unused) {
 }
 
 /* As many messages as the link takes, the true one never; each counted. */
-static void floods_have_no_end(void **unused) {
+TEST(floods_have_no_end) {
     uint8_t data[CUBE_PAYLOAD_MAX + NODE_RESULT_SLACK];
     struct cube cube = {.room = MESSAGES};
     struct node_counted counted = {.cube = &cube};
@@ -441,7 +425,6 @@ static void floods_have_no_end(void **unused) {
     size_t size = results(0, data);
     struct seen seen;
     uint32_t v[4];
-    (void)unused;
     row_of(0, 0, v);
     for (int way = HOST_LIE_FLOOD; way <= HOST_LIE_SPILLS; way++) {
         begin((enum host_lie)way, 1);
@@ -472,20 +455,15 @@ static void floods_have_no_end(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(results_are_altered),
-        cmocka_unit_test(both_orientations_are_told),
-        cmocka_unit_test(what_does_not_fit_is_not_told),
-        cmocka_unit_test(answers_are_altered),
-        cmocka_unit_test(what_is_lent_is_altered),
-        cmocka_unit_test(tuples_are_altered),
-        cmocka_unit_test(findings_are_altered),
-        cmocka_unit_test(shared_ones_are_altered),
-        cmocka_unit_test(pages_are_altered),
-        cmocka_unit_test(other_messages_are_true),
-        cmocka_unit_test(lies_are_counted),
-        cmocka_unit_test(floods_have_no_end),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(results_are_altered),
+          cmocka_unit_test(both_orientations_are_told),
+          cmocka_unit_test(what_does_not_fit_is_not_told),
+          cmocka_unit_test(answers_are_altered),
+          cmocka_unit_test(what_is_lent_is_altered),
+          cmocka_unit_test(tuples_are_altered),
+          cmocka_unit_test(findings_are_altered),
+          cmocka_unit_test(shared_ones_are_altered),
+          cmocka_unit_test(pages_are_altered),
+          cmocka_unit_test(other_messages_are_true),
+          cmocka_unit_test(lies_are_counted),
+          cmocka_unit_test(floods_have_no_end))

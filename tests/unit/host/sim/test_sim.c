@@ -3,20 +3,15 @@
  * node at each frame that it sends.  INCODE_SIM_STRIDE: of those frames one in
  * so many (1: all).  Fewer under the sanitizers: they look at the code that
  * each fate and restart goes through, and it is the same at most frames. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 #include "host/base/parallel.h"
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 #include "host/sim/sim.h"
 #include "tests/unit/emulated.h"
+#include "tests/unit/test.h"
 
 enum { STRIDE = 11, STRIDE_SANITIZED = 61, STRIDE_EMULATED = 97 };
 
@@ -40,9 +35,8 @@ static struct host_sim_outcome run(const struct host_sim_plan *plan) {
     return outcome;
 }
 
-static void the_same_seed_is_the_same_run(void **unused) {
+TEST(the_same_seed_is_the_same_run) {
     uint64_t before = 0;
-    (void)unused;
     for (uint64_t seed = 1; seed <= (emulated() ? 1 : 6); seed++) {
         struct host_sim_plan plan;
         host_sim_plan_draw(&plan, seed, 0);
@@ -80,11 +74,10 @@ static struct host_sim_plan small_run(void) {
     return plan;
 }
 
-static void each_frame_meets_each_fate(void **unused) {
+TEST(each_frame_meets_each_fate) {
     struct host_sim_plan plan = small_run();
     struct host_sim_outcome clean = run(&plan);
     uint64_t runs = 0, changed = 0, step = stride();
-    (void)unused;
     for (int fate = SIM_DROPPED; fate <= SIM_LATE; fate++) {
         plan.fate = (enum sim_fate)fate;
         for (uint64_t k = 1 + (uint64_t)fate % step; k <= clean.frames;
@@ -102,11 +95,10 @@ static void each_frame_meets_each_fate(void **unused) {
     assert_true(2 * changed > runs);
 }
 
-static void each_node_restarts_at_each_frame(void **unused) {
+TEST(each_node_restarts_at_each_frame) {
     struct host_sim_plan plan = small_run();
     struct host_sim_outcome clean = run(&plan);
     uint64_t runs = 0, restarts = 0, step = stride();
-    (void)unused;
     plan.restart = true;
     for (unsigned node = 0; node < 4; node++) {
         plan.restart_node = node;
@@ -126,9 +118,8 @@ static void each_node_restarts_at_each_frame(void **unused) {
 
 /* Seed 151: nodes of an exchange that are done lend pages to those who are not,
  * also such as the shuffle keeps back, and nobody's patience ends. */
-static void who_is_done_lends_on(void **unused) {
+TEST(who_is_done_lends_on) {
     struct host_sim_plan plan;
-    (void)unused;
     host_sim_plan_draw(&plan, 151, 0);
     assert_string_equal(plan.strategy->name, "exchange");
     assert_true(plan.shuffle_seed != 0);

@@ -2,17 +2,12 @@
  * where they should, that what breaks is whole again when all that broke it is
  * taken back; and that every kind of fault can be drawn, strike and be counted.
  */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/sim/sim_cube.h"
 #include "host/sim/sim_plan.h"
+#include "tests/unit/test.h"
 
 static const struct host_sim_cube_options plain = {
     .seed = 1,
@@ -59,8 +54,7 @@ static void check_wire(const struct host_sim_cube *cube, unsigned from,
     }
 }
 
-static void every_wire_leads_where_it_should(void **unused) {
-    (void)unused;
+TEST(every_wire_leads_where_it_should) {
     for (unsigned dimension = 0; dimension <= 5; dimension++) {
         struct host_sim_cube cube;
         struct host_sim_cube_options o = plain;
@@ -80,10 +74,9 @@ static void every_wire_leads_where_it_should(void **unused) {
     }
 }
 
-static void a_host_may_have_more_wires(void **unused) {
+TEST(a_host_may_have_more_wires) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
-    (void)unused;
     o.dimension = 3;
     o.host_ports = 4;
     open_cube(&cube, &o);
@@ -100,10 +93,9 @@ static void a_host_may_have_more_wires(void **unused) {
 }
 
 /* What breaks a wire twice must be taken back twice. */
-static void a_wire_breaks_as_often_as_it_is_mended(void **unused) {
+TEST(a_wire_breaks_as_often_as_it_is_mended) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
-    (void)unused;
     o.dimension = 2;
     open_cube(&cube, &o);
     unsigned wire = host_sim_cube_wire(&cube, 1, 1);
@@ -133,10 +125,9 @@ static void a_wire_breaks_as_often_as_it_is_mended(void **unused) {
 }
 
 /* Node 0 sees the connection before break once, and has the other's bytes. */
-static void one_host_is_connected_at_a_time(void **unused) {
+TEST(one_host_is_connected_at_a_time) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
-    (void)unused;
     o.dimension = 1;
     o.second_host = true;
     open_cube(&cube, &o);
@@ -169,11 +160,10 @@ static void wake(void *context, unsigned place, uint64_t us) {
 }
 
 /* Who is sent something is told when it comes; all that is sent is traced. */
-static void bytes_wake_and_leave_a_trace(void **unused) {
+TEST(bytes_wake_and_leave_a_trace) {
     struct host_sim_cube cube;
     struct host_sim_cube_options o = plain;
     uint64_t traces[3];
-    (void)unused;
     o.dimension = 2;
     o.wake = wake;
     o.context = &woken;
@@ -192,9 +182,8 @@ static void bytes_wake_and_leave_a_trace(void **unused) {
 }
 
 /* Each row of the table can be drawn, and is, and says what it does. */
-static void every_kind_of_fault_is_drawn(void **unused) {
+TEST(every_kind_of_fault_is_drawn) {
     unsigned wanted[HOST_SIM_FAULTS] = {0};
-    (void)unused;
     for (uint64_t seed = 1; seed <= 400; seed++) {
         struct host_sim_plan plan;
         host_sim_plan_draw(&plan, seed, 0);
@@ -212,14 +201,9 @@ static void every_kind_of_fault_is_drawn(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_wire_leads_where_it_should),
-        cmocka_unit_test(a_host_may_have_more_wires),
-        cmocka_unit_test(a_wire_breaks_as_often_as_it_is_mended),
-        cmocka_unit_test(one_host_is_connected_at_a_time),
-        cmocka_unit_test(bytes_wake_and_leave_a_trace),
-        cmocka_unit_test(every_kind_of_fault_is_drawn),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(every_wire_leads_where_it_should),
+          cmocka_unit_test(a_host_may_have_more_wires),
+          cmocka_unit_test(a_wire_breaks_as_often_as_it_is_mended),
+          cmocka_unit_test(one_host_is_connected_at_a_time),
+          cmocka_unit_test(bytes_wake_and_leave_a_trace),
+          cmocka_unit_test(every_kind_of_fault_is_drawn))

@@ -3,18 +3,13 @@
 #ifndef TESTS_CHECK_WORLD_H
 #define TESTS_CHECK_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 enum { FAULTS_MAX = 1 << 16 };
 

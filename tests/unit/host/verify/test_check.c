@@ -69,8 +69,7 @@ static void passes(struct fixture *f) {
     }
 }
 
-static void right_results_pass(void **unused) {
-    (void)unused;
+TEST(right_results_pass) {
     for_each_set(passes);
 }
 
@@ -200,8 +199,7 @@ static void single(struct fixture *f) {
         at_each_place(f, damage[i]);
 }
 
-static void damage_is_found(void **unused) {
-    (void)unused;
+TEST(damage_is_found) {
     for_each_set(single);
 }
 
@@ -235,8 +233,7 @@ static void drop_bricks(struct fixture *f) {
     }
 }
 
-static void missing_bricks_are_found(void **unused) {
-    (void)unused;
+TEST(missing_bricks_are_found) {
     for_each_set(drop_bricks);
 }
 
@@ -264,8 +261,7 @@ static void drop_owned(struct fixture *f) {
     }
 }
 
-static void missing_stars_are_found(void **unused) {
-    (void)unused;
+TEST(missing_stars_are_found) {
     for_each_set(drop_owned);
 }
 
@@ -276,13 +272,11 @@ static void twice(struct fixture *f) {
     expect_found(f, "everything twice", NULL, 0);
 }
 
-static void whole_repeats_are_found(void **unused) {
-    (void)unused;
+TEST(whole_repeats_are_found) {
     for_each_set(twice);
 }
 
-static void nothing_is_found(void **unused) {
-    (void)unused;
+TEST(nothing_is_found) {
     struct fixture f;
     struct host_check_report r;
     open_set(&f, "uniform", 100, 1);
@@ -294,8 +288,7 @@ static void nothing_is_found(void **unused) {
 
 /* --- Garbage -------------------------------------------------------------- */
 
-static void garbage_is_refused(void **unused) {
-    (void)unused;
+TEST(garbage_is_refused) {
     struct fixture f;
     open_set(&f, "grid", 125, 3);
     for (int round = 0; round < 500; round++) {
@@ -321,8 +314,7 @@ static void hear_few(void *context, const uint64_t *tets, int tet_count,
     ++*(int *)context;
 }
 
-static void faults_are_bounded(void **unused) {
-    (void)unused;
+TEST(faults_are_bounded) {
     struct fixture f;
     struct host_check_report r;
     open_set(&f, "uniform", 300, 2);

@@ -29,8 +29,7 @@ static void leave_out(struct fixture *f, const uint32_t vertex[120],
     host_tetrahedra_free(&tets);
 }
 
-static void a_left_out_point_is_found(void **unused) {
-    (void)unused;
+TEST(a_left_out_point_is_found) {
     struct fixture f;
     uint32_t vertex[120] = {0};
     open_set(&f, "uniform", 120, 5);
@@ -95,15 +94,13 @@ static void flips(struct fixture *f) {
     }
 }
 
-static void only_spheres_tell_a_flip(void **unused) {
-    (void)unused;
+TEST(only_spheres_tell_a_flip) {
     for_each_set(flips);
 }
 
 /* Five points cut in both ways, besides all that is right: every new facet
  * belongs to two tetrahedra, both on one side. */
-static void a_body_twice_is_found(void **unused) {
-    (void)unused;
+TEST(a_body_twice_is_found) {
     struct fixture f;
     int bodies = 0;
     open_set(&f, "uniform", 300, 8);
@@ -159,8 +156,7 @@ static bool cover(struct fixture *f, const uint32_t p[3]) {
     return false;
 }
 
-static void flat_ones_are_found(void **unused) {
-    (void)unused;
+TEST(flat_ones_are_found) {
     struct fixture f;
     int covered = 0;
     open_set(&f, "grid", 64, 1);
@@ -182,8 +178,7 @@ static void flat_ones_are_found(void **unused) {
 /* Five tetrahedra about an axis, from each corner of a pentagon to the next but
  * one: positive, closed, of Euler characteristic 2 and convex at every edge,
  * but wound twice. */
-static void a_surface_wound_twice_is_found(void **unused) {
-    (void)unused;
+TEST(a_surface_wound_twice_is_found) {
     static const double pi = 3.14159265358979323846;
     double xyz[21] = {0, 0, -1, 0, 0, 1};
     struct host_check_report r;
@@ -210,8 +205,7 @@ static void a_surface_wound_twice_is_found(void **unused) {
 }
 
 /* Odd and even points by themselves: every facet fits, and yet. */
-static void two_bodies_are_found(void **unused) {
-    (void)unused;
+TEST(two_bodies_are_found) {
     struct fixture f, part[2];
     double xyz[2][90], all[180];
     struct host_check_report r;
@@ -241,8 +235,7 @@ static void two_bodies_are_found(void **unused) {
 /* All tetrahedra at one vertex get a false vertex: a number out of range, which
  * is seen at once, or an unused slot, for which all is summed anew.  Both times
  * the same faults are counted, each once, with the vertex left alone. */
-static void false_vertices_count_once(void **unused) {
-    (void)unused;
+TEST(false_vertices_count_once) {
     struct fixture f;
     struct host_check_report r[2];
     uint32_t free_slot = 0, alone;
@@ -291,8 +284,7 @@ static int compare_vertices(const void *a, const void *b) {
 
 /* Sums at vertices leave little to be paired one by one: the tetrahedra whose
  * lowest or second vertex is the lowest of a facet of the hull. */
-static void sums_leave_little_to_pair(void **unused) {
-    (void)unused;
+TEST(sums_leave_little_to_pair) {
     struct fixture f;
     struct host_check_report r;
     static bool lowest[64 * 64];

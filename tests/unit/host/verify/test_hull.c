@@ -41,8 +41,7 @@ static const char *const other_than_two =
     "is an edge of other than two hull facets";
 static const char *const opposite = "has hull facets of opposite orientation";
 
-static void open_surfaces_are_found(void **unused) {
-    (void)unused;
+TEST(open_surfaces_are_found) {
     assert_int_equal(heard((const uint32_t[]){0, 1, 2, 3}, 4, other_than_two),
                      0);
     assert_int_equal(heard((const uint32_t[]){0, 1, 2}, 3, other_than_two), 3);
@@ -53,21 +52,18 @@ static void open_surfaces_are_found(void **unused) {
 
 /* Facet (0 1 3) of the first, and (0 3 1) of the second, run along their common
  * edges each way; facets (0 2 1) and (0 3 1) both from 1 to 0. */
-static void turned_facets_are_found(void **unused) {
-    (void)unused;
+TEST(turned_facets_are_found) {
     assert_int_equal(heard((const uint32_t[]){2, 4 + 3}, 2, opposite), 0);
     assert_int_equal(heard((const uint32_t[]){3, 4 + 3}, 2, opposite), 1);
 }
 
 /* Facets (0 2 1) and (0 1 5) lie in one plane and over each other. */
-static void folds_are_found(void **unused) {
-    (void)unused;
+TEST(folds_are_found) {
     assert_int_equal(
         heard((const uint32_t[]){3, 8 + 3}, 2, "is a dent of the hull"), 1);
 }
 
-static void nothing_has_no_hull(void **unused) {
-    (void)unused;
+TEST(nothing_has_no_hull) {
     assert_int_equal(heard(NULL, 0, "there is no hull"), 1);
 }
 

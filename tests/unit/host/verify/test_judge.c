@@ -91,8 +91,7 @@ static void judge_all(struct fixture *f, uint64_t most) {
     host_judge_free(&judge);
 }
 
-static void judged_as_by_trying_all(void **unused) {
-    (void)unused;
+TEST(judged_as_by_trying_all) {
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
         struct fixture f;
         open_set(&f, sets[i].kind, sets[i].n, i + 1);
@@ -103,8 +102,7 @@ static void judged_as_by_trying_all(void **unused) {
 
 /* Lattices whose steps no double has: points at, or a rounding beside, spheres
  * and the corners of boxes. */
-static void judged_on_lattices(void **unused) {
-    (void)unused;
+TEST(judged_on_lattices) {
     static const double parts[][3] = {{10, 10, 10}, {3, 7, 11}};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         enum { SIDE = 8, POINTS = SIDE * SIDE * SIDE };
@@ -122,8 +120,7 @@ static void judged_on_lattices(void **unused) {
 }
 
 /* Axes far apart in size; products that overflow, and such that vanish. */
-static void judged_at_the_ends_of_the_range(void **unused) {
-    (void)unused;
+TEST(judged_at_the_ends_of_the_range) {
     static const int powers[][3] = {
         {400, 400, 400}, {-400, -400, -400}, {1000, 0, -1000}, {0, 0, -1060}};
     for (size_t i = 0; i < sizeof powers / sizeof *powers; i++) {
@@ -141,8 +138,7 @@ static void judged_at_the_ends_of_the_range(void **unused) {
 }
 
 /* Groups of bricks, most of which need no look: the boxes decide rightly. */
-static void judged_among_many(void **unused) {
-    (void)unused;
+TEST(judged_among_many) {
     struct host_judge judge;
     struct host_error error = {0};
     struct fixture f = {.state = 7};

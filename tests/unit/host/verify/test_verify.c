@@ -3,18 +3,13 @@
  * data. */
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 struct fixture {
     struct host_points points;
@@ -55,8 +50,7 @@ static void expect(struct fixture *f, const char *what) {
     assert_non_null(strstr(error.text, "; "));
 }
 
-static void data_agrees(void **unused) {
-    (void)unused;
+TEST(data_agrees) {
     static const struct {
         const char *name;
         uint64_t tetrahedra;
@@ -116,8 +110,7 @@ static void data_agrees(void **unused) {
     }
 }
 
-static void right_ones_pass(void **unused) {
-    (void)unused;
+TEST(right_ones_pass) {
     static const struct {
         const char *kind;
         uint32_t n;
@@ -137,8 +130,7 @@ static void right_ones_pass(void **unused) {
     }
 }
 
-static void range_beyond_scaling(void **unused) {
-    (void)unused;
+TEST(range_beyond_scaling) {
     struct fixture f = {0};
     struct host_error error = {0};
     assert_int_equal(host_gen("uniform", 60, 3, &f.points, &error), 0);
@@ -153,8 +145,7 @@ static void range_beyond_scaling(void **unused) {
 }
 
 /* Corners as far away as doubles go. */
-static void ends_of_the_range(void **unused) {
-    (void)unused;
+TEST(ends_of_the_range) {
     struct fixture f = {0};
     struct host_error error = {0};
     for (int i = 0; i < 8; i++) {
@@ -169,8 +160,7 @@ static void ends_of_the_range(void **unused) {
     close_fixture(&f);
 }
 
-static void each_turned_one_is_found(void **unused) {
-    (void)unused;
+TEST(each_turned_one_is_found) {
     struct fixture f = made("uniform", 40, 5);
     for (uint64_t i = 0; i < f.tets.count; i++) {
         uint32_t t = f.tets.v[i][2];
@@ -184,8 +174,7 @@ static void each_turned_one_is_found(void **unused) {
     close_fixture(&f);
 }
 
-static void each_missing_one_is_found(void **unused) {
-    (void)unused;
+TEST(each_missing_one_is_found) {
     struct fixture f = made("uniform", 40, 6);
     uint64_t count = f.tets.count;
     for (uint64_t i = 0; i < count; i++) {
@@ -204,8 +193,7 @@ static void each_missing_one_is_found(void **unused) {
     close_fixture(&f);
 }
 
-static void each_doubled_one_is_found(void **unused) {
-    (void)unused;
+TEST(each_doubled_one_is_found) {
     struct fixture f = made("uniform", 40, 7);
     uint64_t count = f.tets.count;
     for (uint64_t i = 0; i < count; i++) {
@@ -221,8 +209,7 @@ static void each_doubled_one_is_found(void **unused) {
     close_fixture(&f);
 }
 
-static void each_wrong_apex_is_found(void **unused) {
-    (void)unused;
+TEST(each_wrong_apex_is_found) {
     struct fixture f = made("uniform", 40, 8);
     for (uint64_t i = 0; i < f.tets.count; i++) {
         uint32_t *t = f.tets.v[i];
@@ -295,15 +282,13 @@ static int flips_found(const char *kind, uint32_t n, uint64_t seed) {
     return flips;
 }
 
-static void each_flip_is_found(void **unused) {
-    (void)unused;
+TEST(each_flip_is_found) {
     assert_true(flips_found("uniform", 30, 9) >= 10);
     assert_true(flips_found("grid", 27, 9) >= 0);
 }
 
 /* Six cospherical points: three ways to cut them, one is right. */
-static void wrong_ties_are_found(void **unused) {
-    (void)unused;
+TEST(wrong_ties_are_found) {
     const double xyz[18] = {1, 0,  0, -1, 0, 0, 0, 1, 0,
                             0, -1, 0, 0,  0, 1, 0, 0, -1};
     int passed = 0;
@@ -330,8 +315,7 @@ static void wrong_ties_are_found(void **unused) {
     assert_int_equal(passed, 1);
 }
 
-static void unused_points_are_found(void **unused) {
-    (void)unused;
+TEST(unused_points_are_found) {
     struct fixture f = made("uniform", 40, 10);
     struct host_error error = {0};
     const double inside[3] = {0.5, 0.5, 0.5}, outside[3] = {2, 2, 2};
@@ -345,8 +329,7 @@ static void unused_points_are_found(void **unused) {
     close_fixture(&f);
 }
 
-static void duplicates_stand_for_the_lowest(void **unused) {
-    (void)unused;
+TEST(duplicates_stand_for_the_lowest) {
     struct fixture f = made("uniform", 40, 11);
     struct host_error error = {0};
     struct host_check_report r;
@@ -363,8 +346,7 @@ static void duplicates_stand_for_the_lowest(void **unused) {
 }
 
 /* Odd and even points by themselves: every facet fits, and yet. */
-static void two_bodies_are_found(void **unused) {
-    (void)unused;
+TEST(two_bodies_are_found) {
     struct fixture f = made("uniform", 30, 12), g = made("uniform", 30, 13);
     struct host_error error = {0};
     assert_int_equal(host_points_append(&f.points, g.points.xyz, 30, &error),
@@ -382,8 +364,7 @@ static void two_bodies_are_found(void **unused) {
 
 /* All tetrahedra at a vertex of the hull left out, and the vertex too: a dent
  * or another hull. */
-static void dents_are_found(void **unused) {
-    (void)unused;
+TEST(dents_are_found) {
     struct fixture f = made("sphere", 60, 14);
     uint64_t kept = 0;
     for (uint64_t i = 0; i < f.tets.count; i++) {
@@ -396,8 +377,7 @@ static void dents_are_found(void **unused) {
     close_fixture(&f);
 }
 
-static void nothing_is_no_triangulation(void **unused) {
-    (void)unused;
+TEST(nothing_is_no_triangulation) {
     struct fixture f = made("uniform", 10, 15);
     host_tetrahedra_cut(&f.tets, 0);
     expect(&f, "point (0) is a vertex of no tetrahedron");
@@ -405,8 +385,7 @@ static void nothing_is_no_triangulation(void **unused) {
 }
 
 /* Rows of any numbers, the same vertex twice included. */
-static void garbage_is_refused(void **unused) {
-    (void)unused;
+TEST(garbage_is_refused) {
     struct fixture f = {0};
     struct host_error error = {0};
     uint64_t state = 1;

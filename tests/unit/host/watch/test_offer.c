@@ -3,23 +3,18 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "host/base/error.h"
 #include "host/watch/look.h"
 #include "host/watch/offer.h"
 #include "node/version.h"
+#include "tests/unit/test.h"
 
 enum {
     NODES = 4,
@@ -127,10 +122,9 @@ static void look_at(struct host_look *look) {
 
 /* --- looks ---------------------------------------------------------------- */
 
-static void test_nobody(void **unused) {
+TEST(test_nobody) {
     struct host_look look;
     struct host_holder who;
-    (void)unused;
     assert_false(host_holder_find(&who, wire));
     assert_int_equal(host_look_open(&look, wire, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "no program of this machine has it; "));
@@ -150,10 +144,9 @@ static void check_answers(const struct host_look *look, unsigned what) {
     }
 }
 
-static void test_answers(void **unused) {
+TEST(test_answers) {
     struct host_look look;
     uint64_t before = 0;
-    (void)unused;
     begin_holder();
     look_at(&look);
     assert_int_equal(look.nodes, NODES);
@@ -180,10 +173,9 @@ static void test_answers(void **unused) {
     end_holder();
 }
 
-static void test_holder(void **unused) {
+TEST(test_holder) {
     struct host_holder who;
     char text[HOST_HOLDER_TEXT], number[40];
-    (void)unused;
     begin_holder();
     assert_true(host_holder_find(&who, wire));
     assert_int_equal(who.pid, holder);
@@ -198,9 +190,8 @@ static void test_holder(void **unused) {
     assert_false(host_holder_find(&who, wire));
 }
 
-static void test_several(void **unused) {
+TEST(test_several) {
     struct host_look look[HOST_LOOKERS_MAX], late;
-    (void)unused;
     begin_holder();
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         look_at(&look[i]);
@@ -228,11 +219,10 @@ static void test_several(void **unused) {
 }
 
 /* However the other ends, its place is free at once. */
-static void test_killed(void **unused) {
+TEST(test_killed) {
     struct host_look look;
     struct host_holder who;
     int status;
-    (void)unused;
     begin_holder();
     look_at(&look);
     kill(holder, SIGKILL);
@@ -249,9 +239,8 @@ static void test_killed(void **unused) {
 
 /* Who stands still is waited for no longer than one has patience; clock: a
  * fifth of a second, in which nobody could answer. */
-static void test_stopped(void **unused) {
+TEST(test_stopped) {
     struct host_look look;
-    (void)unused;
     begin_holder();
     look_at(&look);
     kill(holder, SIGSTOP);
@@ -269,12 +258,11 @@ static void test_stopped(void **unused) {
 }
 
 /* Whoever asks who has it, and how often: it is had. */
-static void test_queue(void **unused) {
+TEST(test_queue) {
     enum { CALLS = 200 };
     struct host_look look;
     struct host_holder who;
     char text[HOST_HOLDER_TEXT];
-    (void)unused;
     begin_holder();
     look_at(&look);
     kill(holder, SIGSTOP);
@@ -319,13 +307,12 @@ static void says(int file, const char *text) {
                      strlen(text));
 }
 
-static void test_nonsense(void **unused) {
+TEST(test_nonsense) {
     static const char *const lines[] = {
         "who\n", "{\"ask\":\"who\",\"nodes\":\"9\"}\n", "{\"ask\":\"probe\"}\n",
         "{\"ask\":7}\n", "\n"};
     static char much[3 * HOST_LOOK_QUESTION_BYTES];
     char byte;
-    (void)unused;
     begin_holder();
     int file = call();
     hears(file, "\"incode\":\"" NODE_VERSION "\"");
@@ -343,10 +330,9 @@ static void test_nonsense(void **unused) {
 }
 
 /* Who does not read is dropped after a while; the others go on. */
-static void test_deaf(void **unused) {
+TEST(test_deaf) {
     struct host_look look;
     int size = 1, file;
-    (void)unused;
     begin_holder();
     file = call();
     (void)setsockopt(file, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
@@ -364,11 +350,10 @@ static void test_deaf(void **unused) {
 }
 
 /* The next one waits for the place, and takes it. */
-static void test_next(void **unused) {
+TEST(test_next) {
     struct host_look look;
     pid_t first;
     int first_end, status;
-    (void)unused;
     begin_holder();
     first = holder;
     first_end = end;
@@ -441,12 +426,11 @@ static void make_calls(int family, struct sockaddr *at, socklen_t size,
     assert_int_equal(connect(*call, at, size), 0);
 }
 
-static void test_other_users(void **unused) {
+TEST(test_other_users) {
     struct sockaddr_in in = {.sin_family = AF_INET,
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     struct sockaddr_un un = {.sun_family = AF_UNIX};
     int listener, call, other;
-    (void)unused;
     if (geteuid() != 0)
         skip();
     int terminal = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
@@ -471,19 +455,14 @@ static void test_other_users(void **unused) {
     assert_int_equal(unlink(un.sun_path), 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_nobody, set_up),
-        cmocka_unit_test_setup(test_answers, set_up),
-        cmocka_unit_test_setup(test_holder, set_up),
-        cmocka_unit_test_setup(test_several, set_up),
-        cmocka_unit_test_setup(test_killed, set_up),
-        cmocka_unit_test_setup(test_stopped, set_up),
-        cmocka_unit_test_setup(test_queue, set_up),
-        cmocka_unit_test_setup(test_nonsense, set_up),
-        cmocka_unit_test_setup(test_deaf, set_up),
-        cmocka_unit_test_setup(test_next, set_up),
-        cmocka_unit_test_setup(test_other_users, set_up),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(test_nobody, set_up),
+          cmocka_unit_test_setup(test_answers, set_up),
+          cmocka_unit_test_setup(test_holder, set_up),
+          cmocka_unit_test_setup(test_several, set_up),
+          cmocka_unit_test_setup(test_killed, set_up),
+          cmocka_unit_test_setup(test_stopped, set_up),
+          cmocka_unit_test_setup(test_queue, set_up),
+          cmocka_unit_test_setup(test_nonsense, set_up),
+          cmocka_unit_test_setup(test_deaf, set_up),
+          cmocka_unit_test_setup(test_next, set_up),
+          cmocka_unit_test_setup(test_other_users, set_up))

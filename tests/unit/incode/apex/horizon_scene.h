@@ -4,17 +4,12 @@
 #define TESTS_HORIZON_SCENE_H
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/order.h"
 #include "incode/apex/horizon.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 1;
 

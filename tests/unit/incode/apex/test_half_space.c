@@ -1,10 +1,6 @@
-#include <setjmp.h>
 #include <stdalign.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <math.h>
 #include <string.h>
 
@@ -85,12 +81,11 @@ static struct incode_half_space half_space_of(const double *const f[4],
     return s;
 }
 
-static void ball_on_a_rough_plane(void **unused) {
+TEST(ball_on_a_rough_plane) {
     enum { SIDE = 24, POINTS = SIDE * SIDE };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
     size_t balls = 0, outside = 0, small = 0, firsts = 0;
-    (void)unused;
     for (int k = 0; k < 400; k++) {
         double size = ldexp(1, (int)below(80) - 40), scale = 0.5 / size;
         size_t n = lattice(p, SIDE, size);
@@ -131,12 +126,11 @@ static void ball_on_a_rough_plane(void **unused) {
 
 /* Four points of a square of the lattice: in double precision their determinant
  * may cancel to nothing at all, and in twice the precision must not. */
-static void spheres_of_rough_squares(void **unused) {
+TEST(spheres_of_rough_squares) {
     enum { SIDE = 24, POINTS = SIDE * SIDE };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
     size_t vanished = 0, outside = 0;
-    (void)unused;
     for (int k = 0; k < 4000; k++) {
         size_t n = lattice(p, SIDE, 1), at = below(n - 2 * SIDE - 2);
         const double *f[4] = {p[at], p[at + 1], p[at + SIDE], p[at + SIDE + 1]};
@@ -187,10 +181,9 @@ static bool set_pencil(struct incode_pencil *pencil, const double b[3],
 }
 
 /* The places of points in a pencil against the predicates. */
-static void places_in_a_pencil(void **unused) {
+TEST(places_in_a_pencil) {
     struct incode_tally tally = {0};
     size_t compared = 0;
-    (void)unused;
     for (int k = 0; k < 200000; k++) {
         double p[5][3], b[3], c[3], r[2][3], t[2];
         struct incode_pencil pencil = {{0}, {0}, 1};
@@ -222,12 +215,11 @@ static void places_in_a_pencil(void **unused) {
 
 /* The first of the local points, in float: none that is left out may come
  * before the bound. */
-static void first_of_the_local_points(void **unused) {
+TEST(first_of_the_local_points) {
     static struct incode_local_points g;
     static const double lo[3] = {0, 0, 0}, hi[3] = {1, 1, 1};
     uint16_t out[INCODE_NEAR_ALL];
     size_t found = 0;
-    (void)unused;
     for (int k = 0; k < 2000; k++) {
         double far = ldexp(1, (int)below(40));
         incode_local_reset(&g);
@@ -281,12 +273,11 @@ static const double *first_of(const double *const f[3], const double *const *p,
 
 /* A random face of a cubic lattice that is turned and rounded, and the other
  * corners of its cell: all on one sphere but for the rounding. */
-static void close_candidates_of_a_rough_lattice(void **unused) {
+TEST(close_candidates_of_a_rough_lattice) {
     static const double turn[3][3] = {
         {20, 20, -10}, {-4, 22, 20}, {22, -4, 20}};
     struct incode_tally tally = {0};
     size_t certain = 0, alone = 0;
-    (void)unused;
     for (int k = 0; k < 50000; k++) {
         bool exact = k % 10 == 0;
         int power = exact ? 0 : (int)below(200) - 100;
@@ -340,12 +331,11 @@ static void draw_empty(const double *t[4], double (*p)[3], size_t n,
 
 /* Points on a sphere up to rounding: what a radical plane rules out is outside.
  */
-static void radical_bounds_on_a_rough_sphere(void **unused) {
+TEST(radical_bounds_on_a_rough_sphere) {
     enum { POINTS = 24 };
     static double p[POINTS][3];
     struct incode_tally tally = {0};
     size_t set = 0, out = 0;
-    (void)unused;
     for (int k = 0; k < 300; k++) {
         struct incode_empty_spheres empty = {.count = 0};
         double size = ldexp(1, (int)below(40) - 20), scale = 1 / size;
@@ -395,10 +385,9 @@ static void radical_bounds_on_a_rough_sphere(void **unused) {
 
 /* A sphere of much larger scale: what a radical plane by it rules out is
  * outside, and where the products leave the range of doubles there is none. */
-static void radical_bounds_across_scales(void **unused) {
+TEST(radical_bounds_across_scales) {
     struct incode_tally tally = {0};
     size_t set = 0, out = 0;
-    (void)unused;
     for (int power = 0; power < 1020; power += 4) {
         double big = ldexp(1, power / 2), small = ldexp(1, -power / 2);
         double large[4][3] = {
@@ -434,8 +423,7 @@ static void radical_bounds_across_scales(void **unused) {
 
 /* A point so near the vertex that their difference is lost when it is scaled:
  * where it lies in the pencil is not known, so it lessens nothing. */
-static void a_difference_that_vanishes(void **unused) {
-    (void)unused;
+TEST(a_difference_that_vanishes) {
     const double v[3] = {0, 0, 0}, b[3] = {0x1p60, 0, 0}, c[3] = {0, 0x1p60, 0};
     const double near[3] = {0, 0, 0x1p-1060}, within[3] = {0x1p58, 0x1p58, 1};
     struct incode_near_degenerate degenerate = {
@@ -451,8 +439,7 @@ static void a_difference_that_vanishes(void **unused) {
 
 /* A face so small beside its units that products vanish: the sphere's centre is
  * lost, and a box that holds the sphere may hold the apex. */
-static void a_sphere_that_vanishes(void **unused) {
-    (void)unused;
+TEST(a_sphere_that_vanishes) {
     for (int power = -1074; power < 0; power++) {
         double size = ldexp(1, power);
         const double b[3] = {size, 0, 0}, c[3] = {0, size, 0};

@@ -282,8 +282,7 @@ static void check_set(making *make, const char *name, uint32_t n,
     close_scene(&s);
 }
 
-static void no_point_is_lost(void **unused) {
-    (void)unused;
+TEST(no_point_is_lost) {
     static const struct {
         making *make;
         const char *name;
@@ -314,16 +313,14 @@ static void no_point_is_lost(void **unused) {
 }
 
 /* More bricks than there is room for boxes; three levels of box pages. */
-static void no_point_is_lost_where_it_is_full(void **unused) {
-    (void)unused;
+TEST(no_point_is_lost_where_it_is_full) {
     struct tried tried = {0};
     check_set(terrain, "large terrain", 70000, 1, &tried);
     assert_true(tried.full > 0 && tried.full < tried.caps);
 }
 
 /* Planes through the horizon, of sets in which most is beyond all bounds. */
-static void half_spaces_hold_what_is_far(void **unused) {
-    (void)unused;
+TEST(half_spaces_hold_what_is_far) {
     struct scene s;
     open_scene(&s, all_scales, 2000);
     uint64_t *in = malloc(s.order.bricks * sizeof *in);

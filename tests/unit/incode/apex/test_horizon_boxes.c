@@ -12,8 +12,7 @@ static void half_space(const struct scene *s, uint32_t v, const double m[3],
     assert_true(incode_horizon_cap(s->h, cap, pv, s->h->scale, m, 0, m));
 }
 
-static void a_missing_page_is_named(void **unused) {
-    (void)unused;
+TEST(a_missing_page_is_named) {
     struct scene s;
     uint32_t missing = 0, waits = 0, brick;
     struct incode_horizon_cap cap;
@@ -62,8 +61,7 @@ static void a_missing_page_is_named(void **unused) {
     close_scene(&s);
 }
 
-static void too_many_bricks_are_told(void **unused) {
-    (void)unused;
+TEST(too_many_bricks_are_told) {
     struct scene s;
     uint32_t missing, brick = 7;
     open_scene(&s, volume, 30000);
@@ -78,8 +76,7 @@ static void too_many_bricks_are_told(void **unused) {
 }
 
 /* What is done is not reached, and all else is. */
-static void what_is_done_is_left_out(void **unused) {
-    (void)unused;
+TEST(what_is_done_is_left_out) {
     struct scene s;
     const double up[3] = {0.1, 0.2, 1};
     struct incode_horizon_cap cap;
@@ -121,8 +118,7 @@ static void check_copies(const struct incode_horizon *h) {
     }
 }
 
-static void copies_give_way(void **unused) {
-    (void)unused;
+TEST(copies_give_way) {
     struct scene s;
     const double up[3] = {0.1, 0.2, 1}, down[3] = {-0.1, -0.2, -1};
     struct incode_horizon_cap cap;
@@ -159,8 +155,7 @@ static void copies_give_way(void **unused) {
 
 /* ---- by a box ---- */
 
-static void a_box_misses_no_leaf(void **unused) {
-    (void)unused;
+TEST(a_box_misses_no_leaf) {
     static making *const sets[] = {volume, tiny_cluster, large, denormal};
     for (size_t k = 0; k < sizeof sets / sizeof *sets; k++) {
         struct scene s;
@@ -220,8 +215,7 @@ static double touched(struct scene *s, double radius, double side) {
     return (double)bricks / tries;
 }
 
-static void a_cap_beside_a_surface_reaches_little(void **unused) {
-    (void)unused;
+TEST(a_cap_beside_a_surface_reaches_little) {
     static const struct {
         double radius, side, most; /* twice what was counted */
     } balls[] = {{0.01, 1, 2.1}, {0.5, 1, 11},   {0.9, 1, 15},    {0.98, 1, 17},

@@ -1,14 +1,8 @@
 /* A maker alone: asked for the apexes of the faces of a known triangulation, in
  * no order that a front would have, by searches that are suspended for pages
  * which come late, at random, or have been replaced meanwhile. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "incode/apex/maker.h"
@@ -16,6 +10,7 @@
 #include "tests/unit/incode/oracle.h"
 #include "tests/unit/incode/solo.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 enum { GUARD = 256, QUEUE = 4096, SLOTS = 5, BATCH = 24, IDLE_MAX = 10000 };
 
@@ -211,8 +206,7 @@ static void answer_set(const struct host_points *set, enum incode_index index,
     close_bench(&b);
 }
 
-static void real_sets(void **unused) {
-    (void)unused;
+TEST(real_sets) {
     static const struct {
         const char *name;
         enum incode_index index;
@@ -236,8 +230,7 @@ static void real_sets(void **unused) {
     }
 }
 
-static void made_sets(void **unused) {
-    (void)unused;
+TEST(made_sets) {
     static const char *const kinds[] = {"uniform", "bluntfin", "rotated",
                                         "sphere", "hub"};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -260,8 +253,7 @@ static void made(struct host_points *points, uint64_t n) {
         fail_msg("%s", error.text);
 }
 
-static void first_tetrahedra(void **unused) {
-    (void)unused;
+TEST(first_tetrahedra) {
     struct host_points points = {0};
     struct bench b = {.chance = 77};
     made(&points, 3000);
@@ -285,8 +277,7 @@ static void first_tetrahedra(void **unused) {
 }
 
 /* A search that is abandoned anywhere leaves nothing to the next one. */
-static void abandoned(void **unused) {
-    (void)unused;
+TEST(abandoned) {
     struct host_points points = {0};
     struct bench b = {.chance = 5};
     made(&points, 3000);
@@ -311,8 +302,7 @@ static void abandoned(void **unused) {
 }
 
 /* Which searches wait is known, and a page that is fetched ahead is there. */
-static void waiting_and_ahead(void **unused) {
-    (void)unused;
+TEST(waiting_and_ahead) {
     struct host_points points = {0};
     struct bench b = {.chance = 0};
     made(&points, 3000);
@@ -359,8 +349,7 @@ static void waiting_and_ahead(void **unused) {
 }
 
 /* What fits is what the bytes say. */
-static void memory(void **unused) {
-    (void)unused;
+TEST(memory) {
     for (size_t bytes = 0; bytes < 3 << 20; bytes += 12345) {
         for (uint32_t copies = 16; copies <= INCODE_HORIZON_COPIES;
              copies += 8) {
@@ -375,11 +364,6 @@ static void memory(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(real_sets),         cmocka_unit_test(made_sets),
-        cmocka_unit_test(first_tetrahedra),  cmocka_unit_test(abandoned),
-        cmocka_unit_test(waiting_and_ahead), cmocka_unit_test(memory),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(real_sets), cmocka_unit_test(made_sets),
+          cmocka_unit_test(first_tetrahedra), cmocka_unit_test(abandoned),
+          cmocka_unit_test(waiting_and_ahead), cmocka_unit_test(memory))

@@ -1,13 +1,9 @@
 /* The error bounds of planes and spheres against rational numbers, where the
  * axes' scales differ and where they do not. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <gmp.h>
 
 #include "incode/apex/query.h"
@@ -157,8 +153,7 @@ static double check_scales(const double axis[3], double offset) {
     return 3. * sharper / all;
 }
 
-static void bounds_hold(void **unused) {
-    (void)unused;
+TEST(bounds_hold) {
     static const double axes[][3] = {{1, 1, 1},       {1e6, 1, 1},
                                      {1e6, 1e6, 1},   {1e3, 1, 1e-3},
                                      {1, 1e-6, 1e-6}, {1e-3, 1e-3, 1e3}};

@@ -5,17 +5,12 @@
 #ifndef TESTS_UNIT_COMPLEX_SCENE_H
 #define TESTS_UNIT_COMPLEX_SCENE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/tetrahedra.h"
 #include "incode/complex/complex.h"
+#include "tests/unit/test.h"
 
 enum { SCENE_GUARD = 64, SCENE_FILL = 0xa5 };
 

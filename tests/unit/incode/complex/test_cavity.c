@@ -152,13 +152,12 @@ static void show_others(drawing *draw, int exponent, bool *seen,
     scene_close(&s);
 }
 
-static void those_that_hold_a_point(void **unused) {
+TEST(those_that_hold_a_point) {
     static drawing *const draw[] = {volume,         grid,       plane, sphere,
                                     lattice_sphere, skew_lines, lumps};
     static const int exponents[] = {0, -300, 300, -1000, 900};
     bool seen[ALWAYS + 1] = {false}, refused = false;
     uint32_t sizes = 0;
-    (void)unused;
     for (size_t k = 0; k < sizeof draw / sizeof *draw; k++)
         for (size_t e = 0; e < sizeof exponents / sizeof *exponents; e++)
             show_others(draw[k], exponents[e], seen, &refused);
@@ -192,10 +191,9 @@ static uint32_t show_hub(double (*p)[3], uint32_t n, bool *listed) {
     return count;
 }
 
-static void hubs_of_each_size(void **unused) {
+TEST(hubs_of_each_size) {
     static double p[SPHERE][3];
     uint32_t listed_most = 0, refused = 0, most = SANITIZED ? 120 : 300;
-    (void)unused;
     for (uint32_t n = 4; n <= most; n += n < 60 ? 1 : 12) {
         bool listed;
         draw_set(sphere, 0, p, n);
@@ -209,11 +207,10 @@ static void hubs_of_each_size(void **unused) {
 }
 
 /* On a sphere but for rounding, and exactly, where all spheres are one. */
-static void a_hub_of_thousands(void **unused) {
+TEST(a_hub_of_thousands) {
     static double p[SPHERE][3];
     uint32_t n = SANITIZED ? SPHERE / 3 : SPHERE;
     bool listed;
-    (void)unused;
     assert_int_equal(draw_set(sphere, 0, p, n), n);
     assert_true(show_hub(p, n, &listed) > 2 * n);
     assert_false(listed);
@@ -234,12 +231,11 @@ static void a_hub_of_thousands(void **unused) {
 /* A facet of many points, seen at once from far above it, where all cells that
  * give way are infinite; in its plane their circles tell, from outside and from
  * within. */
-static void one_side_of_many_points(void **unused) {
+TEST(one_side_of_many_points) {
     static double p[DISC * DISC + 1][3];
     uint32_t row[DISC * DISC + 1], n = DISC * DISC + 1, sides;
     struct scene s = {.seed = 7};
     bool listed;
-    (void)unused;
     for (uint32_t i = 0; i < n; i++) {
         row[i] = i;
         uint32_t line = i / DISC;
@@ -268,12 +264,7 @@ static void one_side_of_many_points(void **unused) {
     scene_close(&s);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(those_that_hold_a_point, begin),
-        cmocka_unit_test_setup(hubs_of_each_size, begin),
-        cmocka_unit_test_setup(a_hub_of_thousands, begin),
-        cmocka_unit_test_setup(one_side_of_many_points, begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(those_that_hold_a_point, begin),
+          cmocka_unit_test_setup(hubs_of_each_size, begin),
+          cmocka_unit_test_setup(a_hub_of_thousands, begin),
+          cmocka_unit_test_setup(one_side_of_many_points, begin))

@@ -157,11 +157,10 @@ static void by_definition(const double (*p)[3], uint32_t n,
 
 /* ---- small sets, looked at after each insertion ---- */
 
-static void all_orders_are_one(void **unused) {
+TEST(all_orders_are_one) {
     struct scene s = {.each = true, .seed = 7};
     double p[SMALL][3];
     uint32_t row[SMALL], built = 0;
-    (void)unused;
     for (int round = 0; round < 12 * FAMILIES; round++) {
         struct host_tetrahedra tets = {0};
         uint32_t n = 4 + scene_draw(&seed, SMALL - 3);
@@ -184,12 +183,11 @@ static void all_orders_are_one(void **unused) {
 }
 
 /* Powers of two change nothing, down to denormals. */
-static void all_scales_are_one(void **unused) {
+TEST(all_scales_are_one) {
     static const int power[] = {-1074, -1073, -1000, -540, -358, -214,
                                 204,   340,   511,   900,  1015};
     double p[SMALL][3], q[SMALL][3];
     uint32_t row[SMALL], built = 0;
-    (void)unused;
     for (int family = 0; family < WHOLE; family++) {
         struct host_tetrahedra tets = {0};
         draw_set((enum family)family, p, SMALL);
@@ -252,9 +250,8 @@ static uint32_t cube(double (*p)[3], int side, bool hollow) {
     return n;
 }
 
-static void cubes(void **unused) {
+TEST(cubes) {
     static double p[LARGE][3];
-    (void)unused;
     for (int side = 2; side < 6; side++)
         assert_in_range(one_whatever_the_order(p, cube(p, side, false)),
                         5 * (side - 1) * (side - 1) * (side - 1),
@@ -262,9 +259,8 @@ static void cubes(void **unused) {
     (void)one_whatever_the_order(p, cube(p, 6, true));
 }
 
-static void points_of_spheres(void **unused) {
+TEST(points_of_spheres) {
     double p[31][3];
-    (void)unused;
     draw_set(SPHERE, p, 30);
     (void)one_whatever_the_order(p, 30);
     set_point(p[30], 0, 0, 0);
@@ -275,9 +271,8 @@ static void points_of_spheres(void **unused) {
 
 /* Each piece of one line sees each of the other, until a point between them
  * takes many of them away. */
-static void skew_lines(void **unused) {
+TEST(skew_lines) {
     double p[2 * LINE + 1][3];
-    (void)unused;
     for (int i = 0; i < LINE; i++) {
         set_point(p[2 * i], i, 0, 0);
         set_point(p[2 * i + 1], 0, i, 1);
@@ -290,10 +285,9 @@ static void skew_lines(void **unused) {
 
 /* A hull facet of many points, those of it that come later outside it, and what
  * sees all of it at once, first or last. */
-static void one_side_of_many_points(void **unused) {
+TEST(one_side_of_many_points) {
     double p[DISC * DISC + 2][3];
     uint32_t n = DISC * DISC;
-    (void)unused;
     for (int x = 0; x < DISC; x++)
         for (int y = 0; y < DISC; y++)
             set_point(p[DISC * x + y + 1], x, y, 0);
@@ -305,24 +299,18 @@ static void one_side_of_many_points(void **unused) {
                      4 * (DISC - 1) * (DISC - 1));
 }
 
-static void points_at_random(void **unused) {
+TEST(points_at_random) {
     static double p[LARGE][3];
-    (void)unused;
     draw_set(UNIFORM, p, LARGE);
     assert_in_range(one_whatever_the_order(p, LARGE), 6 * LARGE, 7 * LARGE);
     draw_set(ROUGH_PLANE, p, LARGE / 5);
     (void)one_whatever_the_order(p, LARGE / 5);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(all_orders_are_one, begin),
-        cmocka_unit_test_setup(all_scales_are_one, begin),
-        cmocka_unit_test_setup(cubes, begin),
-        cmocka_unit_test_setup(points_of_spheres, begin),
-        cmocka_unit_test_setup(skew_lines, begin),
-        cmocka_unit_test_setup(one_side_of_many_points, begin),
-        cmocka_unit_test_setup(points_at_random, begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(all_orders_are_one, begin),
+          cmocka_unit_test_setup(all_scales_are_one, begin),
+          cmocka_unit_test_setup(cubes, begin),
+          cmocka_unit_test_setup(points_of_spheres, begin),
+          cmocka_unit_test_setup(skew_lines, begin),
+          cmocka_unit_test_setup(one_side_of_many_points, begin),
+          cmocka_unit_test_setup(points_at_random, begin))

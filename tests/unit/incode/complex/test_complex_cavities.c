@@ -70,9 +70,8 @@ static void build_hub(double (*p)[3], uint32_t n, uint32_t before,
 
 /* The last comes into a cavity of 2 n - 4 facets: all numbers of them, where
  * there is room for their edges on the stack and where there is not. */
-static void cavities_of_each_size(void **unused) {
+TEST(cavities_of_each_size) {
     double p[HUB_MAX + 1][3] = {{0}};
-    (void)unused;
     for (uint32_t n = 4; n <= HUB_MAX; n++) {
         struct host_tetrahedra first = {0}, last = {0};
         uint64_t count[2];
@@ -92,12 +91,11 @@ static void cavities_of_each_size(void **unused) {
     }
 }
 
-static void a_hub_of_thousands(void **unused) {
+TEST(a_hub_of_thousands) {
     static double p[SPHERE + 1][3];
     struct host_tetrahedra tets[3] = {{0}};
     static const uint32_t before[3] = {0, SPHERE, SPHERE / 2};
     uint64_t count[2];
-    (void)unused;
     draw_sphere(p, SPHERE);
     for (int i = 0; i < 3; i++) {
         build_hub(p, SPHERE, before[i], &tets[i]);
@@ -112,12 +110,11 @@ static void a_hub_of_thousands(void **unused) {
 }
 
 /* All spheres are one, and it holds the hub. */
-static void a_hub_of_ties(void **unused) {
+TEST(a_hub_of_ties) {
     static double p[LATTICE + 1][3];
     struct host_tetrahedra first = {0}, last = {0};
     uint64_t count[2];
     uint32_t n = lattice_sphere(p, 1001);
-    (void)unused;
     assert_in_range(n, 200, LATTICE);
     build_hub(p, n, 0, &first);
     build_hub(p, n, n, &last);
@@ -132,12 +129,11 @@ static void a_hub_of_ties(void **unused) {
 
 /* What an owner has put down of a cell stays until the cell gives way; of the
  * new cells, which are the new point's, nothing is put down. */
-static void what_is_proved(void **unused) {
+TEST(what_is_proved) {
     static double p[SPHERE][3];
     struct scene s = {.seed = 7};
     uint8_t state[2048];
     uint32_t list[2048], four[4], rows = 200;
-    (void)unused;
     draw_sphere(p, rows);
     memset(p[150], 0, sizeof p[150]);
     scene_open(&s, scene_used(rows + 1, 2048));
@@ -165,11 +161,10 @@ static void what_is_proved(void **unused) {
 
 /* Cells that nobody has looked at for any number of insertions: one corner is
  * filled, then the other. */
-static void marks_do_not_come_back(void **unused) {
+TEST(marks_do_not_come_back) {
     static double p[2 * EPOCHS][3];
     struct scene s = {.seed = 7};
     uint32_t row[2 * EPOCHS], n = 0;
-    (void)unused;
     for (uint32_t run = 1; n < EPOCHS + 160; run++)
         for (uint32_t i = 0; i < run * run && i < 140; i++, n++) {
             for (int d = 0; d < 3; d++)
@@ -182,13 +177,8 @@ static void marks_do_not_come_back(void **unused) {
     scene_close(&s);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(cavities_of_each_size, begin),
-        cmocka_unit_test_setup(a_hub_of_thousands, begin),
-        cmocka_unit_test_setup(a_hub_of_ties, begin),
-        cmocka_unit_test_setup(what_is_proved, begin),
-        cmocka_unit_test_setup(marks_do_not_come_back, begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(cavities_of_each_size, begin),
+          cmocka_unit_test_setup(a_hub_of_thousands, begin),
+          cmocka_unit_test_setup(a_hub_of_ties, begin),
+          cmocka_unit_test_setup(what_is_proved, begin),
+          cmocka_unit_test_setup(marks_do_not_come_back, begin))

@@ -145,12 +145,11 @@ static uint32_t fill(struct scene *s, const double (*p)[3], bool late,
     return count;
 }
 
-static void each_size_of_memory(void **unused) {
+TEST(each_size_of_memory) {
     double p[ROWS][3];
     const double(*xyz)[3] = (const double(*)[3])p;
     uint32_t cells[ROWS], row[ROWS], taken[ROWS + 1] = {0}, four[4];
     struct scene s = {.seed = 7};
-    (void)unused;
     draw_set(p);
     scene_open(&s, MEMORY_MAX);
     for (uint32_t i = 0; i < ROWS; i++)
@@ -187,9 +186,8 @@ static void each_size_of_memory(void **unused) {
 }
 
 /* What is left over of 8 bytes is not used. */
-static void odd_sizes_of_memory(void **unused) {
+TEST(odd_sizes_of_memory) {
     double p[ROWS][3];
-    (void)unused;
     draw_set(p);
     for (size_t odd = 0; odd < 8; odd++) {
         struct scene s = {.seed = 7};
@@ -208,10 +206,9 @@ static void odd_sizes_of_memory(void **unused) {
 
 /* The hub of a sphere, whose cavity is a large one, is refused any number of
  * times, which leaves no traces in the marks that its neighbours meet. */
-static void refused_again_and_again(void **unused) {
+TEST(refused_again_and_again) {
     static double p[SPHERE + 1][3];
     uint32_t row[SPHERE], cells = 0, hub = SPHERE + 1;
-    (void)unused;
     for (uint32_t i = 0; i < SPHERE; i++) {
         row[i] = i;
         for (int d = 0; d < 3; d++)
@@ -243,10 +240,9 @@ static void refused_again_and_again(void **unused) {
 }
 
 /* Indices have 16 bits. */
-static void points_without_number(void **unused) {
+TEST(points_without_number) {
     struct scene s = {.seed = 7};
     uint32_t v = 0, points = 1;
-    (void)unused;
     scene_open(&s, scene_used(INCODE_COMPLEX_POINTS_MAX + 9, 0));
     while (v != INCODE_NONE) {
         const double p[3] = {points, points % 2, points % 3};
@@ -266,10 +262,9 @@ static void points_without_number(void **unused) {
 /* ---- the first four ---- */
 
 /* Any order of four is the one tetrahedron. */
-static void either_orientation(void **unused) {
+TEST(either_orientation) {
     const double p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     struct host_tetrahedra tets = {0};
-    (void)unused;
     scene_append(&tets, 0, 1, 2, 3);
     host_tetrahedra_sort(&tets);
     for (uint32_t i = 0; i < 256; i++) {
@@ -297,7 +292,7 @@ static void either_orientation(void **unused) {
 
 /* Four of a plane are none, on a circle or a line or not, and others may be
  * tried. */
-static void four_in_a_plane(void **unused) {
+TEST(four_in_a_plane) {
     const double p[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                             {2, 0, 0}, {3, 0, 0}, {5, 7, 0}, {1, 2, 3}};
     static const uint32_t flat[3][4] = {
@@ -305,7 +300,6 @@ static void four_in_a_plane(void **unused) {
     static const uint32_t four[4] = {8, 3, 1, 2};
     struct scene s = {.seed = 7};
     static struct state before, after;
-    (void)unused;
     scene_open(&s, MEMORY_MAX);
     for (uint32_t i = 0; i < 8; i++)
         assert_int_equal(try_add(&s, p[i], i), i + 1);
@@ -327,12 +321,11 @@ static void four_in_a_plane(void **unused) {
 }
 
 /* What was there before leaves no traces. */
-static void all_is_forgotten(void **unused) {
+TEST(all_is_forgotten) {
     double p[ROWS][3];
     struct scene s = {.each = true, .seed = 7};
     struct host_tetrahedra tets = {0};
     uint32_t row[ROWS];
-    (void)unused;
     draw_set(p);
     scene_open(&s, MEMORY_MAX);
     for (int round = 0; round < 20; round++) {
@@ -348,15 +341,10 @@ static void all_is_forgotten(void **unused) {
     scene_close(&s);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(each_size_of_memory, begin),
-        cmocka_unit_test_setup(odd_sizes_of_memory, begin),
-        cmocka_unit_test_setup(refused_again_and_again, begin),
-        cmocka_unit_test_setup(points_without_number, begin),
-        cmocka_unit_test_setup(either_orientation, begin),
-        cmocka_unit_test_setup(four_in_a_plane, begin),
-        cmocka_unit_test_setup(all_is_forgotten, begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(each_size_of_memory, begin),
+          cmocka_unit_test_setup(odd_sizes_of_memory, begin),
+          cmocka_unit_test_setup(refused_again_and_again, begin),
+          cmocka_unit_test_setup(points_without_number, begin),
+          cmocka_unit_test_setup(either_orientation, begin),
+          cmocka_unit_test_setup(four_in_a_plane, begin),
+          cmocka_unit_test_setup(all_is_forgotten, begin))

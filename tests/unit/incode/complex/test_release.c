@@ -183,11 +183,10 @@ static void put_in_order(double (*p)[3], uint32_t *row, int along, bool mixed) {
         row[i] = copy[slab[i / BRICK] * BRICK + i % BRICK];
 }
 
-static void any_order_of_bricks(void **unused) {
+TEST(any_order_of_bricks) {
     static double p[MOST][3];
     uint32_t row[MOST], points, taken_again = 0;
     uint64_t scans = 0;
-    (void)unused;
     for (unsigned round = 0; round < (SANITIZED ? 5 : 40); round++) {
         struct scene whole = {.seed = 9};
         struct host_tetrahedra expected = {0};
@@ -206,9 +205,4 @@ static void any_order_of_bricks(void **unused) {
     assert_true(taken_again > 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_order_of_bricks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(any_order_of_bricks))

@@ -1,15 +1,10 @@
 /* The active face list against a plain array of faces. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "incode/front/afl.h"
 #include "incode/pages/bricks.h"
+#include "tests/unit/test.h"
 
 enum { FACES = 300, BRICKS = 40, GUARD = 64 };
 
@@ -204,8 +199,7 @@ static void drop_one(struct incode_afl *afl, const struct plain *p) {
     assert_null(incode_afl_find(afl, brick));
 }
 
-static void against_plain(void **unused) {
-    (void)unused;
+TEST(against_plain) {
     for (uint32_t round = 0; round < 4; round++) {
         struct incode_afl afl;
         uint8_t *memory = open_list(&afl, FACES, BRICKS);
@@ -239,8 +233,7 @@ static void against_plain(void **unused) {
 }
 
 /* To the last face and the last brick, and back. */
-static void full(void **unused) {
-    (void)unused;
+TEST(full) {
     static const uint32_t sizes[][2] = {
         {1, 1}, {2, 1}, {3, 5}, {64, 32}, {100, 100}};
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
@@ -268,8 +261,7 @@ static void full(void **unused) {
 }
 
 /* A long list is noticed, once, and not before it is long. */
-static void crowded(void **unused) {
-    (void)unused;
+TEST(crowded) {
     enum { MANY = 1024 };
     struct incode_afl afl;
     uint8_t *memory = open_list(&afl, MANY, BRICKS);
@@ -292,8 +284,7 @@ static void crowded(void **unused) {
 /* Where a vertex has thousands of faces, as it does when all hubs are in use,
  * lending some of them takes a look or two at each; and all are lent in the
  * end. */
-static void held_of_a_long_list(void **unused) {
-    (void)unused;
+TEST(held_of_a_long_list) {
     enum { MANY = 6000, LIMIT = 96 };
     struct incode_afl afl;
     uint32_t pairs[LIMIT][2], left = MANY;
@@ -320,8 +311,7 @@ static void held_of_a_long_list(void **unused) {
 /* Where hubs do not help, one vertex after another gets thousands of faces: a
  * search looks at few of them, as do all that close them; and take, tell and
  * let go miss none. */
-static void searches_of_long_lists(void **unused) {
-    (void)unused;
+TEST(searches_of_long_lists) {
     enum { MANY = 6000, VERTICES = 3 * INCODE_AFL_WIDE, LIMIT = 96 };
     struct incode_afl afl;
     static uint32_t pairs[MANY][2];
@@ -385,14 +375,7 @@ static void fetched_lists(void **context) {
     free(memory);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(against_plain),
-        cmocka_unit_test(full),
-        cmocka_unit_test(crowded),
-        cmocka_unit_test(held_of_a_long_list),
-        cmocka_unit_test(searches_of_long_lists),
-        cmocka_unit_test(fetched_lists),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(against_plain), cmocka_unit_test(full),
+          cmocka_unit_test(crowded), cmocka_unit_test(held_of_a_long_list),
+          cmocka_unit_test(searches_of_long_lists),
+          cmocka_unit_test(fetched_lists))

@@ -1,20 +1,15 @@
 /* A front alone: an oracle that knows the triangulation answers what it asks,
  * at once, late or much later, and there is no page anywhere.  The tetrahedra
  * come out whole, each once, every brick is committed, and nothing is left. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "incode/front/front.h"
 #include "incode/front/job.h"
 #include "tests/unit/incode/oracle.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 enum { GUARD = 256, SPILLED = 1 << 20, STEPS = 2000000 };
 
@@ -372,8 +367,7 @@ static void triangulate(struct world *w) {
 
 /* ---- tests ---- */
 
-static void sets(void **unused) {
-    (void)unused;
+TEST(sets) {
     static const char *const kinds[] = {"uniform", "bubbles", "grid", "sphere",
                                         "hub"};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
@@ -391,8 +385,7 @@ static void sets(void **unused) {
 }
 
 /* Little may be open at a time: the rest goes out and comes back in order. */
-static void spilling(void **unused) {
-    (void)unused;
+TEST(spilling) {
     for (uint32_t k = 0; k < 16; k++) {
         struct world w = {.regions = k & 1 ? 2 : 1,
                           .faces = (k & 2) != 0,
@@ -408,8 +401,7 @@ static void spilling(void **unused) {
 }
 
 /* A vertex with a list far longer than a star holds at hand. */
-static void hub(void **unused) {
-    (void)unused;
+TEST(hub) {
     for (uint32_t k = 0; k < 4; k++) {
         struct world w = {.regions = k & 1 ? 2 : 1, .chance = k & 2 ? 5 : 0};
         open_world(&w, "hub", 900);
@@ -420,8 +412,7 @@ static void hub(void **unused) {
 }
 
 /* A job that is abandoned midway leaves nothing behind. */
-static void abandoned(void **unused) {
-    (void)unused;
+TEST(abandoned) {
     struct world w = {.regions = 1, .chance = 9};
     open_world(&w, "uniform", 300);
     const struct incode_job job = {.first = 0, .last = w.bricks};
@@ -441,8 +432,7 @@ static void abandoned(void **unused) {
 }
 
 /* Nothing was asked for that it does not ask for. */
-static void refusals(void **unused) {
-    (void)unused;
+TEST(refusals) {
     struct world w = {.regions = 1};
     uint32_t task;
     open_world(&w, "uniform", 100);
@@ -455,8 +445,7 @@ static void refusals(void **unused) {
 }
 
 /* Of four corners, however they are turned, one is the owner. */
-static void one_owner(void **unused) {
-    (void)unused;
+TEST(one_owner) {
     static const double corner[4][3] = {
         {1, -2, 7}, {1, -2, 6}, {1, 3, -9}, {2, -9, -9}};
     static const unsigned turns[4][4] = {
@@ -474,11 +463,6 @@ static void one_owner(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sets),     cmocka_unit_test(spilling),
-        cmocka_unit_test(hub),      cmocka_unit_test(abandoned),
-        cmocka_unit_test(refusals), cmocka_unit_test(one_owner),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(sets), cmocka_unit_test(spilling),
+          cmocka_unit_test(hub), cmocka_unit_test(abandoned),
+          cmocka_unit_test(refusals), cmocka_unit_test(one_owner))

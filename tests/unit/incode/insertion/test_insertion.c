@@ -2,19 +2,14 @@
  * of memory, whether it holds all or only what is not final yet, every range of
  * bricks, small rooms outside, sets that span no space, short steps. */
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "host/mesh/gen.h"
 #include "tests/unit/emulated.h"
 #include "tests/unit/incode/solo.h"
 #include "tests/unit/reference.h"
+#include "tests/unit/test.h"
 
 enum { ROOM_MANY = 4096, WHOLE = 1 << 20, EACH = 23 };
 
@@ -248,7 +243,7 @@ static enum outcome try_memory(size_t bytes) {
 
 /* It is full with nothing emitted, or with something, or it comes to an end;
  * that, once there is as much as stated. */
-static void each_size_of_memory(void **unused) {
+TEST(each_size_of_memory) {
     static const struct {
         const char *kind;
         uint32_t points, step;
@@ -258,7 +253,6 @@ static void each_size_of_memory(void **unused) {
                 {"terrain", 600, 3000, false},  {"shell", 600, 3000, true},
                 {"torus", 600, 3000, true},     {"bubbles", 600, 3000, false}};
     unsigned all[OUTCOMES] = {0};
-    (void)unused;
     for (size_t k = 0; k < sizeof sets / sizeof *sets; k++) {
         open_made(sets[k].kind, sets[k].points);
         uint32_t bricks = world.solo.order.bricks;
@@ -288,8 +282,7 @@ static void each_size_of_memory(void **unused) {
 
 /* ---- jobs ---- */
 
-static void each_range_of_bricks(void **unused) {
-    (void)unused;
+TEST(each_range_of_bricks) {
     open_made("uniform", 500);
     uint32_t bricks = world.solo.order.bricks;
     uint64_t all = 0;
@@ -322,8 +315,7 @@ static void each_range_of_bricks(void **unused) {
 }
 
 /* One that is left in the middle, at any step, is forgotten by the next. */
-static void jobs_that_are_left(void **unused) {
-    (void)unused;
+TEST(jobs_that_are_left) {
     open_made("bubbles", 300);
     uint32_t bricks = world.solo.order.bricks;
     for (uint32_t steps = 0; steps < 120; steps++) {
@@ -342,8 +334,7 @@ static void jobs_that_are_left(void **unused) {
 
 /* ---- outside ---- */
 
-static void rooms(void **unused) {
-    (void)unused;
+TEST(rooms) {
     open_made("hub", 400);
     for (size_t room = 1; room < 300; room += room < 8 ? 1 : 71) {
         enum incode_insertion_step r;
@@ -369,8 +360,7 @@ static void rooms(void **unused) {
 
 /* Pages by one credit at a time, and refused by chance: each is asked for, and
  * none in vain. */
-static void pages(void **unused) {
-    (void)unused;
+TEST(pages) {
     open_made("grid", 27 * 64);
     for (uint64_t chance = 0; chance < 6; chance++) {
         struct incode_pager *pager = &world.solo.t->maker.pager;
@@ -394,8 +384,7 @@ static void pages(void **unused) {
 }
 
 /* With a unit of work, one point, or a few cells, or a few tetrahedra. */
-static void steps_are_short(void **unused) {
-    (void)unused;
+TEST(steps_are_short) {
     open_made("uniform", 700);
     start(WHOLE, 0, world.solo.order.bricks);
     uint32_t steps = 0, cells = 0, most = 0;
@@ -437,10 +426,9 @@ static void *insert_all(void *unused) {
 }
 
 /* The least stack that a board has is enough for cavities of each size. */
-static void little_stack(void **unused) {
+TEST(little_stack) {
     enum { STACK_BYTES = SANITIZED ? 1 << 20 : 48 << 10 };
     static const char *const kinds[] = {"sphere", "hub", "grid", "lines"};
-    (void)unused;
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
         pthread_attr_t attributes;
         pthread_t thread;
@@ -521,10 +509,9 @@ static void expect_no_space(const double (*p)[3], uint32_t n) {
 }
 
 /* Fewer than four, or a line, or a plane. */
-static void no_space(void **unused) {
+TEST(no_space) {
     enum { MOST = 200 };
     static double p[MOST][3];
-    (void)unused;
     for (unsigned kind = 0; kind < 3; kind++) {
         for (uint32_t i = 0; i < MOST; i++) {
             p[i][0] = i;
@@ -537,10 +524,9 @@ static void no_space(void **unused) {
 }
 
 /* All of a plane but the first, the last, or one between. */
-static void hardly_any_space(void **unused) {
+TEST(hardly_any_space) {
     enum { SIDE = 12, COUNT = SIDE * SIDE };
     static double p[COUNT][3];
-    (void)unused;
     for (uint32_t off = 0; off < COUNT; off += 13) {
         for (uint32_t i = 0; i < COUNT; i++) {
             p[i][0] = i % SIDE;
@@ -556,17 +542,9 @@ static void hardly_any_space(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_size_of_memory),
-        cmocka_unit_test(each_range_of_bricks),
-        cmocka_unit_test(jobs_that_are_left),
-        cmocka_unit_test(rooms),
-        cmocka_unit_test(pages),
-        cmocka_unit_test(steps_are_short),
-        cmocka_unit_test(little_stack),
-        cmocka_unit_test(no_space),
-        cmocka_unit_test(hardly_any_space),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(each_size_of_memory),
+          cmocka_unit_test(each_range_of_bricks),
+          cmocka_unit_test(jobs_that_are_left), cmocka_unit_test(rooms),
+          cmocka_unit_test(pages), cmocka_unit_test(steps_are_short),
+          cmocka_unit_test(little_stack), cmocka_unit_test(no_space),
+          cmocka_unit_test(hardly_any_space))

@@ -232,13 +232,11 @@ static void no_cell_that_reaches_is_let_go(making *make, int exponent,
         assert_true(counts.lifted > 0);
 }
 
-static void kinds_and_scales(void **unused) {
-    (void)unused;
+TEST(kinds_and_scales) {
     points_of_all_kinds(no_cell_that_reaches_is_let_go);
 }
 
-static void squares_that_underflow(void **unused) {
-    (void)unused;
+TEST(squares_that_underflow) {
     points_that_underflow(no_cell_that_reaches_is_let_go);
 }
 
@@ -275,13 +273,11 @@ static void through_many_levels(making *make, uint32_t frames) {
     assert_true(counts.final > counts.free * (make == volume ? 6 : 4) / 10);
 }
 
-static void volumes_of_many_levels(void **unused) {
-    (void)unused;
+TEST(volumes_of_many_levels) {
     through_many_levels(volume, 3);
 }
 
-static void surfaces_of_many_levels(void **unused) {
-    (void)unused;
+TEST(surfaces_of_many_levels) {
     through_many_levels(terrain, 5);
 }
 
@@ -303,8 +299,7 @@ static void draw_infinite(const struct points_scene *s, struct batch *b) {
 
 /* Half-spaces that hold nearly all points: whatever pages are there, one call
  * does not look at all that are needed. */
-static void more_than_a_call_looks_at(void **unused) {
-    (void)unused;
+TEST(more_than_a_call_looks_at) {
     points_open(&scene, sphere, 0, 0, MANY);
     uint32_t bricks = scene.set.order.bricks;
     assert_true(bricks <= BRICKS_MAX);
@@ -332,10 +327,9 @@ static void more_than_a_call_looks_at(void **unused) {
 
 /* Bricks that are wanted stay so; they need no look where all are asked for,
  * and one where cells are told. */
-static void what_was_wanted_before(void **unused) {
+TEST(what_was_wanted_before) {
     struct batch b;
     uint32_t again = 0;
-    (void)unused;
     points_open(&scene, volume, 0, 0, POINTS);
     uint32_t bricks = scene.set.order.bricks;
     for (uint32_t from = 1; from < bricks; from++) {
@@ -359,10 +353,9 @@ static void what_was_wanted_before(void **unused) {
 }
 
 /* Nothing is wanted of no cells, nor where all is passed, either way. */
-static void nothing_to_look_at(void **unused) {
+TEST(nothing_to_look_at) {
     struct batch b;
     struct told told = {0};
-    (void)unused;
     points_open(&scene, volume, 0, 0, POINTS);
     uint32_t bricks = scene.set.order.bricks;
     assert_true(points_build(&scene, 0, BUILT));
@@ -380,15 +373,10 @@ static void nothing_to_look_at(void **unused) {
     points_close(&scene);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds_and_scales),
-        cmocka_unit_test(squares_that_underflow),
-        cmocka_unit_test(volumes_of_many_levels),
-        cmocka_unit_test(surfaces_of_many_levels),
-        cmocka_unit_test(more_than_a_call_looks_at),
-        cmocka_unit_test(what_was_wanted_before),
-        cmocka_unit_test(nothing_to_look_at),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(kinds_and_scales),
+          cmocka_unit_test(squares_that_underflow),
+          cmocka_unit_test(volumes_of_many_levels),
+          cmocka_unit_test(surfaces_of_many_levels),
+          cmocka_unit_test(more_than_a_call_looks_at),
+          cmocka_unit_test(what_was_wanted_before),
+          cmocka_unit_test(nothing_to_look_at))

@@ -328,10 +328,9 @@ static void try_cell(struct cell *s, enum shape shape, double far) {
         try_sharp(s, shape);
 }
 
-static void points_in_the_boundary(void **unused) {
+TEST(points_in_the_boundary) {
     static struct cell cell;
     int rounds = emulated() ? 20 : SANITIZED ? 300 : 1500;
-    (void)unused;
     mpq_inits(term, sum, other, NULL);
     for (int i = 0; i < rounds; i++) {
         try_exact(i % 3 == 0 ? 0x1p20 : i % 3, 1, i % 2 != 0);
@@ -392,9 +391,8 @@ static unsigned wrong_by_points(enum bound without,
 
 /* 0.25 for 0.625 of a kept sphere changes none of these results; the test of
  * points in the boundary finds it. */
-static void decimal_lattices(void **unused) {
+TEST(decimal_lattices) {
     unsigned found = 0;
-    (void)unused;
     for (int l = 0; l < LATTICES; l++) {
         struct host_digest right;
         uint64_t count;
@@ -407,8 +405,7 @@ static void decimal_lattices(void **unused) {
     assert_true(found > 0);
 }
 
-static void each_bound_is_needed(void **unused) {
-    (void)unused;
+TEST(each_bound_is_needed) {
     for (int b = NOTHING; b < BOUNDS; b++)
         print_message("without %s: %llu wrong\n", names[b],
                       (unsigned long long)wrong[b]);
@@ -417,11 +414,6 @@ static void each_bound_is_needed(void **unused) {
         assert_true(wrong[b] > 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_in_the_boundary),
-        cmocka_unit_test(each_bound_is_needed),
-        cmocka_unit_test(decimal_lattices),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(points_in_the_boundary),
+          cmocka_unit_test(each_bound_is_needed),
+          cmocka_unit_test(decimal_lattices))

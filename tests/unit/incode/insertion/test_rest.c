@@ -70,13 +70,11 @@ static void no_cell_that_is_reached_is_final(making *make, int exponent,
         assert_true(counts.final > counts.free * VOLUME / 10);
 }
 
-static void kinds_and_scales(void **unused) {
-    (void)unused;
+TEST(kinds_and_scales) {
     points_of_all_kinds(no_cell_that_is_reached_is_final);
 }
 
-static void squares_that_underflow(void **unused) {
-    (void)unused;
+TEST(squares_that_underflow) {
     points_that_underflow(no_cell_that_is_reached_is_final);
 }
 
@@ -163,11 +161,10 @@ static void check_boxes(struct points_scene *s, uint32_t before,
 }
 
 /* Any of them are taken out, and those where pages of boxes begin and end. */
-static void any_bricks_in_the_middle(void **unused) {
+TEST(any_bricks_in_the_middle) {
     static const uint32_t ends[] = {0,   1,    31,   32,   33,  64,
                                     992, 1023, 1024, 1025, 1056};
     enum { ENDS = sizeof ends / sizeof *ends };
-    (void)unused;
     points_open(&scene, volume, 0, 0, MANY);
     uint32_t bricks = scene.set.order.bricks;
     assert_true(scene.maker.tree.levels == 4 && bricks > ends[ENDS - 1]);
@@ -187,11 +184,6 @@ static void any_bricks_in_the_middle(void **unused) {
     points_close(&scene);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds_and_scales),
-        cmocka_unit_test(squares_that_underflow),
-        cmocka_unit_test(any_bricks_in_the_middle),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(kinds_and_scales),
+          cmocka_unit_test(squares_that_underflow),
+          cmocka_unit_test(any_bricks_in_the_middle))

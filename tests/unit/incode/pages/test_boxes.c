@@ -2,16 +2,11 @@
  * can be. */
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "incode/pages/pages.h"
+#include "tests/unit/test.h"
 
 static uint64_t state = 1;
 
@@ -138,8 +133,7 @@ static double one_point(int d) {
     return 1.1 * d;
 }
 
-static void boxes_hold_what_was_set(void **unused) {
-    (void)unused;
+TEST(boxes_hold_what_was_set) {
     double (*const numbers[])(int) = {ordinary, far_away,    clusters, scales,
                                       large,    whole_range, small,    denormal,
                                       skew,     one_point};
@@ -153,8 +147,7 @@ static void boxes_hold_what_was_set(void **unused) {
 }
 
 /* A grid of whole numbers is told exactly, and so is a page of one point. */
-static void what_fits_is_exact(void **unused) {
-    (void)unused;
+TEST(what_fits_is_exact) {
     struct set set = {.count = 2,
                       .lo = {{-3, 5, 7}, {0, 0, 7}},
                       .hi = {{1, 6, 7}, {2, 9, 7}},
@@ -198,8 +191,7 @@ static void one_lifted(struct incode_boxes *boxes) {
     boxes->lid[1] = -8192;
 }
 
-static void what_a_lifted_box_says(void **unused) {
-    (void)unused;
+TEST(what_a_lifted_box_says) {
     struct incode_boxes boxes;
     struct incode_lifted l;
     one_lifted(&boxes);
@@ -225,8 +217,7 @@ static void what_a_lifted_box_says(void **unused) {
             assert_true(fabs(axis[k][d] - (d == (k + 1) % 3)) < 1e-3);
 }
 
-static void axes_are_orthonormal(void **unused) {
-    (void)unused;
+TEST(axes_are_orthonormal) {
     struct incode_boxes boxes;
     double axis[3][3];
     one_lifted(&boxes);
@@ -259,8 +250,7 @@ static void axes_are_orthonormal(void **unused) {
 
 /* ---- on arrival ---- */
 
-static void what_is_not_sound(void **unused) {
-    (void)unused;
+TEST(what_is_not_sound) {
     struct set set = {.count = 2, .all_lo = {-4, -4, -4}, .all_hi = {4, 4, 4}};
     struct incode_boxes good, bad;
     one_lifted(&good);

@@ -1,16 +1,11 @@
 /* The pager against a plain model: a list of pages, the most recently used
  * first, and a set of those that are on their way. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "incode/pages/pager.h"
+#include "tests/unit/test.h"
 
 enum { FRAMES_MAX = 64, PAGES_MAX = 400, BRICKS = 300 };
 
@@ -326,8 +321,7 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled) {
     free(memory);
 }
 
-static void least_recently_used(void **unused) {
-    (void)unused;
+TEST(least_recently_used) {
     static const uint32_t frames[] = {1, 2, 3, 4, 7, 16, 48, 64};
     for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
         state = i;
@@ -336,8 +330,7 @@ static void least_recently_used(void **unused) {
     }
 }
 
-static void shuffled(void **unused) {
-    (void)unused;
+TEST(shuffled) {
     static const uint32_t frames[] = {4, 16, 48};
     for (size_t i = 0; i < sizeof frames / sizeof *frames; i++) {
         state = i;
@@ -347,8 +340,7 @@ static void shuffled(void **unused) {
 }
 
 /* Page numbers up to the end of their range, which share hash chains. */
-static void large_numbers(void **unused) {
-    (void)unused;
+TEST(large_numbers) {
     enum { FRAMES = 8 };
     uint8_t data[INCODE_PAGE_BYTES] = {7};
     void *memory =
@@ -379,11 +371,5 @@ static void large_numbers(void **unused) {
     free(memory);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(least_recently_used),
-        cmocka_unit_test(shuffled),
-        cmocka_unit_test(large_numbers),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(least_recently_used), cmocka_unit_test(shuffled),
+          cmocka_unit_test(large_numbers))

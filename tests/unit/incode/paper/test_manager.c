@@ -28,8 +28,7 @@ static void make(const char *kind, uint64_t n, struct host_points *set) {
 
 /* Every kind of points, every index, one builder and several, at once and by
  * chance. */
-static void kinds(void **unused) {
-    (void)unused;
+TEST(kinds) {
     static const char *const names[] = {"uniform", "bluntfin", "rotated",
                                         "sphere",  "grid",     "hub"};
     static const uint32_t shapes[][3] = {
@@ -55,8 +54,7 @@ static void kinds(void **unused) {
     }
 }
 
-static void indexes(void **unused) {
-    (void)unused;
+TEST(indexes) {
     struct host_points set = {0};
     struct host_digest digest;
     make("uniform", 400, &set);
@@ -76,8 +74,7 @@ static void indexes(void **unused) {
 
 /* Faces are lent, then spilled, then lent again: what comes late of them does
  * not count. */
-static void spilled(void **unused) {
-    (void)unused;
+TEST(spilled) {
     struct host_points set = {0};
     struct host_digest digest;
     make("uniform", 2500, &set); /* fewer would not spill */
@@ -96,8 +93,7 @@ static void spilled(void **unused) {
 }
 
 /* A list that asks for more faces than there are open ever. */
-static void job_larger_than_the_list(void **unused) {
-    (void)unused;
+TEST(job_larger_than_the_list) {
     struct host_points set = {0};
     struct host_digest digest;
     make("uniform", 12, &set);
@@ -115,8 +111,7 @@ static void job_larger_than_the_list(void **unused) {
 
 /* A single tetrahedron: all its faces are of the hull, and the list is empty
  * when they are answered. */
-static void all_faces_on_the_hull(void **unused) {
-    (void)unused;
+TEST(all_faces_on_the_hull) {
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     const struct host_points set = {.xyz = xyz, .count = 4};
     for (uint32_t builders = 1; builders <= 3; builders++) {
@@ -131,8 +126,7 @@ static void all_faces_on_the_hull(void **unused) {
 }
 
 /* A job without bricks: nothing is lent, and it is done. */
-static void empty_list(void **unused) {
-    (void)unused;
+TEST(empty_list) {
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     struct lend lend = {.builders = 1, .faces = 4, .jobs = 1};
     struct incode_list list;
@@ -147,8 +141,7 @@ static void empty_list(void **unused) {
 }
 
 /* What no builder says, and what no manager asks. */
-static void unsound(void **unused) {
-    (void)unused;
+TEST(unsound) {
     double xyz[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
     static const struct incode_answers wrong[] = {
         {0, 0, 1, {{0, 1, 2, 3}}},
@@ -254,8 +247,7 @@ static const char *fault_of(enum incode_list_kind kind, uint32_t least,
 
 /* A builder that leaves something out, or answers what it was not asked, is
  * found, and not waited for. */
-static void wrong_answers(void **unused) {
-    (void)unused;
+TEST(wrong_answers) {
     static const char unsound_text[] =
         "answers that are none to what was asked";
     static const char short_text[] =
@@ -280,16 +272,7 @@ static void wrong_answers(void **unused) {
             cases[i].said);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds),
-        cmocka_unit_test(indexes),
-        cmocka_unit_test(spilled),
-        cmocka_unit_test(job_larger_than_the_list),
-        cmocka_unit_test(all_faces_on_the_hull),
-        cmocka_unit_test(empty_list),
-        cmocka_unit_test(unsound),
-        cmocka_unit_test(wrong_answers),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(kinds), cmocka_unit_test(indexes),
+          cmocka_unit_test(spilled), cmocka_unit_test(job_larger_than_the_list),
+          cmocka_unit_test(all_faces_on_the_hull), cmocka_unit_test(empty_list),
+          cmocka_unit_test(unsound), cmocka_unit_test(wrong_answers))

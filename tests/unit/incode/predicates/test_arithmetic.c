@@ -1,13 +1,9 @@
 /* The self-test of the machine's arithmetic must pass here, and must name each
  * fault that can be provoked. */
 #include <fenv.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 
 #ifdef __SSE2__
 #include <xmmintrin.h>
@@ -67,15 +63,13 @@ static void names(const char *fault, const char *word) {
         fail_msg("'%s' does not name '%s'", fault, word);
 }
 
-static void test_sound_here(void **state) {
-    (void)state;
+TEST(test_sound_here) {
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL)
         fail_msg("%s", fault);
 }
 
-static void test_fused(void **state) {
-    (void)state;
+TEST(test_fused) {
 #if defined(__FMA__) && !defined(INCODE_SANITIZED)
     names(fused_arithmetic_fault(), "fused");
 #else
@@ -84,8 +78,7 @@ static void test_fused(void **state) {
 #endif
 }
 
-static void test_extended(void **state) {
-    (void)state;
+TEST(test_extended) {
     need_processor();
 #ifdef EXTENDED
     names(extended_arithmetic_fault(), "excess");
@@ -95,9 +88,8 @@ static void test_extended(void **state) {
 #endif
 }
 
-static void test_rounding(void **state) {
+TEST(test_rounding) {
     static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
-    (void)state;
     need_processor();
     for (size_t i = 0; i < sizeof modes / sizeof modes[0]; i++) {
         assert_int_equal(fesetround(modes[i]), 0);
@@ -108,8 +100,7 @@ static void test_rounding(void **state) {
     assert_null(incode_arithmetic_fault());
 }
 
-static void test_flushed(void **state) {
-    (void)state;
+TEST(test_flushed) {
     need_processor();
 #ifdef __SSE2__
     static const unsigned flags[] = {0x8000 /* FTZ */, 0x0040 /* DAZ */,
@@ -128,11 +119,6 @@ static void test_flushed(void **state) {
 #endif
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sound_here), cmocka_unit_test(test_fused),
-        cmocka_unit_test(test_extended),   cmocka_unit_test(test_rounding),
-        cmocka_unit_test(test_flushed),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_sound_here), cmocka_unit_test(test_fused),
+          cmocka_unit_test(test_extended), cmocka_unit_test(test_rounding),
+          cmocka_unit_test(test_flushed))

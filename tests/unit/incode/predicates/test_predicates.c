@@ -1,14 +1,10 @@
 /* The predicates against their definitions on integers of any length, more
  * than a million cases, and each stage against the others. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <zlib.h>
 
 #include "incode/predicates/exact.h"
@@ -86,10 +82,9 @@ static int rational_orient3d(double (*p)[3]) {
     return sign;
 }
 
-static void test_reference(void **state) {
+TEST(test_reference) {
     uint64_t seed = 11;
     double p[5][3];
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         for (long n = 0; n < 200; n++) {
             hard_points(&seed, (enum hard_family)family, p);
@@ -111,10 +106,9 @@ static void test_reference(void **state) {
 
 /* ---- the predicates ---- */
 
-static void test_orient3d(void **state) {
+TEST(test_orient3d) {
     uint64_t seed = 1;
     double p[5][3];
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         long zeros = 0;
         for (long n = 0; n < cases(ORIENT3D); n++) {
@@ -152,10 +146,9 @@ static void draw_positive(uint64_t *seed, int family, double (*p)[3]) {
     }
 }
 
-static void test_in_sphere(void **state) {
+TEST(test_in_sphere) {
     uint64_t seed = 2;
     double p[5][3];
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         long ties = 0;
         for (long n = 0; n < cases(IN_SPHERE); n++) {
@@ -183,10 +176,9 @@ static void test_in_sphere(void **state) {
 
 /* Of two candidates over a face exactly one is in the other's sphere, and of
  * three there is one that no other beats: what makes the apex unique. */
-static void test_in_sphere_orders_candidates(void **state) {
+TEST(test_in_sphere_orders_candidates) {
     uint64_t seed = 3;
     double p[10][3];
-    (void)state;
     for (long n = 0; n < cases(60000); n++) {
         int family = (int)(n % 4) == 0 ? HARD_WIDE_BOX : HARD_SMALL_GRID;
         hard_points(&seed, (enum hard_family)family, p);
@@ -209,10 +201,9 @@ static void test_in_sphere_orders_candidates(void **state) {
     }
 }
 
-static void test_compare_distance(void **state) {
+TEST(test_compare_distance) {
     uint64_t seed = 4;
     double p[5][3];
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         long zeros = 0;
         for (long n = 0; n < cases(DISTANCE); n++) {
@@ -234,10 +225,9 @@ static void test_compare_distance(void **state) {
     }
 }
 
-static void test_collinear(void **state) {
+TEST(test_collinear) {
     uint64_t seed = 5;
     double p[5][3];
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         long lines = 0;
         for (long n = 0; n < cases(LINE); n++) {
@@ -259,10 +249,9 @@ static void test_collinear(void **state) {
     }
 }
 
-static void test_lexicographic(void **state) {
+TEST(test_lexicographic) {
     uint64_t seed = 6;
     double p[5][3];
-    (void)state;
     for (long n = 0; n < cases(20000); n++) {
         hard_points(&seed, n % 2 == 0 ? HARD_SMALL_GRID : HARD_EXPONENTS, p);
         assert_int_equal(incode_lexicographic(p[0], p[1]),
@@ -340,11 +329,10 @@ static void check_in_sphere_stages(double (*p)[3], int family, long number,
     }
 }
 
-static void test_stages(void **state) {
+TEST(test_stages) {
     uint64_t seed = 7;
     double p[5][3];
     struct use all = {0};
-    (void)state;
     for (int family = 0; family < HARD_FAMILIES; family++) {
         struct use use = {0};
         for (long n = 0; n < cases(3000); n++) {
@@ -366,10 +354,9 @@ static void test_stages(void **state) {
 }
 
 /* Integers as large as the stage allows, and every size below. */
-static void test_portable_integers(void **state) {
+TEST(test_portable_integers) {
     uint64_t seed = 8;
     int64_t d[4][3];
-    (void)state;
     for (long n = 0; n < cases(50000); n++) {
         int bits = (int)(n % 62);
         for (int i = 0; i < 12; i++) {
@@ -389,10 +376,9 @@ static void test_portable_integers(void **state) {
     }
 }
 
-static void test_two_product(void **state) {
+TEST(test_two_product) {
     uint64_t seed = 9;
     mpz_t x, y, z;
-    (void)state;
     mpz_inits(x, y, z, NULL);
     for (long n = 0; n < cases(200000); n++) {
         double a = hard_sign(&seed) * (double)hard_bits(&seed);
@@ -416,10 +402,9 @@ static void test_two_product(void **state) {
         print_message("no fused multiply-add here: Dekker's product alone\n");
 }
 
-static void test_tally(void **state) {
+TEST(test_tally) {
     struct incode_tally tally = {0};
     double p[5][3] = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {.5, .5, .5}};
-    (void)state;
     incode_orient3d(&tally, p[0], p[1], p[2], p[3]);
     incode_in_sphere(&tally, p[0], p[1], p[2], p[3], p[4]);
     assert_int_equal(tally.exact_orient3d + tally.exact_in_sphere, 0);
@@ -501,7 +486,7 @@ static void check_rows(const char *name, double (*xyz)[3], size_t n) {
     print_message("%s: %ld in_sphere, %ld ties\n", name, spheres, ties);
 }
 
-static void test_data(void **state) {
+TEST(test_data) {
     static const char *const names[] = {"bluntfin.xyz.gz",
                                         "bunny.xyz.gz",
                                         "office.xyz.gz",
@@ -519,7 +504,6 @@ static void test_data(void **state) {
     const char *data = getenv("INCODE_DATA");
     char path[1024];
     int found = 0;
-    (void)state;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         (void)snprintf(path, sizeof path, "%s/%s",
                        data != NULL ? data : "../shared/data", names[i]);

@@ -1,13 +1,9 @@
 /* Vectors against plain code, lane by lane, with infinities, signed zeros,
  * denormals and what is not a number; packs touch nothing beyond a vector. */
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 
-#include <cmocka.h>
+#include "tests/unit/test.h"
 #include <math.h>
 #include <string.h>
 
@@ -61,8 +57,7 @@ static int begin(void **unused) {
     return 0;
 }
 
-static void doubles(void **unused) {
-    (void)unused;
+TEST(doubles) {
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < D; i++) {
@@ -85,8 +80,7 @@ static void doubles(void **unused) {
     assert_true(same(incode_vd_all(-0.0)[D - 1], -0.0));
 }
 
-static void rows(void **unused) {
-    (void)unused;
+TEST(rows) {
     for (int round = 0; round < ROUNDS; round++) {
         incode_vd row[D];
         double least[D];
@@ -104,8 +98,7 @@ static void rows(void **unused) {
     }
 }
 
-static void products(void **unused) {
-    (void)unused;
+TEST(products) {
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < D; i++) {
@@ -121,8 +114,7 @@ static void products(void **unused) {
     }
 }
 
-static void floats(void **unused) {
-    (void)unused;
+TEST(floats) {
     _Alignas(INCODE_VECTOR) float x[F], y[F];
     _Alignas(INCODE_VECTOR) int32_t known[F];
     for (int round = 0; round < ROUNDS; round++) {
@@ -150,8 +142,7 @@ static void floats(void **unused) {
     }
 }
 
-static void whole_numbers(void **unused) {
-    (void)unused;
+TEST(whole_numbers) {
     _Alignas(INCODE_VECTOR) uint32_t x[F], lo[F], span[F];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < F; i++) {
@@ -183,8 +174,7 @@ static void assert_untouched(const uint8_t *bytes, size_t size, size_t first,
         assert_true((i >= first && i < last) || bytes[i] == GUARD);
 }
 
-static void packs(void **unused) {
-    (void)unused;
+TEST(packs) {
     _Alignas(INCODE_VECTOR) int32_t x[F];
     _Alignas(INCODE_VECTOR) double y[D];
     for (int round = 0; round < ROUNDS; round++) {
@@ -222,14 +212,9 @@ static void packs(void **unused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(doubles, begin),
-        cmocka_unit_test_setup(rows, begin),
-        cmocka_unit_test_setup(products, begin),
-        cmocka_unit_test_setup(floats, begin),
-        cmocka_unit_test_setup(whole_numbers, begin),
-        cmocka_unit_test_setup(packs, begin),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(doubles, begin),
+          cmocka_unit_test_setup(rows, begin),
+          cmocka_unit_test_setup(products, begin),
+          cmocka_unit_test_setup(floats, begin),
+          cmocka_unit_test_setup(whole_numbers, begin),
+          cmocka_unit_test_setup(packs, begin))

@@ -6,16 +6,13 @@
 #ifndef TESTS_LOADER_CHIP_H
 #define TESTS_LOADER_CHIP_H
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/loader/incoming.h"
 #include "node/loader/slots.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 enum { CHIP_BYTES = 512 * 1024, CHIP_IMAGE_MAX = 256 * 1024 };
 

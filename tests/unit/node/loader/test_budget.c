@@ -83,9 +83,8 @@ static double years(uint32_t erased, uint64_t us) {
            365.25;
 }
 
-static void restarts_cannot_wear_out_a_board(void **unused) {
+TEST(restarts_cannot_wear_out_a_board) {
     uint32_t starts = 0, at_once = 0;
-    (void)unused;
     while (!start()) {
         assert_true(at_once++ < 2000);
         pass(100000); /* restart orders are obeyed so soon */
@@ -134,11 +133,10 @@ static bool bring_false(const struct made *made, bool restarts) {
     return true;
 }
 
-static void false_transfers_cannot_wear_out_a_slot(void **unused) {
+TEST(false_transfers_cannot_wear_out_a_slot) {
     const struct loader_layout layout = loader_layout(&chip.flash);
     uint32_t begun = 0, before[SECTORS];
     uint64_t from_us = 0;
-    (void)unused;
     (void)start();
     pass(1000000);
     while (from_us == 0 ||
@@ -168,9 +166,8 @@ static void false_transfers_cannot_wear_out_a_slot(void **unused) {
 }
 
 /* Nothing is written for them, and of many few are looked at. */
-static void false_signatures_cost_little(void **unused) {
+TEST(false_signatures_cost_little) {
     struct made bad = one;
-    (void)unused;
     (void)start();
     bad.image.signature[0] ^= 1;
     loader_image_pack(&bad.image, bad.all);
@@ -196,12 +193,7 @@ static void false_signatures_cost_little(void **unused) {
     assert_true(loader_incoming_proved(&in));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(restarts_cannot_wear_out_a_board, blank_board),
-        cmocka_unit_test_setup(false_transfers_cannot_wear_out_a_slot,
-                               blank_board),
-        cmocka_unit_test_setup(false_signatures_cost_little, blank_board),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(restarts_cannot_wear_out_a_board, blank_board),
+          cmocka_unit_test_setup(false_transfers_cannot_wear_out_a_slot,
+                                 blank_board),
+          cmocka_unit_test_setup(false_signatures_cost_little, blank_board))

@@ -1,17 +1,12 @@
 /* A flash on a memory card: where it is, its rules, what it asks of the card,
  * and what a block that was torn, or a card that fails, takes with it. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/loader/slots.h"
 #include "node/loader/flash.h"
 #include "transport/bytes.h"
+#include "tests/unit/test.h"
 
 enum {
     BLOCK = LOADER_CARD_BLOCK,
@@ -81,8 +76,7 @@ static int take_out(void **state) {
     return 0;
 }
 
-static void test_the_partition_is_found(void **state) {
-    (void)state;
+TEST(test_the_partition_is_found) {
     assert_int_equal(card.first, LOADER_CARD_FIRST);
     memmove(entry(2), entry(0), 16);
     entry(0)[4] = 0x0c; /* a partition of files */
@@ -102,10 +96,9 @@ static void test_the_partition_is_found(void **state) {
 }
 
 /* It is looked for again by who needs it. */
-static void test_without_it_nothing_is_taken(void **state) {
+TEST(test_without_it_nothing_is_taken) {
     uint8_t bytes[4] = {0};
     uint32_t boot;
-    (void)state;
     entry(0)[4] = 0x83;
     card.first = 0;
     assert_false(flash.program(flash.context, 0, bytes, 4));
@@ -118,11 +111,10 @@ static void test_without_it_nothing_is_taken(void **state) {
     assert_true(loader_boots_next(&flash, &boot));
 }
 
-static void test_it_has_a_flash_s_rules(void **state) {
+TEST(test_it_has_a_flash_s_rules) {
     uint8_t out[2 * BLOCK], in[4] = {0x0f, 0xf0, 0x55, 0xff};
     uint8_t wide[BLOCK + 1] = {0};
     size_t begin = (size_t)LOADER_CARD_FIRST * BLOCK;
-    (void)state;
     assert_true(flash.erase(flash.context, 1));
     assert_int_equal(device.bytes[begin + LOADER_CARD_SECTOR - 1], 0x5a);
     assert_int_equal(device.bytes[begin + LOADER_CARD_SECTOR], 0xff);
@@ -152,9 +144,8 @@ static void test_it_has_a_flash_s_rules(void **state) {
 }
 
 /* Bytes of one block are one read; what is erased is not written. */
-static void test_it_asks_little_of_the_card(void **state) {
+TEST(test_it_asks_little_of_the_card) {
     uint8_t out[64], in = 0;
-    (void)state;
     assert_true(flash.erase(flash.context, 3));
     assert_int_equal(device.writes, LOADER_CARD_SECTOR / BLOCK);
     assert_true(flash.program(flash.context, 3 * LOADER_CARD_SECTOR, &in, 1));
@@ -168,10 +159,9 @@ static void test_it_asks_little_of_the_card(void **state) {
                      LOADER_CARD_FIRST + 3 * LOADER_CARD_SECTOR / BLOCK);
 }
 
-static void test_a_card_that_fails_is_told(void **state) {
+TEST(test_a_card_that_fails_is_told) {
     uint8_t byte = 0;
     uint32_t boot;
-    (void)state;
     assert_true(loader_boots_next(&flash, &boot));
     device.dead = true;
     assert_false(flash.erase(flash.context, 5));
@@ -186,12 +176,11 @@ static void test_a_card_that_fails_is_told(void **state) {
 
 /* What is told of starts and of the serial number outlives every write that
  * leaves a block of which nothing is right. */
-static void test_a_torn_block_takes_its_own_alone(void **state) {
+TEST(test_a_torn_block_takes_its_own_alone) {
     const uint8_t name[LOADER_SERIAL_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8};
     uint8_t serial[LOADER_SERIAL_BYTES];
     static uint32_t last;
     uint32_t boot;
-    (void)state;
     assert_true(loader_slots_name(&flash, name));
     last = 0;
     for (unsigned i = 0; i < 300; i++) {

@@ -1,16 +1,11 @@
 /* The header of an image: what it says comes back, any damage is found, and who
  * has signed it is told apart. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "node/loader/image.h"
 #include "transport/bytes.h"
 #include "transport/frame.h"
+#include "tests/unit/test.h"
 
 static struct loader_image sample(void) {
     struct loader_image image = {.bytes = 1234567,
@@ -25,10 +20,9 @@ static struct loader_image sample(void) {
     return image;
 }
 
-static void what_is_packed_comes_back(void **unused) {
+TEST(what_is_packed_comes_back) {
     struct loader_image image = sample(), back;
     uint8_t bytes[LOADER_HEADER_BYTES], again[LOADER_HEADER_BYTES];
-    (void)unused;
     loader_image_pack(&image, bytes);
     assert_memory_equal(bytes, "incodeI1", 8);
     assert_int_equal(bytes[16], 4); /* the low byte first */
@@ -47,10 +41,9 @@ static void what_is_packed_comes_back(void **unused) {
 }
 
 /* The longest texts have no zero at their end. */
-static void texts_fill_their_fields(void **unused) {
+TEST(texts_fill_their_fields) {
     struct loader_image image = sample(), back;
     uint8_t bytes[LOADER_HEADER_BYTES];
-    (void)unused;
     memset(image.board, 'b', LOADER_BOARD_BYTES);
     memset(image.version, 'v', LOADER_VERSION_BYTES);
     loader_image_pack(&image, bytes);
@@ -59,10 +52,9 @@ static void texts_fill_their_fields(void **unused) {
     assert_int_equal(strlen(back.version), LOADER_VERSION_BYTES);
 }
 
-static void every_false_bit_is_found(void **unused) {
+TEST(every_false_bit_is_found) {
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES];
-    (void)unused;
     loader_image_pack(&image, bytes);
     for (unsigned bit = 0; bit < 8 * sizeof bytes; bit++) {
         bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
@@ -76,10 +68,9 @@ static void every_false_bit_is_found(void **unused) {
 }
 
 /* Nothing can be hidden where no signature covers it. */
-static void what_says_nothing_is_zero(void **unused) {
+TEST(what_says_nothing_is_zero) {
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES];
-    (void)unused;
     loader_image_pack(&image, bytes);
     for (unsigned bit = 8 * 192; bit < 8 * 252; bit++) {
         bytes[bit / 8] ^= (uint8_t)(1u << bit % 8);
@@ -106,11 +97,10 @@ static bool good(const uint8_t signature[SIGN_BYTES], const uint8_t *bytes,
     return judge.word;
 }
 
-static void a_signer_is_known_by_key_and_signature(void **unused) {
+TEST(a_signer_is_known_by_key_and_signature) {
     static const struct sign_suite suite = {.good = good};
     struct loader_image image = sample();
     uint8_t bytes[LOADER_HEADER_BYTES], key[SIGN_PUBLIC_BYTES];
-    (void)unused;
     memcpy(key, image.key, sizeof key);
     loader_image_pack(&image, bytes);
     judge.word = true;
@@ -129,21 +119,15 @@ static void a_signer_is_known_by_key_and_signature(void **unused) {
     assert_int_equal(judge.asked, 2);
 }
 
-static void every_fault_has_its_text(void **unused) {
-    (void)unused;
+TEST(every_fault_has_its_text) {
     assert_null(loader_fault_text(LOADER_GOOD));
     for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++)
         assert_non_null(loader_fault_text((enum loader_fault)i));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_packed_comes_back),
-        cmocka_unit_test(texts_fill_their_fields),
-        cmocka_unit_test(every_false_bit_is_found),
-        cmocka_unit_test(what_says_nothing_is_zero),
-        cmocka_unit_test(a_signer_is_known_by_key_and_signature),
-        cmocka_unit_test(every_fault_has_its_text),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(what_is_packed_comes_back),
+          cmocka_unit_test(texts_fill_their_fields),
+          cmocka_unit_test(every_false_bit_is_found),
+          cmocka_unit_test(what_says_nothing_is_zero),
+          cmocka_unit_test(a_signer_is_known_by_key_and_signature),
+          cmocka_unit_test(every_fault_has_its_text))

@@ -135,18 +135,15 @@ static void each_geometry(bool empty, void (*act)(void)) {
     }
 }
 
-static void test_cuts_of_an_empty_board(void **state) {
-    (void)state;
+TEST(test_cuts_of_an_empty_board) {
     each_geometry(true, take_new);
 }
 
-static void test_cuts_of_a_second_image(void **state) {
-    (void)state;
+TEST(test_cuts_of_a_second_image) {
     each_geometry(false, take_new);
 }
 
-static void test_cuts_of_an_image_that_fails(void **state) {
-    (void)state;
+TEST(test_cuts_of_an_image_that_fails) {
     each_geometry(false, fail_new);
     each_geometry(false, fail_new_slowly);
 }
@@ -160,9 +157,8 @@ static void take_wanted(void) {
     live(wanted, true);
 }
 
-static void test_cuts_at_random(void **state) {
+TEST(test_cuts_at_random) {
     const struct made *const all[] = {&old, &new, &third};
-    (void)state;
     chip_make(&chip, 512, 64, 45);
     live(&old, true);
     for (uint32_t i = 0; i < 6000; i++) {

@@ -47,8 +47,7 @@ static int blank_board(void **state) {
     return 0;
 }
 
-static void test_slots_layout(void **state) {
-    (void)state;
+TEST(test_slots_layout) {
     static const uint32_t all[][3] = {
         {4096, 256, 1024}, {4096, 256, 64}, {4096, 256, 63}, {65536, 256, 32},
         {131072, 32, 8},   {512, 64, 45},   {4096, 256, 5},  {4096, 256, 6}};
@@ -72,8 +71,7 @@ static void test_slots_layout(void **state) {
     }
 }
 
-static void test_slots_of_an_empty_board(void **state) {
-    (void)state;
+TEST(test_slots_of_an_empty_board) {
     assert_int_equal(starts(false), LOADER_SLOTS);
     assert_int_equal(starts(true), LOADER_SLOTS);
     memset(chip.bytes, 0, chip_size(&chip));
@@ -82,8 +80,7 @@ static void test_slots_of_an_empty_board(void **state) {
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_install(void **state) {
-    (void)state;
+TEST(test_slots_install) {
     assert_true(loader_slots_install(&chip.flash, old.all, old.bytes));
     assert_int_equal(starts(true), 0);
     assert_int_equal(slots.image[0].number, 5);
@@ -92,10 +89,9 @@ static void test_slots_install(void **state) {
 }
 
 /* Three starts that confirm nothing, or one that ends in a fault. */
-static void test_slots_fall_back(void **state) {
-    (void)state;
+TEST(test_slots_fall_back) {
     for (unsigned badly = 0; badly < 2; badly++) {
-        blank_board(state);
+        blank_board(NULL);
         bring_and_confirm(&old);
         bring(&new);
         for (unsigned i = 0; i < (badly ? 1 : LOADER_TRIES); i++) {
@@ -106,7 +102,7 @@ static void test_slots_fall_back(void **state) {
         assert_int_equal(slots.state.trial, 0);
         assert_int_equal(starts(true), 0);
     }
-    blank_board(state);
+    blank_board(NULL);
     bring(&new);
     assert_int_equal(starts(true), 0); /* that was the loader's own start */
     for (unsigned i = 0; i < 2; i++) {
@@ -120,8 +116,7 @@ static void test_slots_fall_back(void **state) {
 
 /* Who turns a board off and on that is not wired yet, and each time lets it run
  * for a while, does not lose the image; one that crashes still falls back. */
-static void test_slots_outlive_power_cycles(void **state) {
-    (void)state;
+TEST(test_slots_outlive_power_cycles) {
     bring_and_confirm(&old);
     bring(&new);
     for (unsigned i = 0; i < 4 * LOADER_TRIES; i++) {
@@ -139,7 +134,7 @@ static void test_slots_outlive_power_cycles(void **state) {
         assert_true(loader_slots_try(&slots));
     }
     assert_int_equal(starts(false), 0);
-    blank_board(state);
+    blank_board(NULL);
     bring_and_confirm(&old);
     bring(&new);
     assert_int_equal(starts(false), 1);
@@ -148,8 +143,7 @@ static void test_slots_outlive_power_cycles(void **state) {
     assert_int_equal(starts(true), 0); /* it hung, however late */
 }
 
-static void test_slots_confirm_once(void **state) {
-    (void)state;
+TEST(test_slots_confirm_once) {
     bring_and_confirm(&old);
     long done = chip.done;
     assert_true(chip_confirm(&chip, 0));
@@ -162,8 +156,7 @@ static void test_slots_confirm_once(void **state) {
 
 /* What has lost a bit is not started; the other one is, on trial, as it may be
  * one that never came up. */
-static void test_slots_leave_what_has_rotted(void **state) {
-    (void)state;
+TEST(test_slots_leave_what_has_rotted) {
     bring_and_confirm(&old);
     bring_and_confirm(&new);
     assert_int_equal(starts(false), 1);
@@ -178,8 +171,7 @@ static void test_slots_leave_what_has_rotted(void **state) {
 }
 
 /* Neither the one in use, nor the only one that has ever come up. */
-static void test_slots_are_spared(void **state) {
-    (void)state;
+TEST(test_slots_are_spared) {
     bring_and_confirm(&old); /* in slot 0 */
     spare_slot(0);
     bring(&new);
@@ -208,7 +200,7 @@ static void test_slots_serial(void **state) {
     uint8_t serial[LOADER_SERIAL_BYTES];
     (void)state;
     for (volatile unsigned tear = 0; tear < 40; tear++) {
-        blank_board(state);
+        blank_board(NULL);
         chip.random = tear;
         assert_false(loader_slots_serial(&chip.flash, serial));
         chip.until_loss = tear == 0 ? -1 : 0;
@@ -240,8 +232,7 @@ static void refuses(const struct made *made, enum loader_fault fault) {
     assert_memory_equal(before, chip.bytes, chip_size(&chip));
 }
 
-static void test_slots_refuse(void **state) {
-    (void)state;
+TEST(test_slots_refuse) {
     bring_and_confirm(&old);
     struct made bad = new;
     bad.all[20] ^= 1;
@@ -285,8 +276,7 @@ static void test_slots_refuse(void **state) {
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_have_no_way_back(void **state) {
-    (void)state;
+TEST(test_slots_have_no_way_back) {
     bring_and_confirm(&old);
     struct made strict = new;
     strict.image.flags = LOADER_NO_WAY_BACK;
@@ -307,8 +297,7 @@ static void test_slots_have_no_way_back(void **state) {
 
 /* --- blocks --------------------------------------------------------------- */
 
-static void test_slots_take_blocks_in_any_order(void **state) {
-    (void)state;
+TEST(test_slots_take_blocks_in_any_order) {
     memset(chip.bytes, 0x5a, chip_size(&chip));
     begin(&old);
     for (uint32_t b = in.blocks; b-- > 0;) {
@@ -324,9 +313,8 @@ static void test_slots_take_blocks_in_any_order(void **state) {
     assert_int_equal(starts(false), 0);
 }
 
-static void test_slots_pass_over_bad_blocks(void **state) {
+TEST(test_slots_pass_over_bad_blocks) {
     uint8_t block[LOADER_BLOCK_BYTES + 1] = {0};
-    (void)state;
     begin(&old);
     memcpy(block, old.all + LOADER_BLOCK_BYTES, LOADER_BLOCK_BYTES);
     uint32_t crc = frame_crc32c(0, block, LOADER_BLOCK_BYTES);
@@ -347,8 +335,7 @@ static void test_slots_pass_over_bad_blocks(void **state) {
 }
 
 /* Blocks whose CRC is right, and which are not what was signed. */
-static void test_slots_refuse_another_code(void **state) {
-    (void)state;
+TEST(test_slots_refuse_another_code) {
     bring_and_confirm(&old);
     struct made bad = new;
     bad.all[2000] ^= 1;
@@ -362,8 +349,7 @@ static void test_slots_refuse_another_code(void **state) {
     assert_int_equal(starts(false), 1);
 }
 
-static void test_slots_go_on(void **state) {
-    (void)state;
+TEST(test_slots_go_on) {
     begin(&old);
     chip_block(&in, &old, 2);
     chip_block(&in, &old, 0);
@@ -380,8 +366,7 @@ static void test_slots_go_on(void **state) {
 
 /* Without a restart: the same again changes nothing; what is refused costs
  * nothing of what has come; another image takes its place. */
-static void test_slots_begin_in_the_midst(void **state) {
-    (void)state;
+TEST(test_slots_begin_in_the_midst) {
     bring_and_confirm(&old);
     begin(&new);
     chip_block(&in, &new, 2);
@@ -429,10 +414,9 @@ static void starts_not(const struct made *made, enum loader_fault fault) {
     assert_int_equal(slots.fault[0], fault);
 }
 
-static void test_slots_start_what_is_signed(void **state) {
+TEST(test_slots_start_what_is_signed) {
     static struct made bad;
     uint32_t boot;
-    (void)state;
     for (unsigned bit = 0; bit < 8 * SIGN_BYTES; bit += 37) {
         bad = new;
         bad.image.signature[bit / 8] ^= (uint8_t)(1u << bit % 8);
@@ -457,8 +441,7 @@ static void test_slots_start_what_is_signed(void **state) {
 
 /* What runs is what was signed, also where the flash gives something else by
  * then, of code or header. */
-static void test_slots_look_at_the_copy(void **state) {
-    (void)state;
+TEST(test_slots_look_at_the_copy) {
     struct loader_look look;
     uint8_t *code = new.all + LOADER_HEADER_BYTES;
     bring_and_confirm(&new);
@@ -472,8 +455,7 @@ static void test_slots_look_at_the_copy(void **state) {
     assert_int_equal(slots.fault[0], LOADER_WRONG_DIGEST);
 }
 
-static void test_slots_tell_of_a_worn_flash(void **state) {
-    (void)state;
+TEST(test_slots_tell_of_a_worn_flash) {
     bring_and_confirm(&old);
     chip.worn = 5 + 20 + 3; /* in slot 1 */
     begin(&new);
@@ -485,9 +467,8 @@ static void test_slots_tell_of_a_worn_flash(void **state) {
 }
 
 /* It would only restart, again and again, and lose what it had. */
-static void test_slots_wait_where_no_start_is_recorded(void **state) {
+TEST(test_slots_wait_where_no_start_is_recorded) {
     uint32_t boot = 0, programs;
-    (void)state;
     bring_and_confirm(&old);
     assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot), 0);
     assert_int_equal(boot, 1);
@@ -512,8 +493,7 @@ static void test_slots_wait_where_no_start_is_recorded(void **state) {
 }
 
 /* A trial that cannot be counted would have no end. */
-static void test_slots_wait_where_no_trial_is_counted(void **state) {
-    (void)state;
+TEST(test_slots_wait_where_no_trial_is_counted) {
     bring(&old);
     chip.worn_out = true;
     for (unsigned i = 0; i < 2 * LOADER_TRIES; i++) {
@@ -523,32 +503,27 @@ static void test_slots_wait_where_no_trial_is_counted(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_slots_layout, blank_board),
-        cmocka_unit_test_setup(test_slots_of_an_empty_board, blank_board),
-        cmocka_unit_test_setup(test_slots_install, blank_board),
-        cmocka_unit_test_setup(test_slots_fall_back, blank_board),
-        cmocka_unit_test_setup(test_slots_outlive_power_cycles, blank_board),
-        cmocka_unit_test_setup(test_slots_confirm_once, blank_board),
-        cmocka_unit_test_setup(test_slots_leave_what_has_rotted, blank_board),
-        cmocka_unit_test_setup(test_slots_are_spared, blank_board),
-        cmocka_unit_test_setup(test_slots_serial, blank_board),
-        cmocka_unit_test_setup(test_slots_refuse, blank_board),
-        cmocka_unit_test_setup(test_slots_have_no_way_back, blank_board),
-        cmocka_unit_test_setup(test_slots_take_blocks_in_any_order,
-                               blank_board),
-        cmocka_unit_test_setup(test_slots_pass_over_bad_blocks, blank_board),
-        cmocka_unit_test_setup(test_slots_refuse_another_code, blank_board),
-        cmocka_unit_test_setup(test_slots_go_on, blank_board),
-        cmocka_unit_test_setup(test_slots_begin_in_the_midst, blank_board),
-        cmocka_unit_test_setup(test_slots_start_what_is_signed, blank_board),
-        cmocka_unit_test_setup(test_slots_look_at_the_copy, blank_board),
-        cmocka_unit_test_setup(test_slots_tell_of_a_worn_flash, blank_board),
-        cmocka_unit_test_setup(test_slots_wait_where_no_start_is_recorded,
-                               blank_board),
-        cmocka_unit_test_setup(test_slots_wait_where_no_trial_is_counted,
-                               blank_board),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test_setup(test_slots_layout, blank_board),
+          cmocka_unit_test_setup(test_slots_of_an_empty_board, blank_board),
+          cmocka_unit_test_setup(test_slots_install, blank_board),
+          cmocka_unit_test_setup(test_slots_fall_back, blank_board),
+          cmocka_unit_test_setup(test_slots_outlive_power_cycles, blank_board),
+          cmocka_unit_test_setup(test_slots_confirm_once, blank_board),
+          cmocka_unit_test_setup(test_slots_leave_what_has_rotted, blank_board),
+          cmocka_unit_test_setup(test_slots_are_spared, blank_board),
+          cmocka_unit_test_setup(test_slots_serial, blank_board),
+          cmocka_unit_test_setup(test_slots_refuse, blank_board),
+          cmocka_unit_test_setup(test_slots_have_no_way_back, blank_board),
+          cmocka_unit_test_setup(test_slots_take_blocks_in_any_order,
+                                 blank_board),
+          cmocka_unit_test_setup(test_slots_pass_over_bad_blocks, blank_board),
+          cmocka_unit_test_setup(test_slots_refuse_another_code, blank_board),
+          cmocka_unit_test_setup(test_slots_go_on, blank_board),
+          cmocka_unit_test_setup(test_slots_begin_in_the_midst, blank_board),
+          cmocka_unit_test_setup(test_slots_start_what_is_signed, blank_board),
+          cmocka_unit_test_setup(test_slots_look_at_the_copy, blank_board),
+          cmocka_unit_test_setup(test_slots_tell_of_a_worn_flash, blank_board),
+          cmocka_unit_test_setup(test_slots_wait_where_no_start_is_recorded,
+                                 blank_board),
+          cmocka_unit_test_setup(test_slots_wait_where_no_trial_is_counted,
+                                 blank_board))

@@ -41,9 +41,8 @@ static void make_file(const char *text, mode_t mode) {
 }
 
 /* With every right of its group and of others. */
-static void others_that_can_write_it_are_refused(void **unused) {
+TEST(others_that_can_write_it_are_refused) {
     static const uint8_t none[SECURE_KEY_BYTES];
-    (void)unused;
     for (unsigned rights = 0; rights < 64; rights++) {
         uint8_t key[SECURE_KEY_BYTES] = {7};
         make_file(digits, 0600 | rights);
@@ -63,10 +62,9 @@ static void others_that_can_write_it_are_refused(void **unused) {
 
 /* Root's is as good as one's own, another user's is not, whatever its rights.
  */
-static void another_users_is_refused(void **unused) {
+TEST(another_users_is_refused) {
     static const uint8_t none[SECURE_KEY_BYTES];
     uint8_t key[SECURE_KEY_BYTES] = {7};
-    (void)unused;
     if (geteuid() != 0) {
         print_message("only root can give a file away\n");
         skip();
@@ -91,12 +89,11 @@ static void another_users_is_refused(void **unused) {
     assert_int_equal(unlink(path), 0);
 }
 
-static void what_is_no_key_is_told(void **unused) {
+TEST(what_is_no_key_is_told) {
     static const uint8_t none[SECURE_KEY_BYTES];
     static const char *const texts[] = {"", "00", "no key", NULL};
     uint8_t key[SECURE_KEY_BYTES] = {7};
     char text[sizeof digits];
-    (void)unused;
     for (unsigned i = 0; texts[i] != NULL; i++) {
         make_file(texts[i], 0600);
         assert_int_equal(key_file_read(path, key), KEY_FILE_NO_KEY);
@@ -129,10 +126,9 @@ static void read_on_stack(void) {
     read_state = key_file_read(path, read_to);
 }
 
-static void a_key_leaves_no_core_and_no_copy(void **unused) {
+TEST(a_key_leaves_no_core_and_no_copy) {
     static const struct rlimit some = {1 << 20, 1 << 20};
     struct rlimit core;
-    (void)unused;
     make_file(digits, 0600);
     assert_int_equal(prctl(PR_SET_DUMPABLE, 1), 0);
     (void)setrlimit(RLIMIT_CORE, &some);

@@ -1,16 +1,11 @@
 /* Pipes over MPI, from a rank to itself: what goes in comes out, whole and in
  * order, room is bounded, the end is noticed, and sleep ends when it should. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
 #include <time.h>
 
-#include <cmocka.h>
-
 #include "transport/drivers/mpi.h"
+#include "tests/unit/test.h"
 
 enum { TAG = 7 };
 
@@ -45,11 +40,10 @@ static int close_end(void **unused) {
 }
 
 /* Pieces of all sizes, read in others. */
-static void bytes_come_out_as_they_went_in(void **unused) {
+TEST(bytes_come_out_as_they_went_in) {
     static uint8_t bytes[200000], got[sizeof bytes];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
-    (void)unused;
     for (size_t i = 0; i < sizeof bytes; i++)
         bytes[i] = (uint8_t)(i * 2654435761u >> 13);
     for (size_t turn = 1; received < sizeof bytes; turn++) {
@@ -67,12 +61,11 @@ static void bytes_come_out_as_they_went_in(void **unused) {
     assert_memory_equal(bytes, got, sizeof bytes);
 }
 
-static void a_pipe_that_is_not_read_takes_no_more(void **unused) {
+TEST(a_pipe_that_is_not_read_takes_no_more) {
     static uint8_t bytes[MPI_PIPE_BYTES];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
     int moved = 1;
-    (void)unused;
     /* Its own receives are a part of the way. */
     for (unsigned i = 0; moved > 0; i++) {
         assert_true(i < 4 * MPI_PIPE_SLOTS);
@@ -87,10 +80,9 @@ static void a_pipe_that_is_not_read_takes_no_more(void **unused) {
     assert_false(end.blocked);
 }
 
-static void sleep_ends_with_time_or_bytes(void **unused) {
+TEST(sleep_ends_with_time_or_bytes) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t byte = 1;
-    (void)unused;
     uint64_t start = clock_us(); /* clock: sleep is no shorter, and ends
                                     minutes before what it was given */
     mpi_sleep(&place, &end, 1, NULL, 20000);
@@ -102,10 +94,9 @@ static void sleep_ends_with_time_or_bytes(void **unused) {
     assert_int_equal(pipe.receive(pipe.context, &byte, 1), 1);
 }
 
-static void an_end_is_noticed(void **unused) {
+TEST(an_end_is_noticed) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t bytes[8] = "last";
-    (void)unused;
     assert_int_equal(pipe.send(pipe.context, bytes, sizeof bytes), 8);
     mpi_pipe_end(&end);
     assert_int_equal(pipe.receive(pipe.context, bytes, sizeof bytes), 8);

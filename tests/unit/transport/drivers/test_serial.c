@@ -1,9 +1,5 @@
 /* Serial wires: pseudo-terminals pass every byte, wires that break come back, a
  * port in use is named with its user, and a link fills a paced wire. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,10 +14,9 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "tests/unit/emulated.h"
 #include "transport/drivers/serial_port.h"
+#include "tests/unit/test.h"
 
 /* clock: minutes, for what has been sent already. */
 static void wait_for(int fd) {
@@ -39,9 +34,8 @@ static void make_pair(int fds[2]) {
     assert_int_equal(serial_pair(fds), 0);
 }
 
-static void a_pair_passes_every_byte(void **unused) {
+TEST(a_pair_passes_every_byte) {
     int fds[2];
-    (void)unused;
     make_pair(fds);
     for (unsigned from = 0; from < 2; from++) {
         uint8_t sent[256], got[256];
@@ -64,12 +58,11 @@ static void a_pair_passes_every_byte(void **unused) {
 }
 
 /* The slave goes and comes back; then the master goes for good. */
-static void a_wire_that_breaks_comes_back(void **unused) {
+TEST(a_wire_that_breaks_comes_back) {
     int fds[2];
     char path[64];
     uint8_t byte = 7;
     struct serial_pipe master, slave;
-    (void)unused;
     make_pair(fds);
     assert_int_equal(ttyname_r(fds[1], path, sizeof path), 0);
     serial_pipe_init(&master, fds[0], 0);
@@ -93,11 +86,10 @@ static void a_wire_that_breaks_comes_back(void **unused) {
     assert_int_equal(serial_open(path, 115200, false), -1);
 }
 
-static void rates_and_modes(void **unused) {
+TEST(rates_and_modes) {
     int fds[2];
     char path[64];
     struct termios t;
-    (void)unused;
     make_pair(fds);
     assert_int_equal(ttyname_r(fds[1], path, sizeof path), 0);
     close(fds[1]);
@@ -113,12 +105,11 @@ static void rates_and_modes(void **unused) {
 }
 
 /* A child has the port open; it must be named. */
-static void a_port_in_use_says_by_whom(void **unused) {
+TEST(a_port_in_use_says_by_whom) {
     int fds[2], ready[2];
     char byte, want[64];
     struct serial_port port;
     struct serial_port_settings settings = {.dtr = true, .rts = true};
-    (void)unused;
     make_pair(fds);
     assert_int_equal(ttyname_r(fds[1], settings.name, sizeof settings.name), 0);
     assert_int_equal(pipe(ready), 0);
@@ -159,12 +150,11 @@ static void a_port_in_use_says_by_whom(void **unused) {
 
 /* Another process has made the pseudo-terminal and keeps both its ends open, as
  * socat does; it passes on what is sent. */
-static void who_made_a_terminal_is_no_user(void **unused) {
+TEST(who_made_a_terminal_is_no_user) {
     int fds[2], ready[2];
     struct serial_port port;
     struct serial_port_settings settings = {.baud = 115200};
     uint8_t byte = 7;
-    (void)unused;
     make_pair(fds);
     assert_int_equal(ttyname_r(fds[1], settings.name, sizeof settings.name), 0);
     assert_int_equal(pipe(ready), 0);
@@ -195,13 +185,12 @@ static void who_made_a_terminal_is_no_user(void **unused) {
 
 /* A pseudo-terminal has no lasting name but that of a link, which leads to
  * another one when both ends were made anew. */
-static void a_link_is_followed_each_time(void **unused) {
+TEST(a_link_is_followed_each_time) {
     char directory[] = "/tmp/incode-serial.XXXXXX", path[64];
     int first[2], second[2];
     uint8_t byte = 7;
     struct serial_port port;
     struct serial_port_settings settings = {.baud = 921600};
-    (void)unused;
     assert_non_null(mkdtemp(directory));
     snprintf(settings.name, sizeof settings.name, "%s/wire", directory);
     make_pair(first);
@@ -238,10 +227,9 @@ static void a_link_is_followed_each_time(void **unused) {
     assert_int_equal(unlink(settings.name) | rmdir(directory), 0);
 }
 
-static void ports_that_are_not_there(void **unused) {
+TEST(ports_that_are_not_there) {
     static const char *const names[] = {"usb:no such number", "at:9-9.9",
                                         "/dev/ttyNONE7", "/dev/pts/99999"};
-    (void)unused;
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
         struct serial_port port;
         struct serial_port_settings settings = {.baud = 115200};
@@ -432,9 +420,8 @@ static void echo(struct wire *wire, size_t size) {
 
 /* Short messages, long ones and both directions at once, in turn: what waits
  * behind others is not lost. */
-static void a_clean_wire_resends_nothing(void **unused) {
+TEST(a_clean_wire_resends_nothing) {
     static const uint32_t bauds[] = {19200, 57600, 115200, 921600, 3000000};
-    (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0];
          i += SANITIZED ? 2 : 1) {
         struct wire wire;
@@ -460,9 +447,8 @@ static void a_clean_wire_resends_nothing(void **unused) {
     }
 }
 
-static void a_link_fills_a_paced_wire(void **unused) {
+TEST(a_link_fills_a_paced_wire) {
     static const uint32_t bauds[] = {115200, 921600, 3000000};
-    (void)unused;
     for (size_t i = 0; i < sizeof bauds / sizeof bauds[0]; i++) {
         for (unsigned noisy = 0; noisy < 2; noisy++) {
             struct wire wire;
@@ -481,11 +467,10 @@ static void a_link_fills_a_paced_wire(void **unused) {
 }
 
 /* What is given to the kernel ahead of the wire is bounded by the clock. */
-static void little_is_written_ahead(void **unused) {
+TEST(little_is_written_ahead) {
     static uint8_t bytes[4096];
     int fds[2];
     struct serial_pipe pipe;
-    (void)unused;
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, fds),
                      0);
     serial_pipe_init(&pipe, fds[0], 100000);
@@ -509,18 +494,13 @@ static void little_is_written_ahead(void **unused) {
     close(fds[1]);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_pair_passes_every_byte),
-        cmocka_unit_test(a_wire_that_breaks_comes_back),
-        cmocka_unit_test(rates_and_modes),
-        cmocka_unit_test(a_port_in_use_says_by_whom),
-        cmocka_unit_test(who_made_a_terminal_is_no_user),
-        cmocka_unit_test(a_link_is_followed_each_time),
-        cmocka_unit_test(ports_that_are_not_there),
-        cmocka_unit_test(a_clean_wire_resends_nothing),
-        cmocka_unit_test(a_link_fills_a_paced_wire),
-        cmocka_unit_test(little_is_written_ahead),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_pair_passes_every_byte),
+          cmocka_unit_test(a_wire_that_breaks_comes_back),
+          cmocka_unit_test(rates_and_modes),
+          cmocka_unit_test(a_port_in_use_says_by_whom),
+          cmocka_unit_test(who_made_a_terminal_is_no_user),
+          cmocka_unit_test(a_link_is_followed_each_time),
+          cmocka_unit_test(ports_that_are_not_there),
+          cmocka_unit_test(a_clean_wire_resends_nothing),
+          cmocka_unit_test(a_link_fills_a_paced_wire),
+          cmocka_unit_test(little_is_written_ahead))

@@ -1,15 +1,10 @@
 /* Wires in virtual time: rate, latency, room, what strikes them, and that the
  * same seed is the same wire. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/drivers/sim.h"
+#include "tests/unit/test.h"
 
 enum { BYTES = 16384, FRAME = 100, FRAMES = 4000 };
 
@@ -47,10 +42,9 @@ static void fill(uint8_t *frame, uint32_t number) {
     frame[FRAME - 1] = 0;
 }
 
-static void bytes_take_their_time(void **unused) {
+TEST(bytes_take_their_time) {
     uint8_t out[200], in[200];
     struct lab *lab = new_lab(10000, 5000, 150, 1);
-    (void)unused;
     memset(out, 7, sizeof out);
     lab->now_us = 1000;
     assert_true(sim_next_us(&lab->wire.direction[0], 0) == UINT64_MAX);
@@ -75,11 +69,10 @@ static void bytes_take_their_time(void **unused) {
 }
 
 /* What is not read holds up who sends, and nothing is lost by that. */
-static void a_full_wire_takes_no_more(void **unused) {
+TEST(a_full_wire_takes_no_more) {
     uint8_t out[1000], in[1000];
     struct lab *lab = new_lab(0, 10, BYTES, 1);
     uint64_t sent = 0, got = 0;
-    (void)unused;
     for (unsigned i = 0; i < 1000; i++) {
         memset(out, 1 + (int)(i % 255), sizeof out);
         sent += (uint64_t)put(lab, out, sizeof out);
@@ -117,7 +110,7 @@ static uint64_t shower(const struct sim_faults *faults, uint64_t seed,
     return sum;
 }
 
-static void faults_strike_as_often_as_they_should(void **unused) {
+TEST(faults_strike_as_often_as_they_should) {
     const double chance[SIM_CHANCES] = {0.2,  1e-3, 1e-2, 1e-2,
                                         1e-2, 1e-4, 1e-3};
     const double each[SIM_CHANCES] = {
@@ -125,7 +118,6 @@ static void faults_strike_as_often_as_they_should(void **unused) {
         FRAMES * FRAME, FRAMES * FRAME,       FRAMES * FRAME};
     struct sim_direction direction;
     uint64_t got, clean;
-    (void)unused;
     uint64_t right = shower(NULL, 1, &direction, &clean);
     assert_true(clean == FRAMES * FRAME);
     assert_true(shower(NULL, 2, &direction, &clean) == right);
@@ -159,8 +151,7 @@ static enum sim_fate decide(void *context, struct sim_direction *direction) {
 }
 
 /* The second frame of three, each sent in two pieces. */
-static void a_frame_meets_its_fate(void **unused) {
-    (void)unused;
+TEST(a_frame_meets_its_fate) {
     for (int fate = SIM_PASSES; fate <= SIM_LATE; fate++) {
         uint8_t frame[3][FRAME], in[5 * FRAME];
         struct judge judge = {(enum sim_fate)fate, 2};
@@ -195,10 +186,9 @@ static void a_frame_meets_its_fate(void **unused) {
     }
 }
 
-static void wires_fail_one_way_and_both(void **unused) {
+TEST(wires_fail_one_way_and_both) {
     uint8_t frame[FRAME], in[FRAME];
     struct lab *lab = new_lab(0, 0, BYTES / 2, 1);
-    (void)unused;
     fill(frame, 1);
     sim_direction_deaf(&lab->wire.direction[0], true);
     assert_int_equal(put(lab, frame, FRAME), FRAME);
@@ -222,13 +212,8 @@ static void wires_fail_one_way_and_both(void **unused) {
     free(lab);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bytes_take_their_time),
-        cmocka_unit_test(a_full_wire_takes_no_more),
-        cmocka_unit_test(faults_strike_as_often_as_they_should),
-        cmocka_unit_test(a_frame_meets_its_fate),
-        cmocka_unit_test(wires_fail_one_way_and_both),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(bytes_take_their_time),
+          cmocka_unit_test(a_full_wire_takes_no_more),
+          cmocka_unit_test(faults_strike_as_often_as_they_should),
+          cmocka_unit_test(a_frame_meets_its_fate),
+          cmocka_unit_test(wires_fail_one_way_and_both))

@@ -1,9 +1,5 @@
 /* Pipes over TCP: pairs are what they claim to be, a link runs over them, and
  * an end that goes away is noticed. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
 #include <errno.h>
@@ -15,10 +11,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "held_clock.h"
 #include "transport/drivers/tcp.h"
+#include "tests/unit/test.h"
 
 /* clock: within minutes. */
 static bool has_input(int fd) {
@@ -26,11 +21,10 @@ static bool has_input(int fd) {
     return poll(&wait, 1, WAIT_MS) == 1;
 }
 
-static void a_pair_is_connected_and_set_up(void **unused) {
+TEST(a_pair_is_connected_and_set_up) {
     int fds[2], on = 0, bytes[2];
     char byte;
     socklen_t size = sizeof on;
-    (void)unused;
     assert_int_equal(tcp_pair(fds), 0);
     for (int i = 0; i < 2; i++) {
         assert_true((fcntl(fds[i], F_GETFL) & O_NONBLOCK) != 0);
@@ -51,11 +45,10 @@ static void a_pair_is_connected_and_set_up(void **unused) {
     close(fds[1]);
 }
 
-static void a_pipe_tells_room_and_end(void **unused) {
+TEST(a_pipe_tells_room_and_end) {
     static uint8_t bytes[100000];
     int fds[2], taken = 1;
     struct tcp_pipe a, b;
-    (void)unused;
     assert_int_equal(tcp_pair(fds), 0);
     tcp_pipe_init(&a, fds[0]);
     tcp_pipe_init(&b, fds[1]);
@@ -107,10 +100,9 @@ static void open_end(struct end *end, int fd, unsigned who, uint16_t window) {
     assert_non_null(end->link);
 }
 
-static void a_link_over_tcp(void **unused) {
+TEST(a_link_over_tcp) {
     enum { MESSAGES = 3000, SIZE = 1600 };
     static uint8_t bytes[SIZE];
-    (void)unused;
     for (uint16_t window = 1; window <= 64; window *= 4) {
         struct end ends[2];
         int fds[2];
@@ -152,11 +144,10 @@ static void a_link_over_tcp(void **unused) {
 
 /* What poll has found spares one call, and no more: bytes and an end that come
  * after it are not missed. */
-static void what_was_heard_spares_one_call(void **unused) {
+TEST(what_was_heard_spares_one_call) {
     uint8_t byte = 0;
     int fds[2];
     struct tcp_pipe pipe;
-    (void)unused;
     assert_int_equal(tcp_pair(fds), 0);
     tcp_pipe_init(&pipe, fds[1]);
     struct link_pipe to = tcp_link_pipe(&pipe);
@@ -177,12 +168,7 @@ static void what_was_heard_spares_one_call(void **unused) {
     close(fds[1]);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_pair_is_connected_and_set_up),
-        cmocka_unit_test(a_pipe_tells_room_and_end),
-        cmocka_unit_test(what_was_heard_spares_one_call),
-        cmocka_unit_test(a_link_over_tcp),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(a_pair_is_connected_and_set_up),
+          cmocka_unit_test(a_pipe_tells_room_and_end),
+          cmocka_unit_test(what_was_heard_spares_one_call),
+          cmocka_unit_test(a_link_over_tcp))

@@ -4,7 +4,7 @@
 
 static const uint8_t other_key[SECURE_KEY_BYTES] = "another key";
 
-static void addresses(void **unused) {
+TEST(addresses) {
     static const char *const good[] = {"127.0.0.1:7000", "[::1]:65535",
                                        "127.9.9.9:1"};
     static const char *const bad[] = {
@@ -12,7 +12,6 @@ static void addresses(void **unused) {
         "localhost:7",  "::1:7",       "[::1:7",      "[::1]7",
         "127.0.0.1:7x", "1.2.3.4.5:7", ":7",          ""};
     struct tcp_address a;
-    (void)unused;
     for (size_t i = 0; i < sizeof good / sizeof good[0]; i++) {
         assert_int_equal(tcp_address_parse(&a, good[i]), 0);
         assert_null(tcp_address_path(&a));
@@ -27,10 +26,9 @@ static void addresses(void **unused) {
     assert_true(tcp_address_is_any(&a));
 }
 
-static void paths(void **unused) {
+TEST(paths) {
     char path[TCP_PATH_MAX + 2];
     struct tcp_address a;
-    (void)unused;
     memset(path, 'a', sizeof path);
     path[TCP_PATH_MAX + 1] = '\0';
     assert_int_equal(tcp_address_set_path(&a, path), -1);
@@ -41,10 +39,9 @@ static void paths(void **unused) {
     assert_int_equal(tcp_address_set_path(&a, ""), -1);
 }
 
-static void wires_that_break_go_on(void **unused) {
+TEST(wires_that_break_go_on) {
     static struct end ends[2];
     static const int families[] = {AF_INET, AF_INET6};
-    (void)unused;
     for (unsigned keyed = 0; keyed < 2; keyed++) {
         for (unsigned f = 0; f < 2; f++) {
             struct tcp_address at = free_address(families[f]);
@@ -72,8 +69,7 @@ static void wires_that_break_go_on(void **unused) {
 
 /* One with another key that is gone is not spoken of any more: the end that
  * called it hears of that, the other after a while. */
-static void another_key_that_is_gone_is_forgotten(void **unused) {
-    (void)unused;
+TEST(another_key_that_is_gone_is_forgotten) {
     for (unsigned gone = 0; gone < 2; gone++) {
         static struct end ends[2];
         struct tcp_address at = free_address(AF_INET);
@@ -96,10 +92,9 @@ static void another_key_that_is_gone_is_forgotten(void **unused) {
     }
 }
 
-static void another_key_never_connects(void **unused) {
+TEST(another_key_never_connects) {
     static struct end ends[2];
     struct tcp_address at = free_address(AF_INET);
-    (void)unused;
     open_end(&ends[1], 1, &at, key);
     for (unsigned keyed = 2; keyed-- > 0;) {
         open_end(&ends[0], 0, &at, keyed ? other_key : NULL);
@@ -124,9 +119,8 @@ static void another_key_never_connects(void **unused) {
 
 /* Where only one of the two has a key, either hears of that, whichever calls;
  * and forgets it when one comes who is right. */
-static void a_lone_key_is_told_of(void **unused) {
+TEST(a_lone_key_is_told_of) {
     static struct end ends[2];
-    (void)unused;
     for (unsigned keyed = 0; keyed < 2; keyed++) {
         struct tcp_address at = free_address(AF_INET);
         open_end(&ends[1], 1, &at, keyed == 1 ? key : NULL);
@@ -160,12 +154,11 @@ static void a_lone_key_is_told_of(void **unused) {
  * wrong, or somebody has led his call elsewhere: while nobody better is there
  * he is heard, as the link tells then who he is; one who is right takes his
  * place, and keeps it. */
-static void one_who_is_led_elsewhere_ends_nothing(void **unused) {
+TEST(one_who_is_led_elsewhere_ends_nothing) {
     static const struct secure_ends sees[3] = {
         {{0, 0}, {1, 0}}, {{1, 0}, {0, 0}}, {{2, 0}, {3, 0}}};
     static struct end ends[2], lost;
     struct tcp_address at = free_address(AF_INET);
-    (void)unused;
     open_end(&ends[1], 1, &at, key);
     ends[1].wire.config.ends = &sees[1];
     for (unsigned round = 0; round < 2; round++) {
@@ -248,13 +241,11 @@ static void with_strangers(const uint8_t *with) {
     assert_true(connections <= 10);
 }
 
-static void strangers_change_nothing(void **unused) {
-    (void)unused;
+TEST(strangers_change_nothing) {
     with_strangers(key);
 }
 
-static void strangers_without_a_key_change_nothing(void **unused) {
-    (void)unused;
+TEST(strangers_without_a_key_change_nothing) {
     with_strangers(NULL);
 }
 
@@ -317,11 +308,10 @@ static void flood_on(struct flood *f, const struct tcp_address *at,
 /* Hundreds come, three at each look of the one who listens; one with the key
  * comes behind them, and answers at every third look only.  It is taken within
  * so many looks. */
-static void a_flood_keeps_nobody_out(void **unused) {
+TEST(a_flood_keeps_nobody_out) {
     enum { LOOKS_MAX = 60 };
     static struct end ends[2];
     static struct flood f;
-    (void)unused;
     assert_int_equal(getrandom(f.opening, sizeof f.opening, 0),
                      sizeof f.opening);
     f.size[0] = greeting_with(other_key, f.opening[0], OPENING_MAX);
@@ -358,11 +348,10 @@ static void a_flood_keeps_nobody_out(void **unused) {
 
 /* Without a key, and with nobody better there, one who only listens is taken:
  * a node that does not know who it is; and gives way to one who greets. */
-static void a_silent_caller_is_taken_for_want_of_a_better(void **unused) {
+TEST(a_silent_caller_is_taken_for_want_of_a_better) {
     static struct end ends[2];
     struct tcp_address at = free_address(AF_INET);
     uint8_t byte;
-    (void)unused;
     open_end(&ends[1], 1, &at, NULL);
     int silent = stranger(&at);
     uint64_t begin = clock_us();
@@ -381,11 +370,10 @@ static void a_silent_caller_is_taken_for_want_of_a_better(void **unused) {
 
 /* One that answers a call and proves nothing, as its bytes were lost, is called
  * again before it gives up itself. */
-static void a_lost_proof_is_asked_for_again(void **unused) {
+TEST(a_lost_proof_is_asked_for_again) {
     static struct end end;
     struct tcp_address at = free_address(AF_INET);
     unsigned calls = 0;
-    (void)unused;
     int on = 1, listener = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
     assert_true(listener >= 0);
     (void)setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -406,10 +394,9 @@ static void a_lost_proof_is_asked_for_again(void **unused) {
     close_end(&end);
 }
 
-static void without_a_key_only_if_it_is_meant(void **unused) {
+TEST(without_a_key_only_if_it_is_meant) {
     static struct tcp_wire wire;
     struct tcp_wire_config c = {.listens = true};
-    (void)unused;
     c.address = free_address(AF_INET);
     for (unsigned i = 0; i < 2; i++) {
         c.listens = i == 0;
@@ -423,13 +410,12 @@ static void without_a_key_only_if_it_is_meant(void **unused) {
 
 /* A board without random bytes gives its device and the number of its start;
  * one that has neither gets no wire, and nothing left open. */
-static void openings_are_drawn_from_the_board(void **unused) {
+TEST(openings_are_drawn_from_the_board) {
     static struct end ends[2];
     struct secure_source boards[2] = {{.device = "board 0", .boot = 7},
                                       {.device = "board 1", .boot = 1}};
     struct secure_source none = {.boot = 0};
     struct tcp_address at = free_address(AF_INET);
-    (void)unused;
     for (unsigned i = 0; i < 2; i++) {
         open_end(&ends[i], i, &at, key);
         ends[i].wire.config.source = i == 0 ? &none : &boards[i];
@@ -446,22 +432,16 @@ static void openings_are_drawn_from_the_board(void **unused) {
     close_end(&ends[1]);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(addresses),
-        cmocka_unit_test(paths),
-        cmocka_unit_test(wires_that_break_go_on),
-        cmocka_unit_test(another_key_never_connects),
-        cmocka_unit_test(a_lone_key_is_told_of),
-        cmocka_unit_test(another_key_that_is_gone_is_forgotten),
-        cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
-        cmocka_unit_test(strangers_change_nothing),
-        cmocka_unit_test(strangers_without_a_key_change_nothing),
-        cmocka_unit_test(a_flood_keeps_nobody_out),
-        cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
-        cmocka_unit_test(a_lost_proof_is_asked_for_again),
-        cmocka_unit_test(without_a_key_only_if_it_is_meant),
-        cmocka_unit_test(openings_are_drawn_from_the_board),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(addresses), cmocka_unit_test(paths),
+          cmocka_unit_test(wires_that_break_go_on),
+          cmocka_unit_test(another_key_never_connects),
+          cmocka_unit_test(a_lone_key_is_told_of),
+          cmocka_unit_test(another_key_that_is_gone_is_forgotten),
+          cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
+          cmocka_unit_test(strangers_change_nothing),
+          cmocka_unit_test(strangers_without_a_key_change_nothing),
+          cmocka_unit_test(a_flood_keeps_nobody_out),
+          cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
+          cmocka_unit_test(a_lost_proof_is_asked_for_again),
+          cmocka_unit_test(without_a_key_only_if_it_is_meant),
+          cmocka_unit_test(openings_are_drawn_from_the_board))

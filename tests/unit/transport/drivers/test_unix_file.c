@@ -25,11 +25,10 @@ static struct tcp_address path_address(const char *name) {
     return a;
 }
 
-static void a_path_is_a_wire(void **unused) {
+TEST(a_path_is_a_wire) {
     static struct end ends[2];
     struct tcp_address at = path_address("wire");
     struct stat about;
-    (void)unused;
     open_end(&ends[0], 0, &at, NULL); /* the caller is there first */
     for (unsigned i = 0; i < 20; i++) {
         step(&ends[0]);
@@ -49,10 +48,9 @@ static void a_path_is_a_wire(void **unused) {
     assert_int_equal(access(tcp_address_path(&at), F_OK), -1);
 }
 
-static void left_over_files_are_replaced_and_no_others(void **unused) {
+TEST(left_over_files_are_replaced_and_no_others) {
     static struct tcp_wire first, second;
     struct tcp_wire_config c = {.listens = true};
-    (void)unused;
     c.address = path_address("socket");
     const char *path = tcp_address_path(&c.address);
     assert_int_equal(tcp_wire_open(&first, &c), 0);
@@ -73,11 +71,10 @@ static void left_over_files_are_replaced_and_no_others(void **unused) {
 
 /* Another user who gets past the file's rights is told by the kernel; either
  * way round. */
-static void another_user_is_sent_away(void **unused) {
+TEST(another_user_is_sent_away) {
     static struct end ends[2];
     static struct tcp_wire wire;
     struct tcp_wire_config c = {.listens = true};
-    (void)unused;
     if (geteuid() != 0) {
         print_message("only root can be another user\n");
         skip();

@@ -3,10 +3,6 @@
 #ifndef TESTS_WIRE_ENDS_H
 #define TESTS_WIRE_ENDS_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,11 +15,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
 #include "held_clock.h"
 #include "transport/drivers/secure_sodium.h"
 #include "transport/drivers/tcp_wire.h"
+#include "tests/unit/test.h"
 
 static const uint8_t key[SECURE_KEY_BYTES] = "the cube's key, 32 bytes of it ";
 

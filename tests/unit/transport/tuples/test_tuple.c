@@ -1,15 +1,10 @@
 /* Tuples as bytes: what is written is read, whatever its fields; nothing else
  * is read; and templates match what they say. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
+#include "tests/unit/test.h"
 
 static uint64_t random_state = 5;
 
@@ -75,9 +70,8 @@ static bool should_match(const struct tuple *pattern,
     return match;
 }
 
-static void round_trip(void **state) {
+TEST(round_trip) {
     uint8_t bytes[200];
-    (void)state;
     for (unsigned i = 0; i < 20000; i++) {
         struct tuple t = drawn_tuple(), back;
         size_t size = tuple_write(&t, bytes, sizeof bytes);
@@ -92,10 +86,9 @@ static void round_trip(void **state) {
     }
 }
 
-static void matches(void **state) {
+TEST(matches) {
     uint8_t a[200], b[200];
     unsigned matched = 0;
-    (void)state;
     for (unsigned i = 0; i < 100000; i++) {
         struct tuple t = drawn_tuple(), pattern = draw(4) ? t : drawn_tuple();
         for (unsigned k = 0; k < pattern.count; k++) {
@@ -119,10 +112,9 @@ static void matches(void **state) {
 }
 
 /* Keys and signatures go to all places alike. */
-static void spreads(void **state) {
+TEST(spreads) {
     unsigned count[7] = {0};
     uint8_t bytes[20];
-    (void)state;
     for (uint32_t i = 0; i < 7000; i++) {
         struct tuple t = {.count = 1, .field = {TUPLE_UINT32(i)}};
         assert_true(tuple_write(&t, bytes, sizeof bytes) > 0);
@@ -132,9 +124,5 @@ static void spreads(void **state) {
         assert_true(count[i] > 850 && count[i] < 1150);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(round_trip),
-                                       cmocka_unit_test(matches),
-                                       cmocka_unit_test(spreads)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(round_trip), cmocka_unit_test(matches),
+          cmocka_unit_test(spreads))

@@ -128,9 +128,8 @@ static void random_program(unsigned places, bool roams, uint64_t seed) {
     free(m);
 }
 
-static void equals_model(void **state) {
+TEST(equals_model) {
     static const unsigned places[] = {1, 2, 3, 5, 16};
-    (void)state;
     for (uint64_t seed = 0; seed < seeds(40); seed++) {
         for (unsigned i = 0; i < 5; i++)
             random_program(places[i], false, seed);
@@ -142,8 +141,7 @@ static void equals_model(void **state) {
 
 /* Callers that wait get what comes in the order in which they asked; copies
  * hold nobody up. */
-static void first_come(void **state) {
-    (void)state;
+TEST(first_come) {
     for (uint64_t seed = 0; seed < seeds(20); seed++) {
         struct tuples_config config = usual_config();
         struct world *w = new_world(6, &config, seed);
@@ -246,21 +244,19 @@ static void push_back(uint64_t seed) {
     free_world(w);
 }
 
-static void pushes_back(void **state) {
-    (void)state;
+TEST(pushes_back) {
     for (uint64_t seed = 0; seed < seeds(20); seed++)
         push_back(seed);
 }
 
 /* A large tuple is not overtaken for ever by small ones: who asked for room
  * first gets it first. */
-static void room_in_order(void **state) {
+TEST(room_in_order) {
     uint8_t bytes[1500] = {0};
     struct tuples_config config = usual_config();
     config.store_bytes = 1600;
     struct world *w = new_world(3, &config, 3);
     struct tuple pattern = {.count = 1}, t = {.count = 1};
-    (void)state;
     pattern.field[0] = TUPLE_FORMAL(TUPLE_TYPE_BYTES);
     t.field[0] = TUPLE_BYTES(bytes, 700);
     finish(w, 0, tuples_out(w->space[0], &t), &t);
@@ -295,8 +291,7 @@ static void drop_messages(struct world *w) {
 
 /* At any moment: all is empty, what was pending has ended, and the space is as
  * good as new.  Messages of before may still come. */
-static void begins_anew(void **state) {
-    (void)state;
+TEST(begins_anew) {
     for (uint64_t seed = 0; seed < seeds(60); seed++) {
         struct tuples_config config = usual_config();
         config.store_bytes = 1600;
@@ -338,8 +333,7 @@ static void begins_anew(void **state) {
 }
 
 /* Whoever gives up gets nothing, and takes nothing from anybody. */
-static void gives_up(void **state) {
-    (void)state;
+TEST(gives_up) {
     for (uint64_t seed = 0; seed < seeds(60); seed++) {
         struct tuples_config config = usual_config();
         struct world *w = new_world(5, &config, seed);
@@ -374,9 +368,8 @@ static bool count_down(void *context, struct tuple *tuple) {
     return true;
 }
 
-static void evaluates(void **state) {
+TEST(evaluates) {
     static tuples_function *const functions[] = {NULL, count_down};
-    (void)state;
     for (uint64_t seed = 0; seed < seeds(20); seed++) {
         unsigned places = 1 + (unsigned)(seed % 5), at[5] = {0};
         struct tuples_config config = usual_config();
@@ -418,12 +411,11 @@ static void evaluates(void **state) {
 
 /* --- limits, and what no place sends -------------------------------------- */
 
-static void keeps_limits(void **state) {
+TEST(keeps_limits) {
     struct tuples_config config = usual_config();
     uint8_t bytes[TUPLES_TUPLE_MAX] = {0};
     struct world *w = new_world(2, &config, 1);
     struct tuple t = pair_of(OPEN, 1, false);
-    (void)state;
     assert_int_equal(tuples_out(w->space[0], &t), TUPLES_UNFIT);
     assert_int_equal(tuples_eval(w->space[0], 0, &t), TUPLES_UNFIT);
     t.count = 0;
@@ -446,11 +438,10 @@ static void keeps_limits(void **state) {
     assert_int_equal(tuples_arena_bytes(&config), 0);
 }
 
-static void survives_nonsense(void **state) {
+TEST(survives_nonsense) {
     struct tuples_config config = usual_config();
     uint8_t m[64];
     unsigned sound = 0;
-    (void)state;
     for (uint64_t seed = 0; seed < 300; seed++) {
         struct world *w = new_world(4, &config, seed);
         struct tuple t = pair_of(1, OPEN, false);
@@ -476,12 +467,8 @@ static void survives_nonsense(void **state) {
     assert_true(sound > 300);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(equals_model),     cmocka_unit_test(first_come),
-        cmocka_unit_test(pushes_back),      cmocka_unit_test(room_in_order),
-        cmocka_unit_test(begins_anew),      cmocka_unit_test(gives_up),
-        cmocka_unit_test(evaluates),        cmocka_unit_test(keeps_limits),
-        cmocka_unit_test(survives_nonsense)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(equals_model), cmocka_unit_test(first_come),
+          cmocka_unit_test(pushes_back), cmocka_unit_test(room_in_order),
+          cmocka_unit_test(begins_anew), cmocka_unit_test(gives_up),
+          cmocka_unit_test(evaluates), cmocka_unit_test(keeps_limits),
+          cmocka_unit_test(survives_nonsense))

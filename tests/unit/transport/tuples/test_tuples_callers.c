@@ -4,9 +4,8 @@
 
 enum { SEEDS = 6000 };
 
-static void explained(void **state) {
+TEST(explained) {
     uint32_t taken = 0, none = 0, waited = 0;
-    (void)state;
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
         struct history h;
         play(&h, seed);
@@ -26,9 +25,8 @@ static void explained(void **state) {
 }
 
 /* What the explainer must not take. */
-static void tells_wrong(void **state) {
+TEST(tells_wrong) {
     struct history h;
-    (void)state;
     memset(&h, 0, sizeof h);
     h.callers = 3;
     h.calls = 1;
@@ -50,8 +48,4 @@ static void tells_wrong(void **state) {
     assert_false(is_explained(&h));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(explained),
-                                       cmocka_unit_test(tells_wrong)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(explained), cmocka_unit_test(tells_wrong))

@@ -178,10 +178,9 @@ static void master(struct party *p, unsigned workers) {
     assert_int_equal(done, JOBS);
 }
 
-static void triangulates(void **state) {
+TEST(triangulates) {
     static const struct cube_config usual = {.window = 2};
     struct host_sim_cube_options bad = perfect;
-    (void)state;
     bad.faults.chance[SIM_DELETE] = 2e-5;
     bad.faults.chance[SIM_FLIP] = 1e-5;
     for (uint64_t seed = 0; seed < 3; seed++) {
@@ -204,7 +203,4 @@ static void triangulates(void **state) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(triangulates)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(triangulates))

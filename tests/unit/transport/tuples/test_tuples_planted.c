@@ -6,9 +6,8 @@
 
 enum { SEEDS = 200 };
 
-static void found(void **state) {
+TEST(found) {
     unsigned wrong = 0;
-    (void)state;
     for (uint64_t seed = 0; seed < SEEDS; seed++) {
         struct history h;
         play(&h, seed);
@@ -18,7 +17,4 @@ static void found(void **state) {
     assert_true(wrong > 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(found)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(found))

@@ -4,17 +4,12 @@
 #ifndef TESTS_UNIT_TUPLES_WORLD_H
 #define TESTS_UNIT_TUPLES_WORLD_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
+#include "tests/unit/test.h"
 
 enum { WORLD_PLACES = 16, WORLD_QUEUE = 4, WORLD_TURNS = 200000 };
 

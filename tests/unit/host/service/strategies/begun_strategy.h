@@ -3,17 +3,12 @@
 #ifndef TESTS_UNIT_BEGUN_STRATEGY_H
 #define TESTS_UNIT_BEGUN_STRATEGY_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/mesh/gen.h"
 #include "host/service/strategies/strategies.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 4 };
 

@@ -1,19 +1,13 @@
 /* The table of strategies, and the choice among them. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "host/service/strategies/strategies.h"
+#include "tests/unit/test.h"
 
 enum { NODES = 4 };
 
 /* Every row can be run and named, and only by its own name. */
-static void test_table(void **unused) {
-    (void)unused;
+TEST(test_table) {
     const struct host_task task = {.points = 1000,
                                    .memory = 4u << 20,
                                    .nodes = NODES,
@@ -57,8 +51,7 @@ static const struct host_strategy *best_of(const struct host_task *task) {
 /* Alone, alone; with few regions, regions; with many, where borders are most of
  * them, an exchange; and where points are inserted faster than faces found, or
  * the wire is what takes the time, alone again. */
-static void test_auto(void **unused) {
-    (void)unused;
+TEST(test_auto) {
     struct host_task task = {
         .points = 20000, .memory = 4u << 20, .nodes = 1, .processors = 1};
     assert_ptr_equal(best_of(&task), &host_sequential);
@@ -91,10 +84,4 @@ static void test_auto(void **unused) {
     assert_ptr_equal(best_of(&task), &host_spatial);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_table),
-        cmocka_unit_test(test_auto),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(cmocka_unit_test(test_table), cmocka_unit_test(test_auto))

@@ -24,8 +24,7 @@ static void commit_all(const struct host_strategy *strategy, unsigned node,
     assert_int_equal(host_ledger_finish(&ledger, node), 0);
 }
 
-static void test_sequential(void **unused) {
-    (void)unused;
+TEST(test_sequential) {
     const struct host_strategy *s = &host_sequential;
     struct incode_job job, none;
     assert_int_equal(s->regions(1), 1);
@@ -62,8 +61,7 @@ static void test_sequential(void **unused) {
     end();
 }
 
-static void test_spatial_first(void **unused) {
-    (void)unused;
+TEST(test_spatial_first) {
     const struct host_strategy *s = &host_spatial;
     struct incode_job job, none;
     begin(s);
@@ -90,8 +88,7 @@ static void test_spatial_first(void **unused) {
 
 /* After a loss everybody takes of what is left, and all of it is done; two
  * ranges a node, or one where it is alone. */
-static void test_spatial_loss(void **unused) {
-    (void)unused;
+TEST(test_spatial_loss) {
     const struct host_strategy *s = &host_spatial;
     for (unsigned gone = 1; gone < NODES; gone++) {
         struct incode_job job;
@@ -126,8 +123,7 @@ static void test_spatial_loss(void **unused) {
 }
 
 /* Nothing is done, and nodes only start again: each has its region again. */
-static void test_spatial_restart(void **unused) {
-    (void)unused;
+TEST(test_spatial_restart) {
     const struct host_strategy *s = &host_spatial;
     struct incode_job job;
     begin(s);
@@ -163,8 +159,7 @@ static unsigned builders_of(const struct host_strategy *strategy,
     return builders;
 }
 
-static void test_master_slaves(void **unused) {
-    (void)unused;
+TEST(test_master_slaves) {
     const struct host_strategy *s = &host_master_slaves;
     struct incode_job job, none;
     begin(s);
@@ -212,8 +207,7 @@ static void test_master_slaves(void **unused) {
     end();
 }
 
-static void test_hybrid(void **unused) {
-    (void)unused;
+TEST(test_hybrid) {
     const struct host_strategy *s = &host_hybrid;
     struct incode_job job, none;
     begin(s);
@@ -274,8 +268,7 @@ static void check_refused(const struct host_strategy *s, unsigned nodes,
     assert_true(text == NULL || strstr(error.text, text) != NULL);
 }
 
-static void test_refusals(void **unused) {
-    (void)unused;
+TEST(test_refusals) {
     static const struct host_strategy *const rows[] = {&host_master_slaves,
                                                        &host_hybrid};
     const struct host_sharing none = {0};
@@ -312,8 +305,7 @@ static unsigned first_with_bricks(const struct host_strategy *s,
 }
 
 /* What comes of a brick that is not committed goes with a loss. */
-static void test_lost_tetrahedra(void **unused) {
-    (void)unused;
+TEST(test_lost_tetrahedra) {
     unsigned tried = 0;
     for (unsigned r = 0; host_strategy_row(r) != NULL; r++) {
         const struct host_strategy *s = host_strategy_row(r);
@@ -347,8 +339,7 @@ static void test_lost_tetrahedra(void **unused) {
 
 /* The memory that is asked for does for every role that a strategy gives, and
  * is no more than one of them needs. */
-static void test_arena(void **unused) {
-    (void)unused;
+TEST(test_arena) {
     const struct node_identity identity = {.dimension = 2, .epoch = 1};
     const struct node_setup_message given = {.setup = {.bricks = 100}};
     const struct host_sharing sharing = {0};

@@ -70,8 +70,7 @@ static void goes_to_all(uint32_t frames, uint32_t first) {
 
 /* All exchange, and are told all regions and what pages each has room for,
  * once; after a loss they work by themselves, and hear nothing of them. */
-static void test_exchange(void **unused) {
-    (void)unused;
+TEST(test_exchange) {
     const struct host_strategy *s = &host_exchange;
     struct incode_job job;
     struct node_setup_message setup = {.setup.build = INCODE_BUILD_AUTO};
