@@ -115,6 +115,11 @@ struct incode_fine {
     struct incode_dd n[3], m[3], det;
 };
 
+/* a: NULL for the plane alone. */
+void incode_sphere_fine(struct incode_fine *f, const double v[3],
+                        const double b[3], const double c[3], const double *a,
+                        double scale);
+
 enum { INCODE_FINE_UNITS = 32 }; /* of incode/predicates/pause.h, at the most */
 
 /* Sharpens the bounds of an ill-conditioned plane or sphere; where that is not
