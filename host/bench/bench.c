@@ -368,7 +368,7 @@ static error_t parse_bench(int key, char *value, struct argp_state *state) {
     }
 }
 
-static const struct argp bench_arguments_bench = {
+static const struct argp argp_of_bench = {
     options,
     parse_bench,
     "paper\nlinks\nboards\nscaling\npeers [DIRECTORY|FILE]...",
@@ -415,14 +415,14 @@ static int check(const struct arguments *a, struct host_error *error) {
     const char *other = other_option(a);
     if (other != NULL) {
         return host_fail(error, HOST_USAGE,
-                         "%s: no option of bench_arguments_bench %s; see "
-                         "incode bench_arguments_bench --help",
+                         "%s: no option of bench %s; see "
+                         "incode bench --help",
                          other, a->what);
     }
     return peers || a->peers.names == 0
                ? 0
                : host_fail(error, HOST_USAGE,
-                           "%s: one argument too many; bench_arguments_bench "
+                           "%s: one argument too many; bench "
                            "%s takes none",
                            a->peers.name[0], a->what);
 }
@@ -430,8 +430,7 @@ static int check(const struct arguments *a, struct host_error *error) {
 int host_bench(int argc, char **argv, struct host_error *error) {
     struct arguments a = {.peers = {.rounds = 3, .limit_s = 60},
                           .error = error};
-    if (host_options_parse(&bench_arguments_bench, argc, argv, 0, &a, error) !=
-        0)
+    if (host_options_parse(&argp_of_bench, argc, argv, 0, &a, error) != 0)
         return error->code;
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,

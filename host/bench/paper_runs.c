@@ -446,7 +446,7 @@ int host_paper_check(struct host_paper_bench *bench, struct host_error *error) {
     for (size_t i = 0; i < sizeof sets / sizeof sets[0]; i++)
         for (unsigned nodes = 1; nodes <= 2 && error->code == 0; nodes *= 2)
             (void)hold(bench, &fit, sets[i].set, sets[i].points, nodes, error);
-    host_paper_note("cpu: processor time of the paper_sequential_busiest node; "
+    host_paper_note("cpu: processor time of the busiest node; "
                     "t_max is by the "
                     "clock, while host and\nnodes share the processors of this "
                     "machine.");

@@ -11,7 +11,9 @@ fi
 tree=$scratch/tree
 mkdir -p "$tree/build"
 cp -a Makefile boards host incode node transport "$tree"
-mkdir -p "$tree/tests"
+mkdir -p "$tree/tests/arithmetic"
+cp -a tests/*.mk "$tree/tests"
+cp -a tests/arithmetic/*.mk "$tree/tests/arithmetic"
 cp -a "$BUILD/flags" "$BUILD/commit" "$BUILD/obj" "$BUILD"/*.a \
     "$BUILD/node" "$BUILD/include" "$tree/build"
 

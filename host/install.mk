@@ -1,0 +1,74 @@
+# Where the programs, their pages and their completion go: what is put there,
+# and what is taken away again.
+bin        = $(DESTDIR)$(PREFIX)/bin
+man        = $(DESTDIR)$(PREFIX)/share/man/man1
+completion = $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+# Images of boards that make firmware has made.
+lib        = $(DESTDIR)$(PREFIX)/lib/incode
+made_images  = $(wildcard $(images))
+made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/%))
+# Likewise programs of nodes that make nodes has made.
+made_nodes   = $(wildcard $(node_programs))
+# The library, its header and what pkg-config tells of it.
+header     = $(DESTDIR)$(PREFIX)/include
+library_to = $(DESTDIR)$(PREFIX)/lib
+VERSION   := $(shell sed -n 's/.*NODE_VERSION "\(.*\)"/\1/p' node/version.h)
+# Documents, what they show, and examples, in folders as here.
+doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
+documents := $(wildcard *.md LICENSE incode/*.md boards/*.md transport/*.md \
+	tests/*.md host/*.md host/*/*.md host/service/strategies/*.md \
+	boards/linux/examples/* host/draw/*.svg)
+man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
+pages     := $(man_pages) $(BUILD)/pages/incode.bash
+$(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
+	@mkdir -p $(@D)
+	$(say) PAGE $@
+	@bash host/pages $* $(BUILD) > $@
+
+# Folders that install has made, for uninstall.
+folders   = $(doc)/.folders
+install: all $(pages)
+	@for file in bin/- share/man/man1/- share/bash-completion/completions/- \
+		lib/incode/loader/- include/- lib/pkgconfig/- $(documents:%=share/doc/incode/%); do \
+		folder='$(DESTDIR)$(PREFIX)/'$${file%/*}; \
+		while [ ! -e "$$folder" ]; do \
+			echo "$$folder"; above=$${folder%/*}; \
+			[ "$$above" != "$$folder" ] || break; folder=$$above; done; \
+	done > '$(BUILD)/folders'
+	install -d '$(bin)' '$(man)' '$(completion)'
+	for file in $(documents); do \
+		install -D -m 644 $$file '$(doc)'/$$file || exit 1; done
+	cat '$(BUILD)/folders' >> '$(folders)'
+	install $(programs) '$(bin)'
+	install -d '$(header)' '$(library_to)/pkgconfig'
+	install -m 644 host/library/incode.h '$(header)'
+	install -m 644 $(libraries) '$(library_to)'
+	ln -sf libincode.so.0 '$(library_to)/libincode.so'
+	printf '%s\n' 'Name: incode' 'Version: $(VERSION)' \
+		'Description: exact 3D Delaunay triangulation' \
+		'Cflags: -I$(PREFIX)/include' 'Libs: -L$(PREFIX)/lib -lincode' \
+		'Libs.private: -lm -pthread' > '$(library_to)/pkgconfig/incode.pc'
+	install -m 644 $(man_pages) '$(man)'
+	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
+	$(if $(made_images),install -d '$(lib)' && \
+		install -m 644 $(made_images) '$(lib)')
+	$(if $(made_loaders),install -d '$(lib)/loader' && \
+		install -m 644 $(made_loaders) '$(lib)/loader')
+	$(if $(made_nodes),install -d '$(lib)' && install $(made_nodes) '$(lib)')
+	ln -sf incode '$(completion)/incode-node'
+
+uninstall:
+	rm -f $(patsubst %,'$(lib)/%.img',$(bare_boards)) \
+		$(patsubst %,'$(lib)/loader/%.img',$(bare_boards)) \
+		$(patsubst %,'$(lib)/%',$(notdir $(node_programs)))
+	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
+		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
+		'$(completion)/incode' '$(completion)/incode-node' \
+		'$(header)/incode.h' '$(library_to)/libincode.so' \
+		$(patsubst %,'$(library_to)/%',$(notdir $(libraries))) \
+		'$(library_to)/pkgconfig/incode.pc' \
+		$(patsubst %,'$(doc)/%',$(documents))
+	@if [ -e '$(folders)' ]; then \
+		sort -ru '$(folders)' > '$(BUILD)/folders'; rm '$(folders)'; \
+		while read -r folder; do \
+			rmdir "$$folder" 2> /dev/null; done < '$(BUILD)/folders'; :; fi
