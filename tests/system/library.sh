@@ -3,9 +3,10 @@
 # calls at once; cancelling; memory and threads that fail.  install.sh has its
 # page's examples, and the names that are seen from outside.
 . tests/system/lib.sh
-user=$BUILD/tests/library # as TOOL, of this build
+# Of this build.  The thread sanitizer knows few places for memory.
+user=(setarch -R "$BUILD/tests/library")
 
-succeeds library/arguments "$user" arguments
+succeeds library/arguments "${user[@]}" arguments
 
 # same NAME FILE.xyz: the rows of a cube's run, with 1 to 3 threads.
 same() {
@@ -13,7 +14,7 @@ same() {
     succeeds "library/$1, a cube" incode run "$2" -q --nodes 2 --memory 4M \
         -o "$scratch/cube.npy"
     for threads in 1 2 3; do
-        succeeds "library/$1, $threads threads" within "$user" rows "$2" \
+        succeeds "library/$1, $threads threads" within "${user[@]}" rows "$2" \
             $threads "$scratch/rows.npy"
         check "library/$1, $threads threads, rows" 'they differ from the cube'"'"'s' \
             cmp -s "$scratch/rows.npy" "$scratch/cube.npy"
@@ -44,13 +45,13 @@ if has_data library; then
     done < <(list_sets)
 fi
 
-succeeds 'library/two calls at once' "$user" twice "$scratch/bubbles.xyz"
-succeeds 'library/memory and threads that fail' "$user" failing \
+succeeds 'library/two calls at once' "${user[@]}" twice "$scratch/bubbles.xyz"
+succeeds 'library/memory and threads that fail' "${user[@]}" failing \
     "$scratch/uniform.xyz" > "$scratch/tried"
 check 'library/so many were tried' "$(xargs < "$scratch/tried")" \
     awk '{ n += $1 > 20 } END { exit n != 2 }' "$scratch/tried"
 "$INCODE" gen uniform "${POINTS_MAX:-60000}" -o "$scratch/many.xyz"
-succeeds library/cancelled "$user" cancel "$scratch/many.xyz" \
+succeeds library/cancelled "${user[@]}" cancel "$scratch/many.xyz" \
     > "$scratch/longest"
 check 'library/it tells how long that took' "after $(cat "$scratch/longest") ms" \
     grep -qE '^[0-9]+$' "$scratch/longest"
