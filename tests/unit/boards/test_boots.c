@@ -1,7 +1,5 @@
 /* A flash's rules, and the number of a start: it comes once only, whenever
  * power is lost. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "node/loader/slots.h"
 #include "node/loader/flash.h"
@@ -185,10 +183,3 @@ TEST(test_flash_ram_has_a_flash_s_rules) {
     ram.read(ram.context, ALL - 1, out, 2);
     assert_int_equal(out[1], 0xff);
 }
-
-TEST_MAIN(cmocka_unit_test(test_boots_count),
-          cmocka_unit_test(test_boots_outlive_every_loss),
-          cmocka_unit_test(test_boots_pass_over_what_settles),
-          cmocka_unit_test(test_boots_at_random),
-          cmocka_unit_test(test_boots_tell_of_a_worn_flash),
-          cmocka_unit_test(test_flash_ram_has_a_flash_s_rules))

@@ -1,6 +1,5 @@
 /* What a board says: records that no link takes for a frame, registers in
  * words, why it was restarted, how deep its stack was. */
-#include <string.h>
 
 #include "boards/bare/bare.h"
 #include "boards/bare/console.h"
@@ -45,7 +44,7 @@ static int listen(void **state) {
     return 0;
 }
 
-TEST(test_console_record) {
+TEST_WITH(test_console_record, listen, NULL) {
     static const uint8_t record[] = {0, 0xff, 'a', ' ', 'b', 0};
     bare_console_begin();
     bare_console_put("a ");
@@ -56,7 +55,7 @@ TEST(test_console_record) {
 }
 
 /* Between the two zeros. */
-TEST(test_console_record_is_no_frame) {
+TEST_WITH(test_console_record_is_no_frame, listen, NULL) {
     struct frame_reader reader;
     struct frame_header header;
     for (size_t size = 0; size < 250; size++) {
@@ -75,7 +74,7 @@ TEST(test_console_record_is_no_frame) {
 }
 
 /* Its end says at least that it ends. */
-TEST(test_console_gives_up) {
+TEST_WITH(test_console_gives_up, listen, NULL) {
     said_max = 5;
     bare_console_begin();
     bare_console_put("abcdef");
@@ -84,7 +83,7 @@ TEST(test_console_gives_up) {
     assert_memory_equal(said + 2, "abc", 3);
 }
 
-TEST(test_hex) {
+TEST_WITH(test_hex, listen, NULL) {
     char room[80];
     struct cube_text text = cube_text_in(room, sizeof room);
     struct bare_register registers[] = {{"pc", 0x1234},
@@ -96,7 +95,7 @@ TEST(test_hex) {
     assert_string_equal(room, "0x0 0x5af pc 0x00001234 x0 0xfedcba9876543210");
 }
 
-TEST(test_reason_is_kept) {
+TEST_WITH(test_reason_is_kept, listen, NULL) {
     struct bare_reason reason = bare_reason_take();
     assert_int_equal(reason.kind, BARE_POWER_ON);
     assert_int_equal(reason.starts, 1);
@@ -117,7 +116,7 @@ TEST(test_reason_is_kept) {
         assert_true(strlen(bare_reason_name((enum bare_reason_kind)kind)) > 4);
 }
 
-TEST(test_fault_is_told_and_kept) {
+TEST_WITH(test_fault_is_told_and_kept, listen, NULL) {
     struct bare_register pc = {"pc", 0x10};
     (void)bare_reason_take();
     locked = false;
@@ -133,7 +132,7 @@ TEST(test_fault_is_told_and_kept) {
     assert_string_equal(reason.text, "a thing");
 }
 
-TEST(test_stack_s_paint) {
+TEST_WITH(test_stack_s_paint, listen, NULL) {
     uint32_t words[16];
     for (size_t used = 0; used <= 16; used++) {
         for (size_t i = 0; i < 16; i++)
@@ -143,11 +142,3 @@ TEST(test_stack_s_paint) {
     }
     assert_int_equal(bare_stack_high_water(), BARE_STACK_BYTES);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(test_reason_is_kept, listen),
-          cmocka_unit_test_setup(test_console_record, listen),
-          cmocka_unit_test_setup(test_console_record_is_no_frame, listen),
-          cmocka_unit_test_setup(test_console_gives_up, listen),
-          cmocka_unit_test_setup(test_hex, listen),
-          cmocka_unit_test_setup(test_fault_is_told_and_kept, listen),
-          cmocka_unit_test_setup(test_stack_s_paint, listen))

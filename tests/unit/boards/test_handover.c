@@ -1,6 +1,4 @@
 /* What a loader leaves for its image, in memory that a restart keeps. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "boards/bare/handover.h"
 #include "tests/unit/test.h"
@@ -44,6 +42,3 @@ TEST(test_reason_is_the_loader_s) {
         assert_int_equal(bare_reason_take().kind, kind);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(test_handover_is_taken_once),
-          cmocka_unit_test(test_reason_is_the_loader_s))

@@ -1,7 +1,5 @@
 /* What boards have instead of a C library, against this machine's: under other
  * names, as it is here as well. */
-#include <stdlib.h>
-#include <string.h>
 
 #include <math.h>
 
@@ -133,10 +131,3 @@ TEST(test_own_memory_is_compared) {
         }
     }
 }
-
-TEST_MAIN(cmocka_unit_test(test_own_sqrt_of_what_is_special),
-          cmocka_unit_test(test_own_sqrt_of_squares_and_their_neighbours),
-          cmocka_unit_test(test_own_sqrt_of_anything),
-          cmocka_unit_test(test_own_memory_moves),
-          cmocka_unit_test(test_own_memory_is_set),
-          cmocka_unit_test(test_own_memory_is_compared))

@@ -1,6 +1,4 @@
 /* A UART between its handler and its link: rings, and what is lost. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "boards/bare/bare.h"
 #include "tests/unit/test.h"
@@ -172,11 +170,3 @@ TEST(test_uart_flushes) {
     bare_uarts_flush(1000000);
     assert_int_equal(clock_us, 1000000);
 }
-
-TEST_MAIN(cmocka_unit_test(test_ring_is_a_queue),
-          cmocka_unit_test(test_ring_takes_pieces),
-          cmocka_unit_test(test_uart_counts_what_is_lost),
-          cmocka_unit_test(test_uart_wakes_who_has_more_to_send),
-          cmocka_unit_test(test_uart_wakes_at_the_end_of_a_frame),
-          cmocka_unit_test(test_uart_without_a_link_wakes_nobody),
-          cmocka_unit_test(test_uart_flushes))

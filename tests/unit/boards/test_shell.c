@@ -1,7 +1,4 @@
 /* Text and frames on one wire: neither harms the other. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "boards/bare/bare.h"
 #include "boards/bare/shell.h"
@@ -302,13 +299,3 @@ TEST(test_a_uart_without_a_link_is_read) {
     bare_shell_alone(&shell);
     takes(&shell, "links");
 }
-
-TEST_MAIN(cmocka_unit_test(test_frames_pass_and_lines_are_taken),
-          cmocka_unit_test(test_a_frame_in_pieces_is_no_line),
-          cmocka_unit_test(test_enter_alone_is_a_line),
-          cmocka_unit_test(test_noise_is_passed_on),
-          cmocka_unit_test(test_text_goes_between_frames),
-          cmocka_unit_test(test_frames_are_kept_back_for_who_types),
-          cmocka_unit_test(test_one_key_keeps_frames_back),
-          cmocka_unit_test(test_lines_wait_for_each_other),
-          cmocka_unit_test(test_a_uart_without_a_link_is_read))

@@ -1,7 +1,5 @@
 /* Which way a triangulator goes, and what stays of a job when the next one goes
  * another way: memory, pages, spilled faces, counts. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "solo.h"
@@ -308,7 +306,3 @@ TEST(high_water) {
     solo_close(&s);
     host_points_free(&points);
 }
-
-TEST_MAIN(cmocka_unit_test(what_is_chosen), cmocka_unit_test(each_memory),
-          cmocka_unit_test(handed_over), cmocka_unit_test(job_after_job),
-          cmocka_unit_test(late_spilled_faces), cmocka_unit_test(high_water))

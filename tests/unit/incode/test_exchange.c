@@ -1,8 +1,6 @@
 /* Triangulators that share one active face list: whatever the order in which
  * they hear of each other, the triangulation is the same, each tetrahedron is
  * built once, and each brick is committed once. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "several.h"
@@ -293,8 +291,3 @@ TEST(spills_before_work) {
     several_close(&all);
     solo_close(&solo);
 }
-
-TEST_MAIN(cmocka_unit_test(made_sets), cmocka_unit_test(degenerate_sets),
-          cmocka_unit_test(little_in_vain), cmocka_unit_test(refusals),
-          cmocka_unit_test(twice), cmocka_unit_test(waits_for_room),
-          cmocka_unit_test(waits_to_ask), cmocka_unit_test(spills_before_work))

@@ -1,7 +1,5 @@
 /* Stars that are lent: the triangulation is the same whoever finds their
  * tetrahedra and whenever these come, and each is built once. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "several.h"
@@ -197,7 +195,3 @@ TEST(unsound) {
     found.count = INCODE_LOAN_FACES + 1;
     assert_false(incode_found_is_sound(&found, 2));
 }
-
-TEST_MAIN(cmocka_unit_test(all_kinds), cmocka_unit_test(too_late),
-          cmocka_unit_test(held_up), cmocka_unit_test(large_star),
-          cmocka_unit_test(unsound))

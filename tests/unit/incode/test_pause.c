@@ -1,6 +1,5 @@
 /* How much a triangulator works between two calls of who looks after other
  * things, on sets that are hard for one part of it or another. */
-#include <stdlib.h>
 
 #include "host/mesh/gen.h"
 #include "solo.h"
@@ -93,8 +92,3 @@ TEST(test_pause_in_searches) {
     holds("uniform", 2000, INCODE_GRID, INCODE_BUILD_FACES);
     holds("grid", 1000, INCODE_GRID, INCODE_BUILD_FACES);
 }
-
-TEST_MAIN(cmocka_unit_test(test_pause_asks),
-          cmocka_unit_test(test_pause_in_points),
-          cmocka_unit_test(test_pause_in_faces),
-          cmocka_unit_test(test_pause_in_searches))

@@ -1,7 +1,6 @@
 /* What a triangulator's setup may say, and the memory that it needs. */
 #include <math.h>
 #include <stdalign.h>
-#include <stdlib.h>
 
 #include "incode/triangulator.h"
 #include "tests/unit/test.h"
@@ -85,5 +84,3 @@ TEST(setup_limits) {
     assert_string_equal(why, incode_setup_fault(&overflow));
     assert_memory_equal(arena, untouched, sizeof arena);
 }
-
-TEST_MAIN(cmocka_unit_test(too_little_memory), cmocka_unit_test(setup_limits))

@@ -137,8 +137,3 @@ TEST(released_vertices) {
                      count_by_points((const double(*)[3])xyz, PLANE));
     solo_close(&solo);
 }
-
-TEST_MAIN(cmocka_unit_test(plane_and_a_point),
-          cmocka_unit_test(mixed_exponents),
-          cmocka_unit_test(frames_before_faces),
-          cmocka_unit_test(released_vertices))

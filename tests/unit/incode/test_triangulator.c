@@ -3,8 +3,6 @@
  * pages that come at random, spilled faces, hubs, extreme coordinates. */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
@@ -529,12 +527,3 @@ TEST(refusals) {
     solo_close(&s);
     host_points_free(&points);
 }
-
-TEST_MAIN(cmocka_unit_test(degenerate_sets), cmocka_unit_test(scaled_sets),
-          cmocka_unit_test(both_ends), cmocka_unit_test(whole_range),
-          cmocka_unit_test(mixed_scales), cmocka_unit_test(denormal_neighbours),
-          cmocka_unit_test(made_sets), cmocka_unit_test(curves),
-          cmocka_unit_test(rough_sides), cmocka_unit_test(rough_sphere),
-          cmocka_unit_test(rough_at_both_ends), cmocka_unit_test(hub),
-          cmocka_unit_test(real_sets), cmocka_unit_test(smallest_memory),
-          cmocka_unit_test(refusals))

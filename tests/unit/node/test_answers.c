@@ -150,9 +150,3 @@ TEST(an_order_to_restart) {
     assert_int_equal(node_reset_why(talk.node), NODE_RESET_AGAIN);
     talk_end_all();
 }
-
-TEST_MAIN(cmocka_unit_test(answers_are_counted),
-          cmocka_unit_test(questions_without_end),
-          cmocka_unit_test(echoes_come_back),
-          cmocka_unit_test(what_is_for_loaders_is_passed_over),
-          cmocka_unit_test(an_order_to_restart))

@@ -17,5 +17,3 @@ TEST(test_windows) {
     assert_int_equal(config.window, 3);
     assert_int_equal(config.host_window, 0);
 }
-
-TEST_MAIN(cmocka_unit_test(test_windows))

@@ -1,5 +1,4 @@
 /* Texts of faults: what a node tells its user. */
-#include <string.h>
 
 #include "node/setup.h"
 #include "node/message.h"
@@ -23,5 +22,3 @@ TEST(fault_texts) {
     assert_int_equal(fault.size, NODE_FAULT_TEXT_MAX);
     assert_string_equal(fault.text + NODE_FAULT_TEXT_MAX - 3, "x12");
 }
-
-TEST_MAIN(cmocka_unit_test(fault_texts))

@@ -1,6 +1,5 @@
 /* A holder by itself: what it sends, and to whom, where its links have room for
  * so many messages and no more. */
-#include <string.h>
 
 #include "node/page_check.h"
 #include "node/roles/holder.h"
@@ -199,7 +198,3 @@ TEST(wrong_pages) {
     expect(0, 0, NODE_PAGE, 4);
     assert_int_equal(role->held(world.arena), 0);
 }
-
-TEST_MAIN(cmocka_unit_test(two_sources),
-          cmocka_unit_test(no_room_for_a_request),
-          cmocka_unit_test(wrong_pages))

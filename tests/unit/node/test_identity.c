@@ -1,7 +1,5 @@
 /* Who a node is, where its board is not told: an epoch of random bytes or of a
  * counter, a number from a neighbour's greeting. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/sim/sim_cube.h"
 #include "node/identity.h"
@@ -136,6 +134,3 @@ TEST(an_epoch_follows_what_neighbours_knew) {
     assert_true(node_identity_epoch_behind(&learner, &id));
     assert_int_equal(id.epoch, 1);
 }
-
-TEST_MAIN(cmocka_unit_test(epochs), cmocka_unit_test(a_neighbour_says_it),
-          cmocka_unit_test(an_epoch_follows_what_neighbours_knew))

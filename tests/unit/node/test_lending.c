@@ -1,6 +1,5 @@
 /* Pages among the nodes of an exchange, by themselves: whom a page is asked of,
  * what is lent, waited for or left to the host, and what comes to all. */
-#include <string.h>
 
 #include "node/roles/requests.h"
 #include "tests/unit/test.h"
@@ -455,9 +454,3 @@ TEST(to_all) {
     node_lending_to_all(&world.lending, 44); /* past the end */
     assert_true(node_fault_is_set(&world.fault));
 }
-
-TEST_MAIN(cmocka_unit_test(keepers), cmocka_unit_test(lent),
-          cmocka_unit_test(not_there_yet), cmocka_unit_test(given_up),
-          cmocka_unit_test(wrong_requests), cmocka_unit_test(asked_for),
-          cmocka_unit_test(to_all), cmocka_unit_test(altered),
-          cmocka_unit_test(not_its_to_send), cmocka_unit_test(to_all_altered))

@@ -1,7 +1,6 @@
 /* A face manager and a tetrahedron builder by themselves: what they send, and
  * to whom, where links have room for so many messages and no more; and what
  * they refuse. */
-#include <string.h>
 
 #include "node/page_check.h"
 #include "node/roles/builder.h"
@@ -272,9 +271,3 @@ TEST(messages_of_others) {
     say(CUBE_HOST, NODE_UNSPILL, &page, size);
     expect_fault("message of type 5 for a builder");
 }
-
-TEST_MAIN(cmocka_unit_test(lists_go_round),
-          cmocka_unit_test(answers_that_are_not_due),
-          cmocka_unit_test(lists_that_are_too_many), cmocka_unit_test(maps),
-          cmocka_unit_test(invalid_setups),
-          cmocka_unit_test(messages_of_others))

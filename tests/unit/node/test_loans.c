@@ -1,6 +1,5 @@
 /* Loans among nodes: who asks whom, what goes where on links that have room for
  * so many messages, and what is refused. */
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "node/roles/lending.h"
@@ -133,7 +132,7 @@ static const struct sent *last_of(const struct one *n) {
 /* --- tests ---------------------------------------------------------------- */
 
 /* Neighbours first, each node once, as the links take it. */
-TEST(asks) {
+TEST_WITH(asks, open_nodes, close_nodes) {
     static const uint16_t order[] = {0, 3, 5, 2, 4, 7, 6};
     struct one *h = &one[HELPER];
     h->cube.room = 0;
@@ -151,7 +150,7 @@ TEST(asks) {
 }
 
 /* Who has work of its own asks nobody, and lends to nobody unasked. */
-TEST(works_by_itself) {
+TEST_WITH(works_by_itself, open_nodes, close_nodes) {
     struct one *l = &one[LENDER];
     for (unsigned i = 0; i < 300; i++) {
         assert_false(solo_step(&all.node[0].solo, 1));
@@ -161,7 +160,7 @@ TEST(works_by_itself) {
 }
 
 /* There and back, again and again, until nothing is left. */
-TEST(there_and_back) {
+TEST_WITH(there_and_back, open_nodes, close_nodes) {
     struct one *l = &one[LENDER], *h = &one[HELPER];
     unsigned loans = 0;
     send_all(h);
@@ -201,7 +200,7 @@ TEST(there_and_back) {
 
 /* A loan for which there is no place goes back as it was, and may be asked for
  * again. */
-TEST(no_place) {
+TEST_WITH(no_place, open_nodes, close_nodes) {
     struct one *l = &one[LENDER], *h = &one[HELPER];
     send_all(h);
     say(l, HELPER, NODE_LOAN_ASK, NULL, 0);
@@ -229,7 +228,7 @@ TEST(no_place) {
 }
 
 /* So many loans are out at most, each with another node. */
-TEST(so_many) {
+TEST_WITH(so_many, open_nodes, close_nodes) {
     struct one *l = &one[LENDER];
     uint32_t seen = 0;
     for (unsigned i = 1; i < NODES; i++)
@@ -252,7 +251,7 @@ static void expect_fault(uint16_t source, uint8_t type, const void *data,
     h->fault.size = 0;
 }
 
-TEST(refusals) {
+TEST_WITH(refusals, open_nodes, close_nodes) {
     const struct incode_loan loan = {0, 4, 1, {{70, 80, 90}}};
     struct incode_loan false_count = loan, no_run = loan;
     const struct node_found_message found = {0, {1, {{1, 2, 3, 4}}}};
@@ -272,12 +271,3 @@ TEST(refusals) {
     assert_false(node_fault_is_set(&h->fault));
     expect_fault(0, NODE_LOAN, &loan, incode_loan_bytes(&loan));
 }
-
-TEST_MAIN(cmocka_unit_test_setup_teardown(asks, open_nodes, close_nodes),
-          cmocka_unit_test_setup_teardown(works_by_itself, open_nodes,
-                                          close_nodes),
-          cmocka_unit_test_setup_teardown(there_and_back, open_nodes,
-                                          close_nodes),
-          cmocka_unit_test_setup_teardown(no_place, open_nodes, close_nodes),
-          cmocka_unit_test_setup_teardown(so_many, open_nodes, close_nodes),
-          cmocka_unit_test_setup_teardown(refusals, open_nodes, close_nodes))

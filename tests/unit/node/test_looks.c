@@ -1,7 +1,5 @@
 /* How often a node looks at its links while it works, on fast processors and
  * slow ones; what it tells of that and of its board. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/sim/sim_cube.h"
 #include "node/looks.h"
@@ -194,10 +192,3 @@ TEST(what_is_told_of_it) {
     assert_int_equal(finished.overruns, 3);
     tear_down();
 }
-
-TEST_MAIN(cmocka_unit_test(looks_come_in_time),
-          cmocka_unit_test(work_that_gets_slower_is_seen),
-          cmocka_unit_test(work_that_differs_is_seen_in_time),
-          cmocka_unit_test(many_messages_are_looked_between),
-          cmocka_unit_test(who_steps_in_parts_is_not_tended),
-          cmocka_unit_test(what_is_told_of_it))

@@ -1,5 +1,4 @@
 /* Messages have one layout on every processor, and fit what carries them. */
-#include <string.h>
 
 #include "node/message.h"
 #include "node/result.h"
@@ -58,5 +57,3 @@ TEST(test_outbox) {
     assert_int_equal(box.used_max, 3);
     assert_int_equal(written - read, box.used);
 }
-
-TEST_MAIN(cmocka_unit_test(test_layouts), cmocka_unit_test(test_outbox))

@@ -2,9 +2,6 @@
  * at random, and a plain host beside it.  Whatever the
  * nodes, roles, windows and memories, the tetrahedra are the same, each brick
  * is committed once, and no node ever has more pages under way than agreed. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
@@ -359,5 +356,3 @@ TEST(test_small) {
     assert_null(node_start(&board, &why));
     assert_non_null(strstr(why, "memory"));
 }
-
-TEST_MAIN(cmocka_unit_test(test_cubes), cmocka_unit_test(test_small))

@@ -1,5 +1,4 @@
 /* Results that wait for more. */
-#include <string.h>
 
 #include "node/setup.h"
 #include "node/roles/outlet.h"
@@ -74,7 +73,3 @@ TEST(test_finders_fit) {
     }
     assert_false(node_fault_is_set(outlet.fault));
 }
-
-TEST_MAIN(cmocka_unit_test(test_few_wait), cmocka_unit_test(test_last_does_not),
-          cmocka_unit_test(test_spilled_do_not),
-          cmocka_unit_test(test_finders_fit))

@@ -2,8 +2,6 @@
  * which a unit of work takes long: the clock ticks with what the triangulator
  * has looked at and built.  Point by point, where nothing tells what was done,
  * it ticks with the basic blocks that incode/ has executed. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "host/mesh/order.h"
@@ -221,8 +219,3 @@ TEST(looks_in_vain_teach_nothing) {
     }
     assert_int_equal(slow.most, NODE_PACE_UNITS_MIN);
 }
-
-TEST_MAIN(cmocka_unit_test(no_index_works_for_long),
-          cmocka_unit_test(a_quick_processor_looks_seldom),
-          cmocka_unit_test(points_are_inserted_a_few_at_a_time),
-          cmocka_unit_test(looks_in_vain_teach_nothing))

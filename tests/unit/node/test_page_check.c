@@ -1,6 +1,5 @@
 /* A page's tag: the checksum is HalfSipHash, nothing of a page may change
  * without it, and a page that is not as it was made is reported. */
-#include <string.h>
 
 #include "node/page_check.h"
 #include "tests/unit/test.h"
@@ -171,7 +170,3 @@ TEST(test_reports) {
     assert_false(comes(CUBE_HOST, &page, 11));
     assert_true(node_fault_is_set(&world.fault));
 }
-
-TEST_MAIN(cmocka_unit_test(test_vectors), cmocka_unit_test(test_right),
-          cmocka_unit_test(test_example), cmocka_unit_test(test_altered),
-          cmocka_unit_test(test_reports))

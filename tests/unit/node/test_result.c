@@ -1,7 +1,5 @@
 /* Batches of tetrahedra: what is written is read, whatever the numbers; and
  * no bytes at all make the reader leave its buffer or invent vertices. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "node/result.h"
 #include "tests/unit/test.h"
@@ -222,6 +220,3 @@ TEST(test_finders) {
     assert_int_equal(node_result_finder(&writer, 9), 0);
     assert_int_equal(writer.size, 0);
 }
-
-TEST_MAIN(cmocka_unit_test(test_round_trip), cmocka_unit_test(test_garbage),
-          cmocka_unit_test(test_finders), cmocka_unit_test(test_truncated))

@@ -179,7 +179,7 @@ static void refuses(uint8_t type, const void *data, size_t size,
 
 /* --- roles ---------------------------------------------------------------- */
 
-TEST(a_role_of_its_own) {
+TEST_WITH(a_role_of_its_own, set_up, tear_down) {
     struct node_job_message job = {.epoch = 5};
     struct node_setup_message setup = setup_of(ECHO_ROLE);
     struct node_finished_message finished;
@@ -214,7 +214,7 @@ TEST(a_role_of_its_own) {
 }
 
 /* The tables of a role and what they count fit what is there. */
-TEST(roles_map_their_arena) {
+TEST_WITH(roles_map_their_arena, set_up, tear_down) {
     static const uint8_t numbers[] = {NODE_WORKER, NODE_HOLDER};
     for (size_t i = 0; i < sizeof numbers; i++) {
         struct node_ready_message ready = begin(numbers[i]);
@@ -236,7 +236,7 @@ TEST(roles_map_their_arena) {
 
 /* Another setup makes another role of it; what the one before did stays
  * counted, and what it had is gone. */
-TEST(a_second_setup) {
+TEST_WITH(a_second_setup, set_up, tear_down) {
     (void)begin(ECHO_ROLE);
     say(ECHO_ASKS, "once", 4);
     assert_string_equal(hear(ECHO_ANSWERS), "once");
@@ -275,7 +275,7 @@ static struct node_pong_message pong_of(void) {
     return pong;
 }
 
-TEST(pongs_tell_of_work) {
+TEST_WITH(pongs_tell_of_work, set_up, tear_down) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
     struct node_pong_message none = pong_of();
     assert_int_equal(none.awaited, INCODE_NONE);
@@ -297,7 +297,7 @@ TEST(pongs_tell_of_work) {
 
 /* --- faults --------------------------------------------------------------- */
 
-TEST(an_unknown_role) {
+TEST_WITH(an_unknown_role, set_up, tear_down) {
     struct node_setup_message setup = setup_of(7);
     struct node_ping_message ping = {2};
     struct node_pong_message pong;
@@ -319,7 +319,7 @@ TEST(an_unknown_role) {
     refuses(NODE_SETUP, &setup, sizeof setup, "nothing to echo");
 }
 
-TEST(setups_of_other_versions) {
+TEST_WITH(setups_of_other_versions, set_up, tear_down) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
     struct {
         struct node_setup_message setup;
@@ -337,7 +337,7 @@ TEST(setups_of_other_versions) {
     refuses(NODE_SETUP, &later, 244, "setup in 244 bytes, expected 240");
 }
 
-TEST(invalid_setups) {
+TEST_WITH(invalid_setups, set_up, tear_down) {
     struct node_setup_message setup = setup_of(NODE_WORKER);
     setup.nodes = 8;
     refuses(NODE_SETUP, &setup, sizeof setup,
@@ -373,7 +373,7 @@ TEST(invalid_setups) {
             "message of type 7 in 3 bytes, expected none");
 }
 
-TEST(what_a_worker_refuses) {
+TEST_WITH(what_a_worker_refuses, set_up, tear_down) {
     struct node_job_message job = {.epoch = 1, .job = {.first = 5, .last = 3}};
     struct node_page_message page = {.head.page = 17};
     size_t whole = node_page_seal(&page, 0, INCODE_PAGE_BYTES);
@@ -444,7 +444,7 @@ static void takes_no_page(const void *data, size_t bytes) {
     refuses(NODE_PAGE, &page, node_page_seal(&page, 0, bytes), text);
 }
 
-TEST(pages_that_a_worker_refuses) {
+TEST_WITH(pages_that_a_worker_refuses, set_up, tear_down) {
     double points[3][INCODE_BRICK_POINTS + 1] = {{0}};
     double *last = &points[2][INCODE_BRICK_POINTS - 3];
     takes_no_page(points, 0);
@@ -458,7 +458,7 @@ TEST(pages_that_a_worker_refuses) {
     takes_no_page(points, INCODE_BRICK_BYTES);
 }
 
-TEST(what_a_holder_refuses) {
+TEST_WITH(what_a_holder_refuses, set_up, tear_down) {
     struct node_job_message job = {.epoch = 1};
     uint32_t pages[NODE_PAGES_IN_FLIGHT_MAX + 1];
     struct node_page_message page = {.head.page = 17};
@@ -493,7 +493,7 @@ TEST(what_a_holder_refuses) {
 }
 
 /* Nothing moves when a role finds it, and the board would sleep. */
-TEST(a_fault_is_told_at_once) {
+TEST_WITH(a_fault_is_told_at_once, set_up, tear_down) {
     struct node_job_message job = {.epoch = ECHO_FAILS};
     echo_is_worn = false;
     (void)begin(ECHO_ROLE);
@@ -510,7 +510,7 @@ TEST(a_fault_is_told_at_once) {
 }
 
 /* Where a node cannot start, its board learns which limit is broken. */
-TEST(boards_that_are_refused) {
+TEST_WITH(boards_that_are_refused, set_up, tear_down) {
     struct node_board board = world.board[SELF];
     const char *why = NULL;
     board.identity.dimension = CUBE_DIMENSION_MAX + 1;
@@ -524,13 +524,3 @@ TEST(boards_that_are_refused) {
     assert_null(node_start(&board, &why));
     assert_string_equal(why, "a node's memory is below 4 GiB");
 }
-
-#define ON_A_CUBE(test) cmocka_unit_test_setup_teardown(test, set_up, tear_down)
-
-TEST_MAIN(ON_A_CUBE(a_role_of_its_own), ON_A_CUBE(roles_map_their_arena),
-          ON_A_CUBE(a_second_setup), ON_A_CUBE(pongs_tell_of_work),
-          ON_A_CUBE(an_unknown_role), ON_A_CUBE(setups_of_other_versions),
-          ON_A_CUBE(invalid_setups), ON_A_CUBE(what_a_worker_refuses),
-          ON_A_CUBE(pages_that_a_worker_refuses),
-          ON_A_CUBE(what_a_holder_refuses), ON_A_CUBE(a_fault_is_told_at_once),
-          ON_A_CUBE(boards_that_are_refused))

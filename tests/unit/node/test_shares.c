@@ -1,8 +1,6 @@
 /* Tetrahedra on their way from node to node: what room is told for them is
  * there, however they fall on the other nodes, and is enough for a whole star
  * where these are few. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "incode/pages/bricks.h"
 #include "node/roles/lending.h"
@@ -102,5 +100,3 @@ TEST(test_enough) {
     assert_true(room_of(&s) >= 256);
     free(s.memory);
 }
-
-TEST_MAIN(cmocka_unit_test(test_honest), cmocka_unit_test(test_enough))

@@ -29,5 +29,3 @@ TEST(random_talks) {
         talk_run(bytes, sizeof bytes);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(random_talks))

@@ -1,8 +1,6 @@
 /* Two nodes and their host, with mailboxes in the place of links: a page that
  * the other node altered is not used, is reported and asked for again, and the
  * result is right; and of each tetrahedron the host learns who found it. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "host/mesh/tetrahedra.h"
@@ -502,14 +500,4 @@ TEST(found_by_a_borrower) {
     expect_right();
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pages_of_a_holder),
-        cmocka_unit_test(pages_of_the_host),
-        cmocka_unit_test(pages_that_are_lent),
-        cmocka_unit_test(pages_to_all),
-        cmocka_unit_test(found_by_a_builder),
-        cmocka_unit_test(found_by_a_borrower),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

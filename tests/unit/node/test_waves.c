@@ -1,6 +1,5 @@
 /* The waves of an exchange at a node that has no others: what it concludes from
  * sums that change, that agree, and that never do. */
-#include <string.h>
 
 #include "node/roles/waves.h"
 #include "tests/unit/test.h"
@@ -75,6 +74,3 @@ TEST(sums_that_never_agree) {
                 2 * NODE_WAVES_UNCHANGED_US / NODE_WAVES_UNCHANGED);
     assert_non_null(strstr(world.fault.text, "of 12 sent to others 9 have"));
 }
-
-TEST_MAIN(cmocka_unit_test(sums_that_agree), cmocka_unit_test(slow_messages),
-          cmocka_unit_test(sums_that_never_agree))

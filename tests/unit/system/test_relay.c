@@ -1,9 +1,7 @@
 /* The relay that the system tests put between UARTs: its rate, what it counts,
  * and what becomes of an end that does not read or goes away. */
+#define TEST_OWN_MAIN
 #include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -296,18 +294,5 @@ TEST(wrong_texts) {
 
 int main(void) {
     fill();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rates),
-        cmocka_unit_test(rate_by_the_clock),
-        cmocka_unit_test(bytes_take_their_time),
-        cmocka_unit_test(flips),
-        cmocka_unit_test(drops),
-        cmocka_unit_test(bursts),
-        cmocka_unit_test(the_same_seed_does_the_same),
-        cmocka_unit_test(a_receiver_is_waited_for),
-        cmocka_unit_test(a_receiver_overruns),
-        cmocka_unit_test(an_end_goes_and_comes),
-        cmocka_unit_test(wrong_texts),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run();
 }

@@ -131,10 +131,3 @@ TEST(a_link_that_is_down) {
     assert_int_equal(link_statistics(p->ends[0].link)->sessions, 1);
     free_pair(p);
 }
-
-TEST_MAIN(cmocka_unit_test(a_link_that_opens),
-          cmocka_unit_test(a_link_that_is_up),
-          cmocka_unit_test(a_link_that_refuses),
-          cmocka_unit_test(a_link_that_is_closed),
-          cmocka_unit_test(a_link_that_closes),
-          cmocka_unit_test(a_link_that_is_down))

@@ -412,20 +412,3 @@ TEST(all_say_farewell) {
             assert_true(cube_link_state(m->places[i].cube, d) == LINK_CLOSED);
     destroy(m);
 }
-
-TEST_MAIN(cmocka_unit_test(every_pair_at_once_with_windows_of_one),
-          cmocka_unit_test(every_pair_at_once_with_wider_windows),
-          cmocka_unit_test(every_pair_at_once_in_small_frames),
-          cmocka_unit_test(every_pair_at_once_on_bad_wires),
-          cmocka_unit_test(broadcasts_from_everywhere),
-          cmocka_unit_test(a_host_with_many_wires),
-          cmocka_unit_test(a_host_wired_to_all_needs_nobody_between),
-          cmocka_unit_test(places_that_stall),
-          cmocka_unit_test(a_host_that_is_slow),
-          cmocka_unit_test(an_unread_message_holds_its_own_link_alone),
-          cmocka_unit_test(a_flood_does_not_starve_the_node_it_passes),
-          cmocka_unit_test(small_messages_leave_room_for_a_large_one),
-          cmocka_unit_test(a_wrong_wire_is_named),
-          cmocka_unit_test(wrong_wires_in_words),
-          cmocka_unit_test(limits_of_a_config),
-          cmocka_unit_test(all_say_farewell))

@@ -215,11 +215,3 @@ TEST(nodes_start_late) {
         destroy(m);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(all_pairs_after_each_single_dead_link),
-          cmocka_unit_test(links_that_die_one_after_another),
-          cmocka_unit_test(a_link_that_falls_silent),
-          cmocka_unit_test(a_node_that_dies),
-          cmocka_unit_test(the_gateway_is_moved),
-          cmocka_unit_test(who_sleeps_does_not_call_others_dead),
-          cmocka_unit_test(many_dead_links), cmocka_unit_test(nodes_start_late))

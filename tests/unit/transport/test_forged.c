@@ -160,7 +160,3 @@ TEST(nor_off_the_e_cube_path) {
         destroy(m);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(no_node_speaks_as_another_end),
-          cmocka_unit_test(nor_where_the_host_has_many_wires),
-          cmocka_unit_test(nor_off_the_e_cube_path))

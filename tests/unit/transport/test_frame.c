@@ -1,8 +1,6 @@
 /* Frames: the checks against their published values, COBS at its edges, and
  * no bytes at all that make the reader believe what was not sent. */
 #include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "transport/frame.h"
 #include "tests/unit/test.h"
@@ -328,13 +326,3 @@ TEST(garbage_is_no_frame) {
     /* The header's check lets one in 65,536 pass. */
     assert_true(opened < 30);
 }
-
-TEST_MAIN(cmocka_unit_test(checks_have_their_published_values),
-          cmocka_unit_test(checks_follow_their_definition),
-          cmocka_unit_test(zeros_are_found),
-          cmocka_unit_test(every_size_and_density_of_zeros),
-          cmocka_unit_test(runs_of_253_to_256),
-          cmocka_unit_test(both_ends_of_a_full_run),
-          cmocka_unit_test(each_wrong_bit_is_found),
-          cmocka_unit_test(lost_and_inserted_bytes_are_found),
-          cmocka_unit_test(garbage_is_no_frame))

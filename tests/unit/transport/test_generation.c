@@ -216,12 +216,3 @@ TEST(a_message_being_read_outlives_its_generation) {
     run(m, 5, 1000000000);
     destroy(m);
 }
-
-TEST_MAIN(cmocka_unit_test(nothing_of_an_old_generation_is_read),
-          cmocka_unit_test(datagrams_that_are_lost_are_told_again),
-          cmocka_unit_test(nothing_of_the_new_generation_is_lost),
-          cmocka_unit_test(all_is_quiet_when_all_agree),
-          cmocka_unit_test(a_node_that_restarts_is_told),
-          cmocka_unit_test(a_host_that_restarts_is_in_charge),
-          cmocka_unit_test(an_unread_message_outlives_no_leap),
-          cmocka_unit_test(a_message_being_read_outlives_its_generation))

@@ -482,14 +482,3 @@ TEST(strangers_are_not_believed) {
     assert_int_equal(learner.misplaced_expected, SOCKETS);
     destroy(m);
 }
-
-TEST_MAIN(cmocka_unit_test(a_cube_learns_from_its_host),
-          cmocka_unit_test(a_wire_in_another_socket_teaches_nothing),
-          cmocka_unit_test(a_greeting_to_another_is_passed_over),
-          cmocka_unit_test(noise_teaches_nothing),
-          cmocka_unit_test(boards_of_four_sockets_learn),
-          cmocka_unit_test(a_node_that_was_reset_asks),
-          cmocka_unit_test(the_largest_epoch_counts),
-          cmocka_unit_test(questions_are_few_and_whole),
-          cmocka_unit_test(questions_do_no_harm),
-          cmocka_unit_test(strangers_are_not_believed))

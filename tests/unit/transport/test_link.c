@@ -268,14 +268,3 @@ TEST(limits_of_a_config) {
     limit(c, timeout_min_us, 1000000, 1000001);
     limit(c, timeout_max_us, 100000, 99999);
 }
-
-TEST_MAIN(cmocka_unit_test(messages_of_every_size),
-          cmocka_unit_test(messages_of_many_frames),
-          cmocka_unit_test(sequence_numbers_wrap),
-          cmocka_unit_test(a_reader_that_does_not_read_holds_the_writer),
-          cmocka_unit_test(lost_credits_are_asked_for),
-          cmocka_unit_test(every_kind_of_damage),
-          cmocka_unit_test(garbage_between_frames),
-          cmocka_unit_test(sleeping_until_due_is_enough),
-          cmocka_unit_test(throughput_on_serial_wires),
-          cmocka_unit_test(limits_of_a_config))

@@ -2,9 +2,6 @@
  * cuts, one-way failures, pauses, readers that do not read, and restarts of
  * either end.  Within a session nothing is missing, nothing comes twice; once
  * the faults stop, messages flow again. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "transport/drivers/sim.h"
 #include "tests/unit/test.h"
@@ -236,5 +233,3 @@ TEST(everything_at_once_then_quiet) {
     for (unsigned k = 0; k < KINDS; k++)
         assert_true(struck[k] > 1000);
 }
-
-TEST_MAIN(cmocka_unit_test(everything_at_once_then_quiet))

@@ -1,8 +1,6 @@
 /* Routes of cubes of which links and nodes are dead, without any link: every
  * node that can be reached is, over live links, by paths that go up a tree and
  * then down; what is sent to all comes to each once. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "transport/routes.h"
 #include "tests/unit/test.h"
@@ -229,8 +227,3 @@ TEST(the_table_holds_the_worst) {
     }
     assert_true(routes_bytes(CUBE_DIMENSION_MAX) <= 2048);
 }
-
-TEST_MAIN(cmocka_unit_test(while_nothing_is_dead_e_cube),
-          cmocka_unit_test(each_single_dead_link_and_node),
-          cmocka_unit_test(random_sets_of_dead_links_and_nodes),
-          cmocka_unit_test(the_table_holds_the_worst))

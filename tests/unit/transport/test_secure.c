@@ -307,12 +307,3 @@ TEST(damage_costs_what_it_touches) {
         free(w);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(what_is_said_arrives),
-          cmocka_unit_test(all_that_fits_is_taken),
-          cmocka_unit_test(a_changed_byte_loses_a_record),
-          cmocka_unit_test(a_record_cut_short_holds_up_none),
-          cmocka_unit_test(a_repeated_record_is_not_heard),
-          cmocka_unit_test(noise_is_passed_over),
-          cmocka_unit_test(noise_without_end_ends_it),
-          cmocka_unit_test(damage_costs_what_it_touches))

@@ -101,8 +101,3 @@ TEST(the_vector) {
     expect_bytes(seed.secret, "83e422ca8fb59ec7a3cabad6555ba885"
                               "bf6357611d7cc7e8a16a6f8ca5b45702");
 }
-
-TEST_MAIN(cmocka_unit_test(no_seed_comes_twice),
-          cmocka_unit_test(every_byte_of_the_source_counts),
-          cmocka_unit_test(random_bytes_count_and_may_fail),
-          cmocka_unit_test(the_vector))

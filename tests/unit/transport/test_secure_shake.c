@@ -207,11 +207,3 @@ TEST(the_vector) {
                                     "6850b6b08c283255c750f88866bcced9");
     free(w);
 }
-
-TEST_MAIN(cmocka_unit_test(another_key_is_refused),
-          cmocka_unit_test(what_is_no_greeting_is_told),
-          cmocka_unit_test(a_wire_that_leads_elsewhere_is_told),
-          cmocka_unit_test(a_point_without_a_secret_is_refused),
-          cmocka_unit_test(keys_need_the_key_and_the_exchange),
-          cmocka_unit_test(a_changed_opening_is_refused),
-          cmocka_unit_test(the_vector))

@@ -198,8 +198,3 @@ TEST(a_shake_that_ends_leaves_none) {
         free(world);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(a_wipe_stays),
-          cmocka_unit_test(no_turn_leaves_a_secret),
-          cmocka_unit_test(a_connection_that_ends_leaves_no_keys),
-          cmocka_unit_test(a_shake_that_ends_leaves_none))

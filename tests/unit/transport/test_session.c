@@ -469,17 +469,3 @@ TEST(test_vectors) {
     assert_memory_equal(s.said, bye_1, sizeof bye_1);
     free(memory);
 }
-
-TEST_MAIN(cmocka_unit_test(what_is_unsent_is_forgotten),
-          cmocka_unit_test(test_vectors),
-          cmocka_unit_test(a_cut_wire_goes_on_where_it_was),
-          cmocka_unit_test(a_peer_that_stops_for_long_is_called_silent),
-          cmocka_unit_test(a_restarted_peer_is_noticed),
-          cmocka_unit_test(an_end_may_keep_to_its_peer),
-          cmocka_unit_test(who_is_sent_away_waits_for_the_other),
-          cmocka_unit_test(a_wrong_wire_is_named),
-          cmocka_unit_test(sizes_that_do_not_fit_are_refused),
-          cmocka_unit_test(a_wire_to_itself_is_refused),
-          cmocka_unit_test(farewell),
-          cmocka_unit_test(farewells_that_cross_are_answered),
-          cmocka_unit_test(farewell_to_the_dead_ends_in_time))

@@ -61,5 +61,3 @@ TEST(slow_wires_carry) {
         assert_true(noisy > 0.75);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(slow_wires_carry))

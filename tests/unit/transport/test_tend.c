@@ -168,7 +168,3 @@ TEST(a_farewell_waits) {
     assert_int_equal(cube_room(one, 1), 0);
     destroy(m);
 }
-
-TEST_MAIN(cmocka_unit_test(messages_being_read_stay),
-          cmocka_unit_test(work_stays_in_its_generation),
-          cmocka_unit_test(a_farewell_waits))

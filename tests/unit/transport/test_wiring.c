@@ -1,6 +1,5 @@
 /* The wiring of a cube: whatever the order in which ends hear of things, all
  * come to the same; its bytes are those of PROTOCOL.md. */
-#include <string.h>
 
 #include "transport/routes.h"
 #include "tests/unit/test.h"
@@ -205,11 +204,3 @@ TEST(its_bytes) {
     bytes[8] = 8; /* no such gateway */
     assert_false(wiring_unpack(&again, bytes, sizeof vector, 3));
 }
-
-TEST_MAIN(cmocka_unit_test(all_come_to_the_same),
-          cmocka_unit_test(what_is_newer_wins_entirely),
-          cmocka_unit_test(generations_go_round),
-          cmocka_unit_test(a_stamp_stands_for_generation_and_host),
-          cmocka_unit_test(a_node_whose_links_are_dead_is_one_entry),
-          cmocka_unit_test(a_gateway_lives_while_its_hosts_wire_does),
-          cmocka_unit_test(its_bytes))

@@ -1,9 +1,6 @@
 /* How much memory is left, by control groups of both versions and by limits. */
 
 #include "tests/unit/test.h"
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -100,11 +97,4 @@ TEST(a_limit) {
     expect_room(available);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_group_of_the_second_version),
-        cmocka_unit_test(a_group_of_the_first_version),
-        cmocka_unit_test(a_limit),
-    };
-    return cmocka_run_group_tests(tests, enter, leave);
-}
+TEST_GROUP(enter, leave)

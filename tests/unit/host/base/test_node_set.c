@@ -1,5 +1,4 @@
 /* Sets of nodes as a person writes them, and as they are told. */
-#include <string.h>
 
 #include "host/base/node_set.h"
 #include "tests/unit/test.h"
@@ -98,6 +97,3 @@ TEST(test_named) {
     host_node_set_name(&set, text, sizeof text);
     assert_string_equal(text, "nodes 3-4");
 }
-
-TEST_MAIN(cmocka_unit_test(test_written), cmocka_unit_test(test_refused),
-          cmocka_unit_test(test_cut), cmocka_unit_test(test_named))

@@ -1,6 +1,4 @@
 /* The arguments of a command: what is wrong with them, and what was meant. */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/base/options.h"
 #include "tests/unit/test.h"
@@ -171,7 +169,3 @@ TEST(test_help) {
     assert_int_not_equal(parse(words, &seen, &error), 0);
     assert_int_equal(error.code, 0);
 }
-
-TEST_MAIN(cmocka_unit_test(test_taken), cmocka_unit_test(test_optional),
-          cmocka_unit_test(test_refused), cmocka_unit_test(test_numbers),
-          cmocka_unit_test(test_the_one_argument), cmocka_unit_test(test_help))

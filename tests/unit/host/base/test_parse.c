@@ -1,5 +1,4 @@
 /* Numbers and sizes as a user may write them, and as not. */
-#include <string.h>
 
 #include "host/base/text.h"
 #include "tests/unit/test.h"
@@ -122,6 +121,3 @@ TEST(test_nodes) {
         assert_int_equal(nodes, 64);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(test_bytes), cmocka_unit_test(test_numbers),
-          cmocka_unit_test(test_exponents), cmocka_unit_test(test_nodes))

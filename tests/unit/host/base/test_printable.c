@@ -1,7 +1,4 @@
 /* Words from elsewhere, for a terminal and for a shell. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/base/error.h"
 #include "host/base/text.h"
@@ -178,8 +175,3 @@ TEST(test_said) {
     fclose(stream);
     assert_string_equal(line, "a\\x0a\\x1b is here\nb\\x0a");
 }
-
-TEST_MAIN(cmocka_unit_test(test_printable), cmocka_unit_test(test_bounds),
-          cmocka_unit_test(test_quoted_where_needed),
-          cmocka_unit_test(test_what_a_shell_reads),
-          cmocka_unit_test(test_nearest), cmocka_unit_test(test_said))

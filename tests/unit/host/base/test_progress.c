@@ -1,14 +1,11 @@
 /* The line of progress on terminals of several widths: it stays one line, goes
  * away at the end, and what is noted meanwhile stands by itself. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <fcntl.h>
 #include <poll.h>
 #include <pty.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -285,8 +282,3 @@ TEST(test_lines) {
     assert_string_equal(strchr(said, '\n'), "\n"); /* and no more */
     (void)close(ends[0]);
 }
-
-TEST_MAIN(cmocka_unit_test(test_fits), cmocka_unit_test(test_follows_the_width),
-          cmocka_unit_test(test_counts), cmocka_unit_test(test_notes),
-          cmocka_unit_test(test_rows), cmocka_unit_test(test_quiet),
-          cmocka_unit_test(test_lines))

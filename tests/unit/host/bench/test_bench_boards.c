@@ -1,7 +1,4 @@
 /* Where a board's instructions go, of a map and counts that are known. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "host/bench/bench_boards.h"
@@ -80,8 +77,4 @@ TEST(test_no_map) {
     assert_non_null(strstr(error.text, "make firmware"));
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_counts),
-                                       cmocka_unit_test(test_no_map)};
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_GROUP(make_folder, remove_folder)

@@ -1,7 +1,6 @@
 /* The cost model on cases that can be done by hand: prices, messages, t_IO, the
  * fit of prices to runs, and wires that are one medium. */
 #include <math.h>
-#include <string.h>
 
 #include "host/bench/paper.h"
 #include "host/bench/model.h"
@@ -132,7 +131,3 @@ TEST(test_figures) {
         host_paper_row_of(host_paper_find("6", "Uniform", 8000, ""), 7));
     assert_null(host_paper_find("2", "Bubbles", 20000, ""));
 }
-
-TEST_MAIN(cmocka_unit_test(test_node), cmocka_unit_test(test_io),
-          cmocka_unit_test(test_fit), cmocka_unit_test(test_medium),
-          cmocka_unit_test(test_figures))

@@ -1,6 +1,5 @@
 /* Runs in virtual time: that a node is charged what it has counted and no more,
  * that the same run takes the same time, and that more nodes take less. */
-#include <stdlib.h>
 
 #include "host/bench/bench_links.h"
 #include "host/mesh/gen.h"
@@ -104,6 +103,3 @@ TEST(test_slow_node) {
     assert_true(run.result.tetrahedra_late < run.result.tetrahedra / 10);
     assert_true(run.result.t_max_s < 1.7 * even);
 }
-
-TEST_MAIN(cmocka_unit_test(test_charge), cmocka_unit_test(test_again),
-          cmocka_unit_test(test_more_nodes), cmocka_unit_test(test_slow_node))

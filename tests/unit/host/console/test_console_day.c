@@ -63,5 +63,3 @@ TEST(a_day_passes) {
     assert_true(desk.world.now_us >= hours * HOUR_US);
     end();
 }
-
-TEST_MAIN(cmocka_unit_test(a_day_passes))

@@ -301,19 +301,3 @@ TEST(bytes_that_are_no_frame_are_shown) {
     assert_string_equal(text, "Hi\\r\\n\\x1b\\x5c");
     end();
 }
-
-TEST_MAIN(cmocka_unit_test(what_is_no_command_is_told),
-          cmocka_unit_test(a_line_may_have_too_many_words),
-          cmocka_unit_test(help_has_every_command),
-          cmocka_unit_test(words_are_completed),
-          cmocka_unit_test(equal_rows_are_folded),
-          cmocka_unit_test(figures_are_short),
-          cmocka_unit_test(nodes_are_asked),
-          cmocka_unit_test(answers_are_objects),
-          cmocka_unit_test(what_is_dead_is_marked),
-          cmocka_unit_test(who_is_gone_is_named),
-          cmocka_unit_test(nodes_that_begin_anew_are_noted),
-          cmocka_unit_test(nodes_are_reset),
-          cmocka_unit_test(a_person_may_interrupt),
-          cmocka_unit_test(top_goes_on_until_it_is_enough),
-          cmocka_unit_test(bytes_that_are_no_frame_are_shown))

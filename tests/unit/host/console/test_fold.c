@@ -1,7 +1,5 @@
 /* Answers that are equal share a row, also where a time in them differs a bit.
  */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/console/fold.h"
 #include "tests/unit/test.h"
@@ -50,7 +48,3 @@ TEST(a_row_without_a_time_is_another) {
     assert_int_equal(fold.count, 2);
     host_fold_free(&fold);
 }
-
-TEST_MAIN(cmocka_unit_test(times_that_are_near_share_a_row),
-          cmocka_unit_test(times_that_are_not_do_not),
-          cmocka_unit_test(a_row_without_a_time_is_another))

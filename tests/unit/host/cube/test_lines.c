@@ -1,10 +1,8 @@
 /* Resets by lines of chips that are played here: what is set when, and that
  * nothing stays active, whatever happens meanwhile. */
+#define TEST_OWN_MAIN
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -117,7 +115,7 @@ static void nothing_is_active(void) {
 
 /* --- resets --------------------------------------------------------------- */
 
-TEST(a_reset) {
+TEST_WITH(a_reset, set_up, tear_down) {
     assert_true(host_lines_has(&file, 0, HOST_LINE_BOOT));
     assert_false(host_lines_has(&file, 1, HOST_LINE_BOOT));
     open_lines();
@@ -127,7 +125,7 @@ TEST(a_reset) {
     host_lines_close(&lines);
 }
 
-TEST(a_loader_that_waits) {
+TEST_WITH(a_loader_that_waits, set_up, tear_down) {
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 0, true, &error), 0);
     assert_string_equal(played->told, "+2 +1 -1 -2 ");
@@ -138,7 +136,7 @@ TEST(a_loader_that_waits) {
     host_lines_close(&lines);
 }
 
-TEST(a_node_without_one) {
+TEST_WITH(a_node_without_one, set_up, tear_down) {
     open_lines();
     assert_int_equal(host_lines_reset(&lines, 3, false, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "a.cube: node 3 has no reset line; "));
@@ -146,7 +144,7 @@ TEST(a_node_without_one) {
     host_lines_close(&lines);
 }
 
-TEST(a_line_in_use) {
+TEST_WITH(a_line_in_use, set_up, tear_down) {
     played->fails_to_open = 3;
     assert_int_equal(host_lines_open(&lines, &file, NULL, &error), HOST_CUBE);
     assert_string_equal(error.text,
@@ -155,7 +153,7 @@ TEST(a_line_in_use) {
     assert_int_equal(played->open, 0);
 }
 
-TEST(a_line_that_fails) {
+TEST_WITH(a_line_that_fails, set_up, tear_down) {
     open_lines();
     played->fails_to_set = 1;
     assert_int_equal(host_lines_reset(&lines, 0, true, &error), HOST_CUBE);
@@ -196,7 +194,7 @@ static int reset_amid(int signal, unsigned on, void (*handler)(int)) {
 }
 
 /* Its handler comes when nothing is active any more. */
-TEST(a_signal_that_is_handled) {
+TEST_WITH(a_signal_that_is_handled, set_up, tear_down) {
     static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
     for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
         memset(&error, 0, sizeof error);
@@ -207,19 +205,19 @@ TEST(a_signal_that_is_handled) {
 }
 
 /* Ctrl-Z waits for the end of the reset. */
-TEST(a_signal_that_stops) {
+TEST_WITH(a_signal_that_stops, set_up, tear_down) {
     assert_int_equal(reset_amid(SIGTSTP, 1, see), 0);
     assert_int_equal(seen, SIGTSTP);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
-TEST(a_signal_that_is_ignored) {
+TEST_WITH(a_signal_that_is_ignored, set_up, tear_down) {
     assert_int_equal(reset_amid(SIGHUP, 1, SIG_IGN), 0);
     assert_true(played->held_us[1] >= HOST_RESET_MS * 1000);
 }
 
 /* The program ends by it as it would have without. */
-TEST(a_signal_that_ends_the_program) {
+TEST_WITH(a_signal_that_ends_the_program, set_up, tear_down) {
     int status = 0;
     pid_t child = fork();
     if (child == 0) {
@@ -237,7 +235,7 @@ TEST(a_signal_that_ends_the_program) {
 /* --- the host's port ------------------------------------------------------ */
 
 /* A terminal that has no such lines, in the hands of another. */
-TEST(a_port_without_them) {
+TEST_WITH(a_port_without_them, set_up, tear_down) {
     static struct host_remote remote;
     int master = posix_openpt(O_RDWR | O_NOCTTY);
     assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
@@ -268,23 +266,8 @@ TEST(a_port_without_them) {
     assert_non_null(strstr(error.text, "/dev/t: "));
 }
 
-#define SET_UP_TEST(name)                                                      \
-    cmocka_unit_test_setup_teardown(name, set_up, tear_down)
-
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        SET_UP_TEST(a_reset),
-        SET_UP_TEST(a_loader_that_waits),
-        SET_UP_TEST(a_node_without_one),
-        SET_UP_TEST(a_line_in_use),
-        SET_UP_TEST(a_line_that_fails),
-        SET_UP_TEST(a_signal_that_is_handled),
-        SET_UP_TEST(a_signal_that_stops),
-        SET_UP_TEST(a_signal_that_is_ignored),
-        SET_UP_TEST(a_signal_that_ends_the_program),
-        SET_UP_TEST(a_port_without_them),
-    };
     played = mmap(NULL, sizeof *played, PROT_READ | PROT_WRITE,
                   MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-    return played == MAP_FAILED ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
+    return played == MAP_FAILED ? 1 : test_run();
 }

@@ -1,5 +1,4 @@
 /* The words by which commands name a cube, as advice repeats them. */
-#include <string.h>
 
 #include "host/cube/site.h"
 #include "tests/unit/test.h"
@@ -37,6 +36,3 @@ TEST(what_does_not_fit_is_left_to_the_user) {
             "--cube FILE");
     }
 }
-
-TEST_MAIN(cmocka_unit_test(words_are_those_that_were_given),
-          cmocka_unit_test(what_does_not_fit_is_left_to_the_user))

@@ -28,13 +28,12 @@ TEST(nodes_say_who_they_are) {
     close_place();
 }
 
-static void nodes_answer_all_questions(void **state) {
+TEST_WITH(nodes_answer_all_questions, NULL, NULL) {
     struct node_link_state links[4];
     struct node_top top;
     struct node_ready_message memory;
     struct node_finished_message totals;
     struct node_probe probe;
-    (void)state;
     open_place(&eight);
     come();
     wait_for(all(), S);
@@ -284,16 +283,3 @@ TEST(a_node_that_loses_power_and_comes_back) {
     ask(all(), NODE_LINKS, 0, 2 * S);
     close_place();
 }
-
-TEST_MAIN(cmocka_unit_test(nodes_say_who_they_are),
-          cmocka_unit_test(nodes_answer_all_questions),
-          cmocka_unit_test(a_probe_of_who_is_silent_ends),
-          cmocka_unit_test(the_next_host_comes_at_once),
-          cmocka_unit_test(a_host_that_vanished_is_waited_for),
-          cmocka_unit_test(starts_are_told_apart),
-          cmocka_unit_test(nodes_restart_when_told),
-          cmocka_unit_test(wires_of_nodes_that_have_just_begun_are_waited_for),
-          cmocka_unit_test(a_pulled_wire_is_gone_round),
-          cmocka_unit_test(a_wire_that_was_never_there),
-          cmocka_unit_test(a_node_that_is_off), cmocka_unit_test(a_cube_of_one),
-          cmocka_unit_test(a_node_that_loses_power_and_comes_back))

@@ -94,6 +94,3 @@ TEST(large_cubes) {
     storms(6, LARGE, false);
     storms(6, LARGE, true);
 }
-
-TEST_MAIN(cmocka_unit_test(small_cubes), cmocka_unit_test(boards),
-          cmocka_unit_test(large_cubes))

@@ -1,9 +1,6 @@
 /* What starts a node on a board: words of a shell and of systemd, and the
  * node's memory. */
 #include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/utsname.h>
 #include <unistd.h>
 
@@ -161,11 +158,4 @@ TEST(test_refused) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_where),    cmocka_unit_test(test_service),
-        cmocka_unit_test(test_start),    cmocka_unit_test(test_command),
-        cmocka_unit_test(test_programs), cmocka_unit_test(test_own_program),
-        cmocka_unit_test(test_refused)};
-    return cmocka_run_group_tests(tests, read_cube, free_cube);
-}
+TEST_GROUP(read_cube, free_cube)

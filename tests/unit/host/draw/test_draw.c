@@ -1,14 +1,11 @@
 /* Sections of a cube that is cut into tetrahedra cover its section once,
  * wherever the plane is; pictures show just that. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <expat.h>
 #include <math.h>
 #include <png.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <unistd.h>
 
 #include "host/draw/picture.h"
@@ -311,15 +308,4 @@ TEST(test_raster) {
     assert_true(fabs(sum - 50.0) < 0.01);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_covers_the_section_once),
-        cmocka_unit_test(test_beside),
-        cmocka_unit_test(test_default_plane),
-        cmocka_unit_test(test_svg),
-        cmocka_unit_test(test_svg_merges),
-        cmocka_unit_test(test_png),
-        cmocka_unit_test(test_raster),
-    };
-    return cmocka_run_group_tests(tests, make_cube, drop_cube);
-}
+TEST_GROUP(make_cube, drop_cube)

@@ -1,8 +1,5 @@
 /* What is said of an image's way: nodes of which the same is true share a line,
  * or a row where a terminal has fewer than there are nodes. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -65,7 +62,7 @@ static void print_cut(void) {
 }
 
 /* Ctrl-C: what each board does now, and the command that goes on. */
-TEST(test_cut) {
+TEST_WITH(test_cut, prepare, NULL) {
     node[0].phase = HOST_SPREAD_TAKES;
     node[1].phase = HOST_SPREAD_WHOLE;
     node[2].phase = HOST_SPREAD_VERIFIED;
@@ -99,7 +96,7 @@ static void print_changes(void) {
     host_progress_end();
 }
 
-TEST(nodes_of_a_kind_share_a_line) {
+TEST_WITH(nodes_of_a_kind_share_a_line, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i == 2   ? HOST_SPREAD_PASSED
                         : i == 7 ? HOST_SPREAD_LOST
@@ -115,7 +112,7 @@ TEST(nodes_of_a_kind_share_a_line) {
                         "nodes 5-6: had mps2-an500 1.2, number 3 already\n");
 }
 
-TEST(a_plan_tells_what_runs_now) {
+TEST_WITH(a_plan_tells_what_runs_now, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++) {
         node[i].phase = i < 2 ? HOST_SPREAD_LEAVES : HOST_SPREAD_BEGINS;
         memcpy(seen[i].who.version, i == 0 ? "0.9" : "1.0", 3);
@@ -130,7 +127,7 @@ TEST(a_plan_tells_what_runs_now) {
               "its loader\n");
 }
 
-TEST(where_there_is_no_terminal_there_are_lines) {
+TEST_WITH(where_there_is_no_terminal_there_are_lines, prepare, NULL) {
     capture(STDERR_FILENO, print_changes);
     assert_string_equal(text, "incode: flash: node 3: takes blocks\n"
                               "incode: flash: node 3: runs it\n");
@@ -150,7 +147,7 @@ static void take_all(int master, int slave) {
     text[size] = '\0';
 }
 
-TEST(a_small_terminal_has_several_nodes_a_row) {
+TEST_WITH(a_small_terminal_has_several_nodes_a_row, prepare, NULL) {
     struct winsize size = {.ws_row = 5, .ws_col = 70};
     int master, slave, before = dup(STDERR_FILENO);
     assert_int_equal(openpty(&master, &slave, NULL, NULL, &size), 0);
@@ -172,16 +169,4 @@ TEST(a_small_terminal_has_several_nodes_a_row) {
     assert_non_null(strstr(text, "]  50 % takes blocks"));
     assert_non_null(strstr(text, "nodes 3-5 [####"));
     assert_non_null(strstr(text, "nodes 6-7 is not there"));
-}
-
-int main(void) {
-#define SET_UP_TEST(name) cmocka_unit_test_setup(name, prepare)
-    const struct CMUnitTest tests[] = {
-        SET_UP_TEST(nodes_of_a_kind_share_a_line),
-        SET_UP_TEST(a_plan_tells_what_runs_now),
-        SET_UP_TEST(where_there_is_no_terminal_there_are_lines),
-        SET_UP_TEST(test_cut),
-        SET_UP_TEST(a_small_terminal_has_several_nodes_a_row),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,5 @@
 /* Signing pairs and images as files: what is made is good, and what is not is
  * refused with a way on. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -304,19 +301,4 @@ TEST(wrong_usage_is_told) {
     assert_int_equal(sign(no_key), HOST_USAGE);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_binary_becomes_an_image),
-        cmocka_unit_test(an_image_is_signed_anew_in_its_place),
-        cmocka_unit_test(the_digest_is_blake2b_of_name_and_code),
-        cmocka_unit_test(false_code_and_false_signatures_are_found),
-        cmocka_unit_test(every_bit_of_an_image_is_held),
-        cmocka_unit_test(an_image_that_is_not_whole_is_refused),
-        cmocka_unit_test(a_file_without_an_end_is_no_image),
-        cmocka_unit_test(keys_of_the_other_kind_are_refused),
-        cmocka_unit_test(a_secret_half_is_its_owner_s_alone),
-        cmocka_unit_test(a_pair_is_made_whole_or_not_at_all),
-        cmocka_unit_test(wrong_usage_is_told),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -96,7 +96,7 @@ static void all_are_in(enum host_spread_phase phase) {
 }
 
 /* What goes with a generation is not waited for. */
-TEST(a_lost_generation_costs_no_wait) {
+TEST_WITH(a_lost_generation_costs_no_wait, prepare, NULL) {
     uint64_t seconds[2];
     for (unsigned i = 0; i < 2; i++) {
         (void)prepare(NULL);
@@ -114,7 +114,7 @@ TEST(a_lost_generation_costs_no_wait) {
     assert_true(seconds[1] <= seconds[0] + 3);
 }
 
-TEST(every_block_goes_once_to_all) {
+TEST_WITH(every_block_goes_once_to_all, prepare, NULL) {
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
     assert_int_equal(spread.sent, BLOCKS);
@@ -129,7 +129,7 @@ TEST(every_block_goes_once_to_all) {
 
 /* What broken transfers have left is not sent again; what one lacks alone goes
  * to it alone. */
-TEST(only_what_is_lacking_is_sent) {
+TEST_WITH(only_what_is_lacking_is_sent, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++)
         memset(board[i].map, 0xff, 1); /* blocks 0 .. 7 */
     board[2].map[0] = 0xf7;            /* but for 3 */
@@ -141,7 +141,7 @@ TEST(only_what_is_lacking_is_sent) {
     host_spread_close(&spread);
 }
 
-TEST(nodes_that_are_left_out_are_left_alone) {
+TEST_WITH(nodes_that_are_left_out_are_left_alone, prepare, NULL) {
     options.nodes = (struct host_node_set){{0}};
     host_node_set_add(&options.nodes, 1);
     assert_int_equal(run(), 0);
@@ -153,7 +153,7 @@ TEST(nodes_that_are_left_out_are_left_alone) {
     host_spread_close(&spread);
 }
 
-TEST(what_is_lost_is_sent_again) {
+TEST_WITH(what_is_lost_is_sent_again, prepare, NULL) {
     loss = 30;
     assert_int_equal(run(), 0);
     all_are_in(HOST_SPREAD_DONE);
@@ -162,7 +162,7 @@ TEST(what_is_lost_is_sent_again) {
     host_spread_close(&spread);
 }
 
-TEST(where_the_image_is_nothing_happens) {
+TEST_WITH(where_the_image_is_nothing_happens, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++)
         board[i].digest = NEW;
     assert_int_equal(run(), 0);
@@ -182,7 +182,7 @@ TEST(where_the_image_is_nothing_happens) {
 }
 
 /* A board in its loader as it has nothing else, or as it was told to wait. */
-TEST(empty_boards_are_filled_and_named) {
+TEST_WITH(empty_boards_are_filled_and_named, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++) {
         board[i].kind = NODE_KIND_LOADER;
         board[i].digest = 0;
@@ -200,7 +200,7 @@ TEST(empty_boards_are_filled_and_named) {
     host_spread_close(&spread);
 }
 
-TEST(who_refuses_has_its_old_image_back) {
+TEST_WITH(who_refuses_has_its_old_image_back, prepare, NULL) {
     board[2].refuses = LOADER_WRONG_KEY;
     assert_int_equal(run(), HOST_INPUT);
     is_in(2, HOST_SPREAD_REFUSED);
@@ -212,7 +212,7 @@ TEST(who_refuses_has_its_old_image_back) {
     host_spread_close(&spread);
 }
 
-TEST(every_refusal_says_what_to_do) {
+TEST_WITH(every_refusal_says_what_to_do, prepare, NULL) {
     for (unsigned f = LOADER_GOOD + 1; f <= LOADER_FAULTS; f++) {
         (void)prepare(NULL);
         for (unsigned i = 0; i < NODES; i++)
@@ -230,7 +230,7 @@ static const char *known_board(void *unused, unsigned node) {
     return node == 1 ? "raspi3b" : node == 2 ? "linux" : "mps2-an500";
 }
 
-TEST(other_boards_are_passed_over_or_refused) {
+TEST_WITH(other_boards_are_passed_over_or_refused, prepare, NULL) {
     for (unsigned known = 0; known < 2; known++) {
         (void)prepare(NULL);
         board[1].name = "raspi3b";
@@ -251,7 +251,7 @@ TEST(other_boards_are_passed_over_or_refused) {
     }
 }
 
-TEST(who_is_off_is_waited_for) {
+TEST_WITH(who_is_off_is_waited_for, prepare, NULL) {
     board[3].on = false;
     off_until_us[3] = 12000000;
     assert_int_equal(run(), 0);
@@ -260,7 +260,7 @@ TEST(who_is_off_is_waited_for) {
     host_spread_close(&spread);
 }
 
-TEST(who_stays_off_is_named_and_the_others_are_done) {
+TEST_WITH(who_stays_off_is_named_and_the_others_are_done, prepare, NULL) {
     board[1].on = board[3].on = false;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -273,7 +273,7 @@ TEST(who_stays_off_is_named_and_the_others_are_done) {
 }
 
 /* Whatever block it was at: it goes on from there. */
-TEST(lost_power_loses_nothing_that_is_written) {
+TEST_WITH(lost_power_loses_nothing_that_is_written, prepare, NULL) {
     for (uint32_t at = 1; at <= BLOCKS; at++) {
         (void)prepare(NULL);
         lose_power_at = at;
@@ -285,7 +285,7 @@ TEST(lost_power_loses_nothing_that_is_written) {
     }
 }
 
-TEST(an_image_that_does_not_come_up_is_told) {
+TEST_WITH(an_image_that_does_not_come_up_is_told, prepare, NULL) {
     board[0].end = FALLS_BACK;
     board[1].end = STAYS;
     assert_int_equal(run(), HOST_CUBE);
@@ -300,7 +300,7 @@ TEST(an_image_that_does_not_come_up_is_told) {
     host_spread_close(&spread);
 }
 
-TEST(a_loader_that_says_nothing_is_given_up) {
+TEST_WITH(a_loader_that_says_nothing_is_given_up, prepare, NULL) {
     board[2].mute = true;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -310,7 +310,7 @@ TEST(a_loader_that_says_nothing_is_given_up) {
 }
 
 /* Its links are up, and pings are answered. */
-TEST(a_loader_that_takes_nothing_is_given_up) {
+TEST_WITH(a_loader_that_takes_nothing_is_given_up, prepare, NULL) {
     board[2].deaf = true;
     assert_int_equal(run(), HOST_CUBE);
     is_in(0, HOST_SPREAD_DONE);
@@ -319,7 +319,7 @@ TEST(a_loader_that_takes_nothing_is_given_up) {
     host_spread_close(&spread);
 }
 
-TEST(who_restarts_for_ever_is_given_up) {
+TEST_WITH(who_restarts_for_ever_is_given_up, prepare, NULL) {
     board[1].restless = true;
     options.patience_us = 1000000000;
     assert_int_equal(run(), HOST_CUBE);
@@ -329,7 +329,7 @@ TEST(who_restarts_for_ever_is_given_up) {
     host_spread_close(&spread);
 }
 
-TEST(another_version_is_refused) {
+TEST_WITH(another_version_is_refused, prepare, NULL) {
     come_up(1);
     seen[1].who = (struct node_who){.protocol = NODE_PROTOCOL + 1};
     assert_int_equal(run(), HOST_INPUT);
@@ -338,7 +338,7 @@ TEST(another_version_is_refused) {
     host_spread_close(&spread);
 }
 
-TEST(a_look_changes_nothing) {
+TEST_WITH(a_look_changes_nothing, prepare, NULL) {
     board[1].digest = NEW;
     board[2].on = false;
     for (unsigned i = 0; i < NODES; i++)
@@ -355,7 +355,7 @@ TEST(a_look_changes_nothing) {
     host_spread_close(&spread);
 }
 
-TEST(a_cube_that_is_lost_ends_it) {
+TEST_WITH(a_cube_that_is_lost_ends_it, prepare, NULL) {
     lost = true;
     assert_int_equal(run(), HOST_CUBE);
     assert_string_equal(error.text, "host: no wire; plug it in");
@@ -363,7 +363,7 @@ TEST(a_cube_that_is_lost_ends_it) {
 }
 
 /* Power, losses and absences by chance: each is done in the end. */
-TEST(chance_does_not_stop_it) {
+TEST_WITH(chance_does_not_stop_it, prepare, NULL) {
     for (uint32_t seed = 1; seed <= 300; seed++) {
         (void)prepare(NULL);
         random_state = seed;
@@ -381,32 +381,4 @@ TEST(chance_does_not_stop_it) {
         all_are_in(HOST_SPREAD_DONE);
         host_spread_close(&spread);
     }
-}
-
-int main(void) {
-#define SET_UP_TEST(name) cmocka_unit_test_setup(name, prepare)
-    const struct CMUnitTest tests[] = {
-        SET_UP_TEST(every_block_goes_once_to_all),
-        SET_UP_TEST(a_lost_generation_costs_no_wait),
-        SET_UP_TEST(only_what_is_lacking_is_sent),
-        SET_UP_TEST(nodes_that_are_left_out_are_left_alone),
-        SET_UP_TEST(what_is_lost_is_sent_again),
-        SET_UP_TEST(where_the_image_is_nothing_happens),
-        SET_UP_TEST(empty_boards_are_filled_and_named),
-        SET_UP_TEST(who_refuses_has_its_old_image_back),
-        SET_UP_TEST(every_refusal_says_what_to_do),
-        SET_UP_TEST(other_boards_are_passed_over_or_refused),
-        SET_UP_TEST(who_is_off_is_waited_for),
-        SET_UP_TEST(who_stays_off_is_named_and_the_others_are_done),
-        SET_UP_TEST(lost_power_loses_nothing_that_is_written),
-        SET_UP_TEST(an_image_that_does_not_come_up_is_told),
-        SET_UP_TEST(a_loader_that_says_nothing_is_given_up),
-        SET_UP_TEST(a_loader_that_takes_nothing_is_given_up),
-        SET_UP_TEST(who_restarts_for_ever_is_given_up),
-        SET_UP_TEST(another_version_is_refused),
-        SET_UP_TEST(a_look_changes_nothing),
-        SET_UP_TEST(a_cube_that_is_lost_ends_it),
-        SET_UP_TEST(chance_does_not_stop_it),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

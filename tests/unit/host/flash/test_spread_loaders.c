@@ -291,17 +291,4 @@ static int make_images(void **unused) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_wire_is_kept_full),
-        cmocka_unit_test(of_slow_wires_answers_take_little),
-        cmocka_unit_test(erasing_goes_beside_the_wire),
-        cmocka_unit_test(a_loader_answers_as_a_node),
-        cmocka_unit_test(a_name_counts_within_a_transfer_alone),
-        cmocka_unit_test(a_board_with_a_worn_flash_waits_and_says_so),
-        cmocka_unit_test(a_second_image_takes_the_first_s_place),
-        cmocka_unit_test(losses_cost_time_alone),
-        cmocka_unit_test(pauses_cost_time_alone),
-    };
-    return cmocka_run_group_tests(tests, make_images, NULL);
-}
+TEST_GROUP(make_images, NULL)

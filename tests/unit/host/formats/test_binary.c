@@ -289,16 +289,3 @@ TEST(real_data) {
     host_points_free(&again);
     host_points_free(&points);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ply_is_as_long_as_it_says),
-        cmocka_unit_test(ply_of_every_coding),
-        cmocka_unit_test(npy_of_every_kind),
-        cmocka_unit_test(npy_of_other_shapes),
-        cmocka_unit_test(binary_nan_is_named),
-        cmocka_unit_test(plot3d_of_every_variant),
-        cmocka_unit_test(real_data),
-    };
-    return cmocka_run_group_tests_name("binary", tests, NULL, NULL);
-}

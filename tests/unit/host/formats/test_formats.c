@@ -214,15 +214,3 @@ TEST(files_that_are_not_there) {
         assert_int_equal(unlink(name), 0);
     }
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(listed),
-        cmocka_unit_test(found_by_extension),
-        cmocka_unit_test(told_by_name),
-        cmocka_unit_test(written_and_read_back),
-        cmocka_unit_test(packed_files),
-        cmocka_unit_test(files_that_are_not_there),
-    };
-    return cmocka_run_group_tests_name("formats", tests, NULL, NULL);
-}

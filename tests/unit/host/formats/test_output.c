@@ -1,7 +1,5 @@
 /* All outputs get their names or none, and what fails leaves nothing new: not
  * by a signal, nor beyond the limit of a file's size. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <dirent.h>
@@ -9,7 +7,6 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdbool.h>
-#include <stdio.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -399,22 +396,4 @@ TEST(a_limit_is_an_error) {
     free(bytes);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_signal_leaves_no_parts),
-        cmocka_unit_test(a_signal_says_what_is_written),
-        cmocka_unit_test(an_ignored_signal_stays_ignored),
-        cmocka_unit_test(a_signal_amid_the_names_is_too_late),
-        cmocka_unit_test(however_many_there_are),
-        cmocka_unit_test(what_was_there_outlives_a_failure),
-        cmocka_unit_test(all_get_their_names_or_none),
-        cmocka_unit_test(what_cannot_be_kept_is_told),
-        cmocka_unit_test(what_a_killed_process_left_is_no_hindrance),
-        cmocka_unit_test(links_to_what_is_not_yet_are_followed),
-        cmocka_unit_test(cleaning_takes_no_more_than_was_made),
-        cmocka_unit_test(cleaning_leaves_the_files_of_others),
-        cmocka_unit_test(a_name_taken_over_is_left),
-        cmocka_unit_test(a_limit_is_an_error),
-    };
-    return cmocka_run_group_tests(tests, enter, leave);
-}
+TEST_GROUP(enter, leave)

@@ -261,17 +261,3 @@ TEST(las_that_is_wrong) {
     refused("a.laz", "1 2 3\n", "a.laz: its points are compressed, ");
     refused("a.LAZ.gz", "1 2 3\n", "pdal translate IN.laz OUT.las");
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pts_with_and_without_a_count),
-        cmocka_unit_test(obj_of_every_habit),
-        cmocka_unit_test(stl_as_text),
-        cmocka_unit_test(stl_in_binary),
-        cmocka_unit_test(las_of_every_version),
-        cmocka_unit_test(las_is_rounded_as_specified),
-        cmocka_unit_test(las_with_a_signature),
-        cmocka_unit_test(las_that_is_wrong),
-    };
-    return cmocka_run_group_tests_name("scans", tests, NULL, NULL);
-}

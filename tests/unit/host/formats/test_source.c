@@ -1,11 +1,8 @@
 /* A file, packed or not, that is larger than the memory allows is refused where
  * that is known, and says how large it is. */
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -338,18 +335,4 @@ TEST(points_beyond_the_memory) {
     host_points_free(&points);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_unpacks_beyond_the_memory),
-        cmocka_unit_test(what_is_little),
-        cmocka_unit_test(text_beyond_the_memory),
-        cmocka_unit_test(pieces_are_as_the_whole),
-        cmocka_unit_test(a_pipe_that_brings_little),
-        cmocka_unit_test(a_line_without_an_end),
-        cmocka_unit_test(a_plain_file_beyond_the_memory),
-        cmocka_unit_test(what_is_longer_than_its_caller_takes),
-        cmocka_unit_test(an_array_beyond_the_memory),
-        cmocka_unit_test(points_beyond_the_memory),
-    };
-    return cmocka_run_group_tests(tests, enter, leave);
-}
+TEST_GROUP(enter, leave)

@@ -354,17 +354,3 @@ TEST(text_is_as_long_as_it_says) {
                  "1 1\n3 0 1 2\n\n# end\n");
     expect_rows("a.off", &b, 3);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_are_correctly_rounded),
-        cmocka_unit_test(text_in_all_its_habits),
-        cmocka_unit_test(text_of_other_tools),
-        cmocka_unit_test(decimal_commas),
-        cmocka_unit_test(columns_after_the_third),
-        cmocka_unit_test(text_faults_have_their_place),
-        cmocka_unit_test(binary_is_no_text),
-        cmocka_unit_test(text_is_as_long_as_it_says),
-    };
-    return cmocka_run_group_tests_name("text", tests, NULL, NULL);
-}

@@ -188,11 +188,3 @@ TEST(vtk_xml_of_every_coding) {
     refused("a.vtu", "<VTKFile compressor=\"vtkLZ4DataCompressor\">\n",
             "a.vtu:1: a compressor");
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(vtk_legacy),
-        cmocka_unit_test(vtk_xml_of_every_coding),
-    };
-    return cmocka_run_group_tests_name("vtk", tests, NULL, NULL);
-}

@@ -3,9 +3,6 @@
 #include <dirent.h>
 #include <math.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -528,19 +525,4 @@ TEST(input_is_left) {
     host_points_free(&points);
     host_tetrahedra_free(&tets);
     assert_int_equal(remove_folder(&folder), 8);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(written_and_read_back),
-        cmocka_unit_test(neighbours_are_right),
-        cmocka_unit_test(failures_leave_nothing),
-        cmocka_unit_test(links_are_followed),
-        cmocka_unit_test(faults_have_their_place),
-        cmocka_unit_test(other_writers_files),
-        cmocka_unit_test(conversion),
-        cmocka_unit_test(fewest_digits),
-        cmocka_unit_test(input_is_left),
-    };
-    return cmocka_run_group_tests_name("write", tests, NULL, NULL);
 }

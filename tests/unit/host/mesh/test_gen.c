@@ -2,8 +2,6 @@
  * names promise. */
 #include <math.h>
 #include <stdbool.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <nettle/sha2.h>
@@ -174,17 +172,4 @@ TEST(wrong_requests_are_refused) {
     error = (struct host_error){0};
     assert_int_equal(host_gen("grid", UINT64_C(1) << 32, 1, &points, &error),
                      HOST_USAGE);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(digests_are_known),
-        cmocka_unit_test(shapes_are_as_named),
-        cmocka_unit_test(surfaces_are_as_named),
-        cmocka_unit_test(the_rest_is_as_named),
-        cmocka_unit_test(some_kinds_have_no_chance_in_them),
-        cmocka_unit_test(seeds_differ_and_points_do_not_repeat),
-        cmocka_unit_test(wrong_requests_are_refused),
-    };
-    return cmocka_run_group_tests_name("gen", tests, NULL, NULL);
 }

@@ -2,8 +2,6 @@
  * function of a sphere has less at a point than its bound; and the bounds are
  * close where the points are flat. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/lift.h"
 #include "host/mesh/order.h"
@@ -357,13 +355,4 @@ TEST(lumps_join) {
         assert_true(fabs(one.y_cube[d] - all.y_cube[d]) < 1e-9);
     }
     assert_true(fabs(one.y_square - all.y_square) < 1e-9);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_point_is_outside),
-        cmocka_unit_test(flat_boxes_exclude),
-        cmocka_unit_test(lumps_join),
-    };
-    return cmocka_run_group_tests_name("lift", tests, NULL, NULL);
 }

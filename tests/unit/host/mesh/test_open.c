@@ -1,8 +1,6 @@
 /* How many tetrahedra are open at a time: few of a sheet, more of a volume, a
  * part of all where they reach across; none where there is no triangulation. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "host/mesh/order.h"
@@ -59,6 +57,3 @@ TEST(test_few) {
     assert_true(open_of(xyz[0], 5) <= 3);
     assert_true(open_of(xyz[0], 4) <= 1);
 }
-
-TEST_MAIN(cmocka_unit_test(test_growth), cmocka_unit_test(test_across),
-          cmocka_unit_test(test_few))

@@ -1,8 +1,6 @@
 /* The order of the points against plain definitions: every row once, regions
  * and boxes as stated, pages as nodes will see them. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/duplicates.h"
 #include "host/mesh/order.h"
@@ -381,17 +379,4 @@ TEST(flat_input_is_refused) {
     assert_int_equal(
         host_order_make(&order, "a.xyz", xyz, 0, HOST_UNIFORM, 1, 0, &error),
         HOST_INPUT);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_row_once),
-        cmocka_unit_test(bricks_are_compact),
-        cmocka_unit_test(shuffling_changes_no_region),
-        cmocka_unit_test(signed_zeros_are_one),
-        cmocka_unit_test(signed_zeros_are_counted),
-        cmocka_unit_test(extreme_coordinates),
-        cmocka_unit_test(flat_input_is_refused),
-    };
-    return cmocka_run_group_tests_name("order", tests, NULL, NULL);
 }

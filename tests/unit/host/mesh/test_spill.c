@@ -1,7 +1,5 @@
 /* Spilled faces come back in order, brick by brick, from memory and from the
  * temporary file alike; against a plain model of lists. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/spill.h"
 #include "tests/unit/test.h"
@@ -143,6 +141,3 @@ TEST(test_marks) {
     assert_int_equal(spill.faces, 1);
     host_spill_free(&spill);
 }
-
-TEST_MAIN(cmocka_unit_test(test_in_memory), cmocka_unit_test(test_in_file),
-          cmocka_unit_test(test_detached), cmocka_unit_test(test_marks))

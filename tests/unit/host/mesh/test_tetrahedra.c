@@ -1,7 +1,5 @@
 /* The list of tetrahedra: canonical order against a plain sort, the digest
  * against a known one. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/adjacency.h"
 #include "tests/unit/reference.h"
@@ -157,15 +155,4 @@ TEST(too_many_for_neighbours) {
                      HOST_BROKEN);
     assert_non_null(strstr(error.text, "2^32 - 1 tetrahedra or more"));
     assert_non_null(strstr(error.text, "; do without these"));
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(order_is_canonical),
-        cmocka_unit_test(every_permutation_keeps_its_sign),
-        cmocka_unit_test(digests_are_known),
-        cmocka_unit_test(mapping_and_cutting),
-        cmocka_unit_test(too_many_for_neighbours),
-    };
-    return cmocka_run_group_tests_name("tetrahedra", tests, NULL, NULL);
 }

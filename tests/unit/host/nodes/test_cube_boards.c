@@ -1,7 +1,5 @@
 /* Bare boards in a cube file: which nodes they are, what they need, and what
  * their links are called. */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/nodes/cube_file.h"
 #include "tests/unit/test.h"
@@ -119,8 +117,3 @@ TEST(what_a_board_has_not) {
             fail_msg("%s: %s", cases[i].text, error.text);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(all_nodes_are_of_a_board),
-          cmocka_unit_test(nodes_are_of_several_boards),
-          cmocka_unit_test(one_board_is_no_mixture),
-          cmocka_unit_test(what_a_board_has_not))

@@ -1,8 +1,5 @@
 /* The cube file: what it says is what nodes are started with, and what is wrong
  * in it is named with its line. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -361,14 +358,4 @@ TEST(files_that_are_not_taken) {
     assert_int_equal(chmod(key_path, 0600), 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nodes_are_started_as_it_says),
-        cmocka_unit_test(wires_without_a_key),
-        cmocka_unit_test(mistakes_are_named),
-        cmocka_unit_test(other_types_are_no_values),
-        cmocka_unit_test(what_the_library_is_not_given),
-        cmocka_unit_test(files_that_are_not_taken),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

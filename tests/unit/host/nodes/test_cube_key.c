@@ -1,7 +1,4 @@
 /* A cube's key: a file of its own, for its owner alone, or none. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include <signal.h>
 #include <sys/resource.h>
@@ -86,11 +83,4 @@ TEST(what_cannot_be_written_leaves_nothing) {
     assert_int_equal(host_key_make("/no/such/folder/key", &error), HOST_INPUT);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_key_is_for_its_owner_alone),
-        cmocka_unit_test(a_file_that_is_there_stays),
-        cmocka_unit_test(what_cannot_be_written_leaves_nothing),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

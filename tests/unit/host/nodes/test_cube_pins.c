@@ -1,7 +1,5 @@
 /* Reset and boot lines in a cube file: of GPIO chips, and DTR and RTS of the
  * host's ports. */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/nodes/cube_file.h"
 #include "tests/unit/test.h"
@@ -176,8 +174,3 @@ TEST(what_is_wrong_with_a_ports) {
            "dtr = \"reset\"; } );",
            "a.cube:3: reset: node 0 has one in line 2; leave one of them out");
 }
-
-TEST_MAIN(cmocka_unit_test(lines_of_chips), cmocka_unit_test(lines_of_ports),
-          cmocka_unit_test(room_for_all),
-          cmocka_unit_test(what_is_wrong_with_a_chips),
-          cmocka_unit_test(what_is_wrong_with_a_ports))

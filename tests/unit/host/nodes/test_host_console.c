@@ -1,5 +1,4 @@
 /* What a board's console says is heard among frames, and a fault is kept. */
-#include <string.h>
 
 #include "host/nodes/port.h"
 #include "transport/frame.h"
@@ -95,8 +94,3 @@ TEST(a_pipe_stays_as_it_is) {
     assert_int_equal(got, sizeof "\0\377" REPORT);
     assert_int_equal(console.faults, 1);
 }
-
-TEST_MAIN(cmocka_unit_test(a_fault_is_kept),
-          cmocka_unit_test(frames_are_passed_over),
-          cmocka_unit_test(a_long_record_is_cut),
-          cmocka_unit_test(a_pipe_stays_as_it_is))

@@ -1,5 +1,4 @@
 /* An emulator's monitor: asked, late, lost, and another than before. */
-#include <string.h>
 #include <unistd.h>
 
 #include "host/base/error.h"
@@ -39,7 +38,7 @@ static void heard(const char *expected) {
     assert_string_equal(text, expected);
 }
 
-TEST(requests_are_answered) {
+TEST_WITH(requests_are_answered, set_up, tear_down) {
     say(GREETING GOOD EVENT GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
     heard("{\"execute\":\"qmp_capabilities\"}\n{\"execute\":\"stop\"}\n");
@@ -48,7 +47,7 @@ TEST(requests_are_answered) {
     heard("{\"execute\":\"cont\"}\n");
 }
 
-TEST(a_refusal_is_told) {
+TEST_WITH(a_refusal_is_told, set_up, tear_down) {
     say(GREETING GOOD BAD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_RESET, &error), HOST_CUBE);
     assert_non_null(strstr(error.text, "refuses"));
@@ -56,7 +55,7 @@ TEST(a_refusal_is_told) {
 
 /* Nothing waits for ever, nor as long as usual where less was asked for.
  * Where the machine is held up for ten seconds, it has more turns. */
-TEST(silence_ends) {
+TEST_WITH(silence_ends, set_up, tear_down) {
     uint64_t took_us = HOST_QMP_US;
     qmp.wait_us = 200000;
     say(GREETING);
@@ -70,14 +69,14 @@ TEST(silence_ends) {
     assert_true(took_us < HOST_QMP_US);
 }
 
-TEST(its_end_is_told) {
+TEST_WITH(its_end_is_told, set_up, tear_down) {
     close(ends[1]);
     ends[1] = dup(ends[0]);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_RESET, &error), HOST_CUBE);
 }
 
 /* What is left of the process before is passed over. */
-TEST(another_process_is_greeted) {
+TEST_WITH(another_process_is_greeted, set_up, tear_down) {
     say(GREETING GOOD GOOD);
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
     say(EVENT "{\"ret");
@@ -89,7 +88,7 @@ TEST(another_process_is_greeted) {
 }
 
 /* A line that has no room is passed over whole. */
-TEST(a_long_line_is_passed_over) {
+TEST_WITH(a_long_line_is_passed_over, set_up, tear_down) {
     static char line[2 * HOST_QMP_LINE];
     memset(line, ' ', sizeof line - 1);
     say(line);
@@ -97,13 +96,3 @@ TEST(a_long_line_is_passed_over) {
     assert_int_equal(host_qmp_ask(&qmp, HOST_QMP_STOP, &error), 0);
     heard("{\"execute\":\"qmp_capabilities\"}\n{\"execute\":\"stop\"}\n");
 }
-
-TEST_MAIN(cmocka_unit_test_setup_teardown(requests_are_answered, set_up,
-                                          tear_down),
-          cmocka_unit_test_setup_teardown(a_refusal_is_told, set_up, tear_down),
-          cmocka_unit_test_setup_teardown(silence_ends, set_up, tear_down),
-          cmocka_unit_test_setup_teardown(its_end_is_told, set_up, tear_down),
-          cmocka_unit_test_setup_teardown(another_process_is_greeted, set_up,
-                                          tear_down),
-          cmocka_unit_test_setup_teardown(a_long_line_is_passed_over, set_up,
-                                          tear_down))

@@ -1,5 +1,4 @@
 /* Boards are troubled one after the other, each once, and a stop ends. */
-#include <string.h>
 
 #include "host/nodes/cluster.h"
 #include "tests/unit/test.h"
@@ -46,6 +45,3 @@ TEST(none_where_none_is_wanted) {
     for (uint64_t now = 1; now < 20 * EVERY_US; now += EVERY_US)
         assert_false(host_trouble_due(&t, now, &kind, &node));
 }
-
-TEST_MAIN(cmocka_unit_test(each_board_once), cmocka_unit_test(each_stop_ends),
-          cmocka_unit_test(none_where_none_is_wanted))

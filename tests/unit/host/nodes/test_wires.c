@@ -49,5 +49,3 @@ TEST(test_many) {
     check(4);
     check(8);
 }
-
-TEST_MAIN(cmocka_unit_test(test_one), cmocka_unit_test(test_many))

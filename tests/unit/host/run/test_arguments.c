@@ -1,6 +1,4 @@
 /* What `incode run` takes, and what it refuses with a reason. */
-#include <stdio.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -334,9 +332,3 @@ TEST(test_strategies) {
     assert_true(i >= 3);
     assert_string_equal(host_strategy_name(i - 1), "auto");
 }
-
-TEST_MAIN(cmocka_unit_test(test_defaults), cmocka_unit_test(test_direct),
-          cmocka_unit_test(test_options), cmocka_unit_test(test_linda),
-          cmocka_unit_test(test_bare_boards), cmocka_unit_test(test_refused),
-          cmocka_unit_test(test_in_vain), cmocka_unit_test(test_names),
-          cmocka_unit_test(test_rows), cmocka_unit_test(test_strategies))

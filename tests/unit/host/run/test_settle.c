@@ -99,7 +99,3 @@ TEST(what_does_not_fit) {
     (void)settle(&options, "sphere", &regions);
     assert_int_equal(result.build, INCODE_BUILD_POINTS);
 }
-
-TEST_MAIN(cmocka_unit_test(volumes_and_others),
-          cmocka_unit_test(what_is_asked_for_stays),
-          cmocka_unit_test(one_alone), cmocka_unit_test(what_does_not_fit))

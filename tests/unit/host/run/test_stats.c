@@ -1,8 +1,6 @@
 /* The statistics have every name that scripts rely on, and its value. */
+#define TEST_OWN_MAIN
 #include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 #include "tests/unit/test.h"
@@ -264,12 +262,5 @@ int main(int argc, char **argv) {
         uint64_t peak = host_memory_peak();
         return write(STDOUT_FILENO, &peak, sizeof peak) == sizeof peak ? 0 : 1;
     }
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_names),
-        cmocka_unit_test(test_documented),
-        cmocka_unit_test(test_candidates),
-        cmocka_unit_test(test_unwritable),
-        cmocka_unit_test(test_peak_is_its_own),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run();
 }

@@ -1,5 +1,4 @@
 /* What a run tells of its nodes together: who counts for which figure. */
-#include <string.h>
 
 #include "host/run/run.h"
 #include "tests/unit/test.h"
@@ -46,5 +45,3 @@ TEST(test_sums) {
     assert_int_equal(result.retransmitted, 10);
     assert_int_equal(result.node[1].statistics.wall_us, 6000000);
 }
-
-TEST_MAIN(cmocka_unit_test(test_sums))

@@ -521,13 +521,4 @@ TEST(test_exact) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_alone),     cmocka_unit_test(test_together),
-        cmocka_unit_test(test_suspect),   cmocka_unit_test(test_no_tetrahedra),
-        cmocka_unit_test(test_far_point), cmocka_unit_test(test_unclear),
-        cmocka_unit_test(test_redo),      cmocka_unit_test(test_no_other),
-        cmocka_unit_test(test_no_end),    cmocka_unit_test(test_exact),
-    };
-    return cmocka_run_group_tests(tests, set_up_truth, tear_down_truth);
-}
+TEST_GROUP(set_up_truth, tear_down_truth)

@@ -1,8 +1,5 @@
 /* Which node is doubted, and when: nodes that answer each after its own time,
  * and whose neighbours say so where one is silent for long, in virtual time. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/service/parts.h"
 #include "tests/unit/test.h"
@@ -101,7 +98,7 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
 }
 
 /* More nodes than processors: all are slow, and one is for once slower. */
-TEST(a_busy_machine_is_no_reason) {
+TEST_WITH(a_busy_machine_is_no_reason, set_up, tear_down) {
     uint64_t slow[NODES];
     for (unsigned i = 0; i < NODES; i++)
         slow[i] = 900000 + 30000 * i;
@@ -119,12 +116,12 @@ TEST(a_busy_machine_is_no_reason) {
 
 /* One that answers no more is found among quick ones in no time, and among slow
  * ones when it is silent for longer than they are. */
-static void one_that_stands_still_is_named(void **unused) {
+TEST_WITH(one_that_stands_still_is_named, NULL, NULL) {
     for (unsigned i = 1; i < NODES; i++) {
         for (unsigned busy = 0; busy < 2; busy++) {
             uint64_t after_us[NODES];
             char start[40];
-            (void)set_up(unused);
+            (void)set_up(fixture);
             for (unsigned k = 0; k < NODES; k++)
                 after_us[k] = busy == 0 ? 60000 : 900000 + 30000 * k;
             pass(10 * SECOND, after_us);
@@ -137,11 +134,7 @@ static void one_that_stands_still_is_named(void **unused) {
                             busy == 0 ? 1400000 : 2400000);
             snprintf(start, sizeof start, "node %u link", i);
             assert_non_null(strstr(told, start));
-            (void)tear_down(unused);
+            (void)tear_down(fixture);
         }
     }
 }
-
-TEST_MAIN(cmocka_unit_test_setup_teardown(a_busy_machine_is_no_reason, set_up,
-                                          tear_down),
-          cmocka_unit_test(one_that_stands_still_is_named))

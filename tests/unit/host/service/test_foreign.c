@@ -1,7 +1,5 @@
 /* A host whose node tells of generations that the host did not begin: it
  * answers them, and does not do so for ever. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/run/run.h"
 #include "host/service/service.h"
@@ -144,6 +142,3 @@ TEST(one_that_comes_again_ends_the_run) {
         ends_soon();
     }
 }
-
-TEST_MAIN(cmocka_unit_test(one_is_answered),
-          cmocka_unit_test(one_that_comes_again_ends_the_run))

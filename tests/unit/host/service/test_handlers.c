@@ -450,21 +450,4 @@ TEST(test_texts) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_any_bytes),
-        cmocka_unit_test(test_epochs),
-        cmocka_unit_test(test_gaps),
-        cmocka_unit_test(test_answers),
-        cmocka_unit_test(test_starts),
-        cmocka_unit_test(test_fault),
-        cmocka_unit_test(test_doubtful_fault),
-        cmocka_unit_test(test_shared_list_too_small),
-        cmocka_unit_test(test_fault_with_its_cure),
-        cmocka_unit_test(test_strategy),
-        cmocka_unit_test(test_passed),
-        cmocka_unit_test(test_wrong_pages),
-        cmocka_unit_test(test_texts),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -1,8 +1,6 @@
 /* Commits count once, for the node that has the job, under its epoch; a loss
  * takes the uncommitted tetrahedra with it, and no others, and their bricks are
  * given out again. */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/service/ledger.h"
 #include "tests/unit/test.h"
@@ -166,6 +164,3 @@ TEST(test_ranges) {
         host_ledger_free(&ledger);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(test_commits), cmocka_unit_test(test_abandon),
-          cmocka_unit_test(test_ranges))

@@ -144,12 +144,4 @@ TEST(test_nobody) {
     assert_true(onlooker.questions <= took_us[1] / EVERY_US + 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_each_strategy),
-        cmocka_unit_test(test_losses),
-        cmocka_unit_test(test_some),
-        cmocka_unit_test(test_nobody),
-    };
-    return cmocka_run_group_tests(tests, set_up, end_runs);
-}
+TEST_GROUP(set_up, end_runs)

@@ -1,6 +1,4 @@
 /* When the user is told that a run spends its time on pages, and what then. */
-#include <stdio.h>
-#include <string.h>
 
 #include "host/service/parts.h"
 #include "tests/unit/test.h"
@@ -107,7 +105,3 @@ TEST(test_advice) {
     send(10000000);
     assert_non_null(strstr(told, "; --memory 1G would hold more of them"));
 }
-
-TEST_MAIN(cmocka_unit_test(test_told_once), cmocka_unit_test(test_not_told),
-          cmocka_unit_test(test_other_nodes), cmocka_unit_test(test_cube),
-          cmocka_unit_test(test_advice))

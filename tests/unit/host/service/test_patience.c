@@ -270,18 +270,4 @@ TEST(test_all_idle) {
     assert_int_equal(nobody, 1);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_idle),
-        cmocka_unit_test(test_idle_holder),
-        cmocka_unit_test(test_idle_in_each_strategy),
-        cmocka_unit_test(test_silent),
-        cmocka_unit_test(test_back),
-        cmocka_unit_test(test_silent_gateway),
-        cmocka_unit_test(test_never_started),
-        cmocka_unit_test(test_started_here),
-        cmocka_unit_test(test_late),
-        cmocka_unit_test(test_all_idle),
-    };
-    return cmocka_run_group_tests(tests, set_up, end_runs);
-}
+TEST_GROUP(set_up, end_runs)

@@ -178,12 +178,4 @@ TEST(test_floods) {
            "more spilled faces than its points allow");
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_refused_results),
-        cmocka_unit_test(test_unfinished),
-        cmocka_unit_test(test_spilled),
-        cmocka_unit_test(test_floods),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

@@ -1,6 +1,4 @@
 /* What the host sends first where more is due than the wire takes. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/service/parts.h"
 #include "host/service/strategies/strategies.h"
@@ -113,10 +111,4 @@ static int tear_down(void **unused) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_turns),
-        cmocka_unit_test(test_order),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)

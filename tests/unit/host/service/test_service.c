@@ -310,24 +310,4 @@ TEST(test_ends_at_once) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_restarts),
-        cmocka_unit_test(test_restarts_at_first),
-        cmocka_unit_test(test_mixtures),
-        cmocka_unit_test(test_stopped),
-        cmocka_unit_test(test_gone),
-        cmocka_unit_test(test_gateway),
-        cmocka_unit_test(test_for_ever),
-        cmocka_unit_test(test_next_host),
-        cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_wrong_wire),
-        cmocka_unit_test(test_missing_wire),
-        cmocka_unit_test(test_missing_wire_and_late_node),
-        cmocka_unit_test(test_late_node),
-        cmocka_unit_test(test_late_wire),
-        cmocka_unit_test(test_missing_host_port),
-        cmocka_unit_test(test_ends_at_once),
-    };
-    return cmocka_run_group_tests(tests, set_up, end_runs);
-}
+TEST_GROUP(set_up, end_runs)

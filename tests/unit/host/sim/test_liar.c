@@ -1,6 +1,5 @@
 /* A node that lies: in each way it alters what that way is about, as often as
  * it is to, nothing else, and always so that what leaves is a message. */
-#include <string.h>
 
 #include "host/sim/liar.h"
 #include "node/setup.h"
@@ -454,16 +453,3 @@ TEST(floods_have_no_end) {
         }
     }
 }
-
-TEST_MAIN(cmocka_unit_test(results_are_altered),
-          cmocka_unit_test(both_orientations_are_told),
-          cmocka_unit_test(what_does_not_fit_is_not_told),
-          cmocka_unit_test(answers_are_altered),
-          cmocka_unit_test(what_is_lent_is_altered),
-          cmocka_unit_test(tuples_are_altered),
-          cmocka_unit_test(findings_are_altered),
-          cmocka_unit_test(shared_ones_are_altered),
-          cmocka_unit_test(pages_are_altered),
-          cmocka_unit_test(other_messages_are_true),
-          cmocka_unit_test(lies_are_counted),
-          cmocka_unit_test(floods_have_no_end))

@@ -3,8 +3,6 @@
  * node at each frame that it sends.  INCODE_SIM_STRIDE: of those frames one in
  * so many (1: all).  Fewer under the sanitizers: they look at the code that
  * each fate and restart goes through, and it is the same at most frames. */
-#include <stdio.h>
-#include <stdlib.h>
 
 #include "host/base/parallel.h"
 #include "host/service/service.h"
@@ -133,12 +131,4 @@ static int one_thread(void **unused) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_same_seed_is_the_same_run),
-        cmocka_unit_test(who_is_done_lends_on),
-        cmocka_unit_test(each_frame_meets_each_fate),
-        cmocka_unit_test(each_node_restarts_at_each_frame),
-    };
-    return cmocka_run_group_tests(tests, one_thread, NULL);
-}
+TEST_GROUP(one_thread, NULL)

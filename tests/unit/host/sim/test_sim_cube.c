@@ -2,8 +2,6 @@
  * where they should, that what breaks is whole again when all that broke it is
  * taken back; and that every kind of fault can be drawn, strike and be counted.
  */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/sim/sim_cube.h"
 #include "host/sim/sim_plan.h"
@@ -200,10 +198,3 @@ TEST(every_kind_of_fault_is_drawn) {
             assert_string_not_equal(kind->name, host_sim_kinds[other].name);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(every_wire_leads_where_it_should),
-          cmocka_unit_test(a_host_may_have_more_wires),
-          cmocka_unit_test(a_wire_breaks_as_often_as_it_is_mended),
-          cmocka_unit_test(one_host_is_connected_at_a_time),
-          cmocka_unit_test(bytes_wake_and_leave_a_trace),
-          cmocka_unit_test(every_kind_of_fault_is_drawn))

@@ -335,17 +335,3 @@ TEST(faults_are_bounded) {
     }
     close_set(&f);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(right_results_pass),
-        cmocka_unit_test(damage_is_found),
-        cmocka_unit_test(missing_bricks_are_found),
-        cmocka_unit_test(missing_stars_are_found),
-        cmocka_unit_test(whole_repeats_are_found),
-        cmocka_unit_test(nothing_is_found),
-        cmocka_unit_test(garbage_is_refused),
-        cmocka_unit_test(faults_are_bounded),
-    };
-    return cmocka_run_group_tests_name("check", tests, NULL, NULL);
-}

@@ -311,17 +311,3 @@ TEST(sums_leave_little_to_pair) {
     assert_true(listed < r.tetrahedra);
     close_set(&f);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_left_out_point_is_found),
-        cmocka_unit_test(only_spheres_tell_a_flip),
-        cmocka_unit_test(a_body_twice_is_found),
-        cmocka_unit_test(false_vertices_count_once),
-        cmocka_unit_test(flat_ones_are_found),
-        cmocka_unit_test(a_surface_wound_twice_is_found),
-        cmocka_unit_test(two_bodies_are_found),
-        cmocka_unit_test(sums_leave_little_to_pair),
-    };
-    return cmocka_run_group_tests_name("check_shapes", tests, NULL, NULL);
-}

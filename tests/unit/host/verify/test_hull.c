@@ -66,13 +66,3 @@ TEST(folds_are_found) {
 TEST(nothing_has_no_hull) {
     assert_int_equal(heard(NULL, 0, "there is no hull"), 1);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(open_surfaces_are_found),
-        cmocka_unit_test(turned_facets_are_found),
-        cmocka_unit_test(folds_are_found),
-        cmocka_unit_test(nothing_has_no_hull),
-    };
-    return cmocka_run_group_tests_name("hull", tests, NULL, NULL);
-}

@@ -165,13 +165,3 @@ TEST(judged_among_many) {
     host_points_free(&f.points);
     host_order_free(&f.order);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(judged_as_by_trying_all),
-        cmocka_unit_test(judged_on_lattices),
-        cmocka_unit_test(judged_at_the_ends_of_the_range),
-        cmocka_unit_test(judged_among_many),
-    };
-    return cmocka_run_group_tests_name("judge", tests, NULL, NULL);
-}

@@ -3,8 +3,6 @@
  * data. */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/verify/check.h"
 #include "host/mesh/gen.h"
@@ -404,26 +402,4 @@ TEST(garbage_is_refused) {
         expect(&f, "");
     }
     close_fixture(&f);
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(data_agrees),
-        cmocka_unit_test(right_ones_pass),
-        cmocka_unit_test(range_beyond_scaling),
-        cmocka_unit_test(ends_of_the_range),
-        cmocka_unit_test(each_turned_one_is_found),
-        cmocka_unit_test(each_missing_one_is_found),
-        cmocka_unit_test(each_doubled_one_is_found),
-        cmocka_unit_test(each_wrong_apex_is_found),
-        cmocka_unit_test(each_flip_is_found),
-        cmocka_unit_test(wrong_ties_are_found),
-        cmocka_unit_test(unused_points_are_found),
-        cmocka_unit_test(duplicates_stand_for_the_lowest),
-        cmocka_unit_test(two_bodies_are_found),
-        cmocka_unit_test(dents_are_found),
-        cmocka_unit_test(nothing_is_no_triangulation),
-        cmocka_unit_test(garbage_is_refused),
-    };
-    return cmocka_run_group_tests_name("verify", tests, NULL, NULL);
 }

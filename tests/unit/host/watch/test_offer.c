@@ -4,9 +4,6 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -122,7 +119,7 @@ static void look_at(struct host_look *look) {
 
 /* --- looks ---------------------------------------------------------------- */
 
-TEST(test_nobody) {
+TEST_WITH(test_nobody, set_up, NULL) {
     struct host_look look;
     struct host_holder who;
     assert_false(host_holder_find(&who, wire));
@@ -144,7 +141,7 @@ static void check_answers(const struct host_look *look, unsigned what) {
     }
 }
 
-TEST(test_answers) {
+TEST_WITH(test_answers, set_up, NULL) {
     struct host_look look;
     uint64_t before = 0;
     begin_holder();
@@ -173,7 +170,7 @@ TEST(test_answers) {
     end_holder();
 }
 
-TEST(test_holder) {
+TEST_WITH(test_holder, set_up, NULL) {
     struct host_holder who;
     char text[HOST_HOLDER_TEXT], number[40];
     begin_holder();
@@ -190,7 +187,7 @@ TEST(test_holder) {
     assert_false(host_holder_find(&who, wire));
 }
 
-TEST(test_several) {
+TEST_WITH(test_several, set_up, NULL) {
     struct host_look look[HOST_LOOKERS_MAX], late;
     begin_holder();
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
@@ -219,7 +216,7 @@ TEST(test_several) {
 }
 
 /* However the other ends, its place is free at once. */
-TEST(test_killed) {
+TEST_WITH(test_killed, set_up, NULL) {
     struct host_look look;
     struct host_holder who;
     int status;
@@ -239,7 +236,7 @@ TEST(test_killed) {
 
 /* Who stands still is waited for no longer than one has patience; clock: a
  * fifth of a second, in which nobody could answer. */
-TEST(test_stopped) {
+TEST_WITH(test_stopped, set_up, NULL) {
     struct host_look look;
     begin_holder();
     look_at(&look);
@@ -258,7 +255,7 @@ TEST(test_stopped) {
 }
 
 /* Whoever asks who has it, and how often: it is had. */
-TEST(test_queue) {
+TEST_WITH(test_queue, set_up, NULL) {
     enum { CALLS = 200 };
     struct host_look look;
     struct host_holder who;
@@ -307,7 +304,7 @@ static void says(int file, const char *text) {
                      strlen(text));
 }
 
-TEST(test_nonsense) {
+TEST_WITH(test_nonsense, set_up, NULL) {
     static const char *const lines[] = {
         "who\n", "{\"ask\":\"who\",\"nodes\":\"9\"}\n", "{\"ask\":\"probe\"}\n",
         "{\"ask\":7}\n", "\n"};
@@ -330,7 +327,7 @@ TEST(test_nonsense) {
 }
 
 /* Who does not read is dropped after a while; the others go on. */
-TEST(test_deaf) {
+TEST_WITH(test_deaf, set_up, NULL) {
     struct host_look look;
     int size = 1, file;
     begin_holder();
@@ -350,7 +347,7 @@ TEST(test_deaf) {
 }
 
 /* The next one waits for the place, and takes it. */
-TEST(test_next) {
+TEST_WITH(test_next, set_up, NULL) {
     struct host_look look;
     pid_t first;
     int first_end, status;
@@ -426,7 +423,7 @@ static void make_calls(int family, struct sockaddr *at, socklen_t size,
     assert_int_equal(connect(*call, at, size), 0);
 }
 
-TEST(test_other_users) {
+TEST_WITH(test_other_users, set_up, NULL) {
     struct sockaddr_in in = {.sin_family = AF_INET,
                              .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     struct sockaddr_un un = {.sun_family = AF_UNIX};
@@ -454,15 +451,3 @@ TEST(test_other_users) {
     close(listener);
     assert_int_equal(unlink(un.sun_path), 0);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(test_nobody, set_up),
-          cmocka_unit_test_setup(test_answers, set_up),
-          cmocka_unit_test_setup(test_holder, set_up),
-          cmocka_unit_test_setup(test_several, set_up),
-          cmocka_unit_test_setup(test_killed, set_up),
-          cmocka_unit_test_setup(test_stopped, set_up),
-          cmocka_unit_test_setup(test_queue, set_up),
-          cmocka_unit_test_setup(test_nonsense, set_up),
-          cmocka_unit_test_setup(test_deaf, set_up),
-          cmocka_unit_test_setup(test_next, set_up),
-          cmocka_unit_test_setup(test_other_users, set_up))

@@ -1,8 +1,8 @@
+#define TEST_OWN_MAIN
 #include <stdalign.h>
 
 #include "tests/unit/test.h"
 #include <math.h>
-#include <string.h>
 
 #include "incode/apex/sphere.h"
 #include "incode/apex/lanes.h"
@@ -463,17 +463,6 @@ TEST(a_sphere_that_vanishes) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ball_on_a_rough_plane),
-        cmocka_unit_test(spheres_of_rough_squares),
-        cmocka_unit_test(close_candidates_of_a_rough_lattice),
-        cmocka_unit_test(radical_bounds_on_a_rough_sphere),
-        cmocka_unit_test(radical_bounds_across_scales),
-        cmocka_unit_test(a_difference_that_vanishes),
-        cmocka_unit_test(a_sphere_that_vanishes),
-        cmocka_unit_test(places_in_a_pencil),
-        cmocka_unit_test(first_of_the_local_points),
-    };
     state = 88172645463325252u;
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return test_run();
 }

@@ -342,12 +342,3 @@ TEST(half_spaces_hold_what_is_far) {
     free(in);
     close_scene(&s);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_point_is_lost),
-        cmocka_unit_test(no_point_is_lost_where_it_is_full),
-        cmocka_unit_test(half_spaces_hold_what_is_far),
-    };
-    return cmocka_run_group_tests_name("horizon", tests, NULL, NULL);
-}

@@ -228,15 +228,3 @@ TEST(a_cap_beside_a_surface_reaches_little) {
     }
     close_scene(&s);
 }
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_missing_page_is_named),
-        cmocka_unit_test(too_many_bricks_are_told),
-        cmocka_unit_test(what_is_done_is_left_out),
-        cmocka_unit_test(copies_give_way),
-        cmocka_unit_test(a_box_misses_no_leaf),
-        cmocka_unit_test(a_cap_beside_a_surface_reaches_little),
-    };
-    return cmocka_run_group_tests_name("horizon_boxes", tests, NULL, NULL);
-}

@@ -1,8 +1,6 @@
 /* A maker alone: asked for the apexes of the faces of a known triangulation, in
  * no order that a front would have, by searches that are suspended for pages
  * which come late, at random, or have been replaced meanwhile. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "incode/apex/maker.h"
@@ -363,7 +361,3 @@ TEST(memory) {
         }
     }
 }
-
-TEST_MAIN(cmocka_unit_test(real_sets), cmocka_unit_test(made_sets),
-          cmocka_unit_test(first_tetrahedra), cmocka_unit_test(abandoned),
-          cmocka_unit_test(waiting_and_ahead), cmocka_unit_test(memory))

@@ -1,7 +1,7 @@
 /* The error bounds of planes and spheres against rational numbers, where the
  * axes' scales differ and where they do not. */
+#define TEST_OWN_MAIN
 #include <math.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 #include <gmp.h>
@@ -167,11 +167,8 @@ TEST(bounds_hold) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bounds_hold),
-    };
     start();
-    int failed = cmocka_run_group_tests_name("sphere", tests, NULL, NULL);
+    int failed = test_run();
     stop();
     return failed;
 }

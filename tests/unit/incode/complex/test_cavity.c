@@ -152,7 +152,7 @@ static void show_others(drawing *draw, int exponent, bool *seen,
     scene_close(&s);
 }
 
-TEST(those_that_hold_a_point) {
+TEST_WITH(those_that_hold_a_point, begin, NULL) {
     static drawing *const draw[] = {volume,         grid,       plane, sphere,
                                     lattice_sphere, skew_lines, lumps};
     static const int exponents[] = {0, -300, 300, -1000, 900};
@@ -191,7 +191,7 @@ static uint32_t show_hub(double (*p)[3], uint32_t n, bool *listed) {
     return count;
 }
 
-TEST(hubs_of_each_size) {
+TEST_WITH(hubs_of_each_size, begin, NULL) {
     static double p[SPHERE][3];
     uint32_t listed_most = 0, refused = 0, most = SANITIZED ? 120 : 300;
     for (uint32_t n = 4; n <= most; n += n < 60 ? 1 : 12) {
@@ -207,7 +207,7 @@ TEST(hubs_of_each_size) {
 }
 
 /* On a sphere but for rounding, and exactly, where all spheres are one. */
-TEST(a_hub_of_thousands) {
+TEST_WITH(a_hub_of_thousands, begin, NULL) {
     static double p[SPHERE][3];
     uint32_t n = SANITIZED ? SPHERE / 3 : SPHERE;
     bool listed;
@@ -231,7 +231,7 @@ TEST(a_hub_of_thousands) {
 /* A facet of many points, seen at once from far above it, where all cells that
  * give way are infinite; in its plane their circles tell, from outside and from
  * within. */
-TEST(one_side_of_many_points) {
+TEST_WITH(one_side_of_many_points, begin, NULL) {
     static double p[DISC * DISC + 1][3];
     uint32_t row[DISC * DISC + 1], n = DISC * DISC + 1, sides;
     struct scene s = {.seed = 7};
@@ -263,8 +263,3 @@ TEST(one_side_of_many_points) {
     scene_check(&s);
     scene_close(&s);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(those_that_hold_a_point, begin),
-          cmocka_unit_test_setup(hubs_of_each_size, begin),
-          cmocka_unit_test_setup(a_hub_of_thousands, begin),
-          cmocka_unit_test_setup(one_side_of_many_points, begin))

@@ -157,7 +157,7 @@ static void by_definition(const double (*p)[3], uint32_t n,
 
 /* ---- small sets, looked at after each insertion ---- */
 
-TEST(all_orders_are_one) {
+TEST_WITH(all_orders_are_one, begin, NULL) {
     struct scene s = {.each = true, .seed = 7};
     double p[SMALL][3];
     uint32_t row[SMALL], built = 0;
@@ -183,7 +183,7 @@ TEST(all_orders_are_one) {
 }
 
 /* Powers of two change nothing, down to denormals. */
-TEST(all_scales_are_one) {
+TEST_WITH(all_scales_are_one, begin, NULL) {
     static const int power[] = {-1074, -1073, -1000, -540, -358, -214,
                                 204,   340,   511,   900,  1015};
     double p[SMALL][3], q[SMALL][3];
@@ -250,7 +250,7 @@ static uint32_t cube(double (*p)[3], int side, bool hollow) {
     return n;
 }
 
-TEST(cubes) {
+TEST_WITH(cubes, begin, NULL) {
     static double p[LARGE][3];
     for (int side = 2; side < 6; side++)
         assert_in_range(one_whatever_the_order(p, cube(p, side, false)),
@@ -259,7 +259,7 @@ TEST(cubes) {
     (void)one_whatever_the_order(p, cube(p, 6, true));
 }
 
-TEST(points_of_spheres) {
+TEST_WITH(points_of_spheres, begin, NULL) {
     double p[31][3];
     draw_set(SPHERE, p, 30);
     (void)one_whatever_the_order(p, 30);
@@ -271,7 +271,7 @@ TEST(points_of_spheres) {
 
 /* Each piece of one line sees each of the other, until a point between them
  * takes many of them away. */
-TEST(skew_lines) {
+TEST_WITH(skew_lines, begin, NULL) {
     double p[2 * LINE + 1][3];
     for (int i = 0; i < LINE; i++) {
         set_point(p[2 * i], i, 0, 0);
@@ -285,7 +285,7 @@ TEST(skew_lines) {
 
 /* A hull facet of many points, those of it that come later outside it, and what
  * sees all of it at once, first or last. */
-TEST(one_side_of_many_points) {
+TEST_WITH(one_side_of_many_points, begin, NULL) {
     double p[DISC * DISC + 2][3];
     uint32_t n = DISC * DISC;
     for (int x = 0; x < DISC; x++)
@@ -299,18 +299,10 @@ TEST(one_side_of_many_points) {
                      4 * (DISC - 1) * (DISC - 1));
 }
 
-TEST(points_at_random) {
+TEST_WITH(points_at_random, begin, NULL) {
     static double p[LARGE][3];
     draw_set(UNIFORM, p, LARGE);
     assert_in_range(one_whatever_the_order(p, LARGE), 6 * LARGE, 7 * LARGE);
     draw_set(ROUGH_PLANE, p, LARGE / 5);
     (void)one_whatever_the_order(p, LARGE / 5);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(all_orders_are_one, begin),
-          cmocka_unit_test_setup(all_scales_are_one, begin),
-          cmocka_unit_test_setup(cubes, begin),
-          cmocka_unit_test_setup(points_of_spheres, begin),
-          cmocka_unit_test_setup(skew_lines, begin),
-          cmocka_unit_test_setup(one_side_of_many_points, begin),
-          cmocka_unit_test_setup(points_at_random, begin))

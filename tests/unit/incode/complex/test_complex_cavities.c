@@ -70,7 +70,7 @@ static void build_hub(double (*p)[3], uint32_t n, uint32_t before,
 
 /* The last comes into a cavity of 2 n - 4 facets: all numbers of them, where
  * there is room for their edges on the stack and where there is not. */
-TEST(cavities_of_each_size) {
+TEST_WITH(cavities_of_each_size, begin, NULL) {
     double p[HUB_MAX + 1][3] = {{0}};
     for (uint32_t n = 4; n <= HUB_MAX; n++) {
         struct host_tetrahedra first = {0}, last = {0};
@@ -91,7 +91,7 @@ TEST(cavities_of_each_size) {
     }
 }
 
-TEST(a_hub_of_thousands) {
+TEST_WITH(a_hub_of_thousands, begin, NULL) {
     static double p[SPHERE + 1][3];
     struct host_tetrahedra tets[3] = {{0}};
     static const uint32_t before[3] = {0, SPHERE, SPHERE / 2};
@@ -110,7 +110,7 @@ TEST(a_hub_of_thousands) {
 }
 
 /* All spheres are one, and it holds the hub. */
-TEST(a_hub_of_ties) {
+TEST_WITH(a_hub_of_ties, begin, NULL) {
     static double p[LATTICE + 1][3];
     struct host_tetrahedra first = {0}, last = {0};
     uint64_t count[2];
@@ -129,10 +129,10 @@ TEST(a_hub_of_ties) {
 
 /* What an owner has put down of a cell stays until the cell gives way; of the
  * new cells, which are the new point's, nothing is put down. */
-TEST(what_is_proved) {
+TEST_WITH(what_is_proved, begin, NULL) {
     static double p[SPHERE][3];
     struct scene s = {.seed = 7};
-    uint8_t state[2048];
+    uint8_t reach[2048];
     uint32_t list[2048], four[4], rows = 200;
     draw_sphere(p, rows);
     memset(p[150], 0, sizeof p[150]);
@@ -142,14 +142,14 @@ TEST(what_is_proved) {
     assert_true(scene_four(&s, 1, rows, four));
     assert_true(incode_complex_begin(&s.x, &s.tally, four));
     for (uint32_t v = 1; v <= rows; v++) {
-        uint32_t live = scene_reach(&s, state, list);
+        uint32_t live = scene_reach(&s, reach, list);
         for (uint32_t i = 0; i < live; i++)
             incode_cell_set_proved(incode_complex_cell(&s.x, list[i]),
                                    1 + v % 3);
         if (incode_complex_is_vertex(&s.x, v))
             continue;
         assert_true(incode_complex_insert(&s.x, &s.tally, v, scene_near(&s)));
-        live = scene_reach(&s, state, list);
+        live = scene_reach(&s, reach, list);
         for (uint32_t i = 0; i < live; i++) {
             const struct incode_cell *c = incode_complex_cell(&s.x, list[i]);
             bool new = incode_cell_index(c, v) < 4;
@@ -161,7 +161,7 @@ TEST(what_is_proved) {
 
 /* Cells that nobody has looked at for any number of insertions: one corner is
  * filled, then the other. */
-TEST(marks_do_not_come_back) {
+TEST_WITH(marks_do_not_come_back, begin, NULL) {
     static double p[2 * EPOCHS][3];
     struct scene s = {.seed = 7};
     uint32_t row[2 * EPOCHS], n = 0;
@@ -176,9 +176,3 @@ TEST(marks_do_not_come_back) {
     assert_true(scene_build(&s, (const double(*)[3])p, row, n));
     scene_close(&s);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(cavities_of_each_size, begin),
-          cmocka_unit_test_setup(a_hub_of_thousands, begin),
-          cmocka_unit_test_setup(a_hub_of_ties, begin),
-          cmocka_unit_test_setup(what_is_proved, begin),
-          cmocka_unit_test_setup(marks_do_not_come_back, begin))

@@ -145,7 +145,7 @@ static uint32_t fill(struct scene *s, const double (*p)[3], bool late,
     return count;
 }
 
-TEST(each_size_of_memory) {
+TEST_WITH(each_size_of_memory, begin, NULL) {
     double p[ROWS][3];
     const double(*xyz)[3] = (const double(*)[3])p;
     uint32_t cells[ROWS], row[ROWS], taken[ROWS + 1] = {0}, four[4];
@@ -186,7 +186,7 @@ TEST(each_size_of_memory) {
 }
 
 /* What is left over of 8 bytes is not used. */
-TEST(odd_sizes_of_memory) {
+TEST_WITH(odd_sizes_of_memory, begin, NULL) {
     double p[ROWS][3];
     draw_set(p);
     for (size_t odd = 0; odd < 8; odd++) {
@@ -206,7 +206,7 @@ TEST(odd_sizes_of_memory) {
 
 /* The hub of a sphere, whose cavity is a large one, is refused any number of
  * times, which leaves no traces in the marks that its neighbours meet. */
-TEST(refused_again_and_again) {
+TEST_WITH(refused_again_and_again, begin, NULL) {
     static double p[SPHERE + 1][3];
     uint32_t row[SPHERE], cells = 0, hub = SPHERE + 1;
     for (uint32_t i = 0; i < SPHERE; i++) {
@@ -240,7 +240,7 @@ TEST(refused_again_and_again) {
 }
 
 /* Indices have 16 bits. */
-TEST(points_without_number) {
+TEST_WITH(points_without_number, begin, NULL) {
     struct scene s = {.seed = 7};
     uint32_t v = 0, points = 1;
     scene_open(&s, scene_used(INCODE_COMPLEX_POINTS_MAX + 9, 0));
@@ -262,7 +262,7 @@ TEST(points_without_number) {
 /* ---- the first four ---- */
 
 /* Any order of four is the one tetrahedron. */
-TEST(either_orientation) {
+TEST_WITH(either_orientation, begin, NULL) {
     const double p[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     struct host_tetrahedra tets = {0};
     scene_append(&tets, 0, 1, 2, 3);
@@ -292,7 +292,7 @@ TEST(either_orientation) {
 
 /* Four of a plane are none, on a circle or a line or not, and others may be
  * tried. */
-TEST(four_in_a_plane) {
+TEST_WITH(four_in_a_plane, begin, NULL) {
     const double p[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                             {2, 0, 0}, {3, 0, 0}, {5, 7, 0}, {1, 2, 3}};
     static const uint32_t flat[3][4] = {
@@ -321,7 +321,7 @@ TEST(four_in_a_plane) {
 }
 
 /* What was there before leaves no traces. */
-TEST(all_is_forgotten) {
+TEST_WITH(all_is_forgotten, begin, NULL) {
     double p[ROWS][3];
     struct scene s = {.each = true, .seed = 7};
     struct host_tetrahedra tets = {0};
@@ -340,11 +340,3 @@ TEST(all_is_forgotten) {
     host_tetrahedra_free(&tets);
     scene_close(&s);
 }
-
-TEST_MAIN(cmocka_unit_test_setup(each_size_of_memory, begin),
-          cmocka_unit_test_setup(odd_sizes_of_memory, begin),
-          cmocka_unit_test_setup(refused_again_and_again, begin),
-          cmocka_unit_test_setup(points_without_number, begin),
-          cmocka_unit_test_setup(either_orientation, begin),
-          cmocka_unit_test_setup(four_in_a_plane, begin),
-          cmocka_unit_test_setup(all_is_forgotten, begin))

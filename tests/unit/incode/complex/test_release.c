@@ -204,5 +204,3 @@ TEST(any_order_of_bricks) {
     assert_true(scans > 0);
     assert_true(taken_again > 0);
 }
-
-TEST_MAIN(cmocka_unit_test(any_order_of_bricks))

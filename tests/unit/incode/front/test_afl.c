@@ -1,6 +1,4 @@
 /* The active face list against a plain array of faces. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "incode/front/afl.h"
 #include "incode/pages/bricks.h"
@@ -348,8 +346,7 @@ TEST(searches_of_long_lists) {
 
 /* Ways through lists of 0, 1 and 3 faces end in that order, and change nothing;
  * one of them leads past every face of its list. */
-static void fetched_lists(void **context) {
-    (void)context;
+TEST_WITH(fetched_lists, NULL, NULL) {
     enum { LISTS = 3 };
     static const uint32_t faces[LISTS] = {0, 3, 1}, left[] = {2, 1, 1, 0, 0};
     struct incode_afl afl;
@@ -374,8 +371,3 @@ static void fetched_lists(void **context) {
     assert_null(afl.fault);
     free(memory);
 }
-
-TEST_MAIN(cmocka_unit_test(against_plain), cmocka_unit_test(full),
-          cmocka_unit_test(crowded), cmocka_unit_test(held_of_a_long_list),
-          cmocka_unit_test(searches_of_long_lists),
-          cmocka_unit_test(fetched_lists))

@@ -1,8 +1,6 @@
 /* A front alone: an oracle that knows the triangulation answers what it asks,
  * at once, late or much later, and there is no page anywhere.  The tetrahedra
  * come out whole, each once, every brick is committed, and nothing is left. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "incode/front/front.h"
@@ -462,7 +460,3 @@ TEST(one_owner) {
         assert_int_equal(turns[k][i], 2);
     }
 }
-
-TEST_MAIN(cmocka_unit_test(sets), cmocka_unit_test(spilling),
-          cmocka_unit_test(hub), cmocka_unit_test(abandoned),
-          cmocka_unit_test(refusals), cmocka_unit_test(one_owner))

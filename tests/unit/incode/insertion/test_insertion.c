@@ -2,8 +2,6 @@
  * of memory, whether it holds all or only what is not final yet, every range of
  * bricks, small rooms outside, sets that span no space, short steps. */
 #include <pthread.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "host/mesh/gen.h"
 #include "tests/unit/emulated.h"
@@ -541,10 +539,3 @@ TEST(hardly_any_space) {
         close_world();
     }
 }
-
-TEST_MAIN(cmocka_unit_test(each_size_of_memory),
-          cmocka_unit_test(each_range_of_bricks),
-          cmocka_unit_test(jobs_that_are_left), cmocka_unit_test(rooms),
-          cmocka_unit_test(pages), cmocka_unit_test(steps_are_short),
-          cmocka_unit_test(little_stack), cmocka_unit_test(no_space),
-          cmocka_unit_test(hardly_any_space))

@@ -372,11 +372,3 @@ TEST(nothing_to_look_at) {
     }
     points_close(&scene);
 }
-
-TEST_MAIN(cmocka_unit_test(kinds_and_scales),
-          cmocka_unit_test(squares_that_underflow),
-          cmocka_unit_test(volumes_of_many_levels),
-          cmocka_unit_test(surfaces_of_many_levels),
-          cmocka_unit_test(more_than_a_call_looks_at),
-          cmocka_unit_test(what_was_wanted_before),
-          cmocka_unit_test(nothing_to_look_at))

@@ -413,7 +413,3 @@ TEST(each_bound_is_needed) {
     for (int b = NOTHING + 1; b < BOUNDS && !emulated(); b++)
         assert_true(wrong[b] > 0);
 }
-
-TEST_MAIN(cmocka_unit_test(points_in_the_boundary),
-          cmocka_unit_test(each_bound_is_needed),
-          cmocka_unit_test(decimal_lattices))

@@ -183,7 +183,3 @@ TEST(any_bricks_in_the_middle) {
     assert_int_equal(rest.count, 0);
     points_close(&scene);
 }
-
-TEST_MAIN(cmocka_unit_test(kinds_and_scales),
-          cmocka_unit_test(squares_that_underflow),
-          cmocka_unit_test(any_bricks_in_the_middle))

@@ -2,8 +2,6 @@
  * can be. */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "incode/pages/pages.h"
 #include "tests/unit/test.h"
@@ -283,15 +281,4 @@ TEST(what_is_not_sound) {
     REFUSED(bad.is_lifted[0] = 2);
     REFUSED(bad.is_lifted[2] = 1);
 #undef REFUSED
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(boxes_hold_what_was_set),
-        cmocka_unit_test(what_fits_is_exact),
-        cmocka_unit_test(what_a_lifted_box_says),
-        cmocka_unit_test(axes_are_orthonormal),
-        cmocka_unit_test(what_is_not_sound),
-    };
-    return cmocka_run_group_tests_name("boxes", tests, NULL, NULL);
 }

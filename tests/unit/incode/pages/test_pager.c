@@ -1,8 +1,6 @@
 /* The pager against a plain model: a list of pages, the most recently used
  * first, and a set of those that are on their way. */
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "incode/pages/pager.h"
 #include "tests/unit/test.h"
@@ -370,6 +368,3 @@ TEST(large_numbers) {
     assert_int_equal(pager.evictions, 1000 - FRAMES);
     free(memory);
 }
-
-TEST_MAIN(cmocka_unit_test(least_recently_used), cmocka_unit_test(shuffled),
-          cmocka_unit_test(large_numbers))

@@ -271,8 +271,3 @@ TEST(wrong_answers) {
             fault_of(cases[i].kind, cases[i].least, cases[i].how),
             cases[i].said);
 }
-
-TEST_MAIN(cmocka_unit_test(kinds), cmocka_unit_test(indexes),
-          cmocka_unit_test(spilled), cmocka_unit_test(job_larger_than_the_list),
-          cmocka_unit_test(all_faces_on_the_hull), cmocka_unit_test(empty_list),
-          cmocka_unit_test(unsound), cmocka_unit_test(wrong_answers))

@@ -1,7 +1,6 @@
 /* The self-test of the machine's arithmetic must pass here, and must name each
  * fault that can be provoked. */
 #include <fenv.h>
-#include <string.h>
 
 #include "tests/unit/test.h"
 
@@ -118,7 +117,3 @@ TEST(test_flushed) {
     skip();
 #endif
 }
-
-TEST_MAIN(cmocka_unit_test(test_sound_here), cmocka_unit_test(test_fused),
-          cmocka_unit_test(test_extended), cmocka_unit_test(test_rounding),
-          cmocka_unit_test(test_flushed))

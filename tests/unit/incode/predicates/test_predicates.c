@@ -1,8 +1,6 @@
 /* The predicates against their definitions on integers of any length, more
  * than a million cases, and each stage against the others. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#define TEST_OWN_MAIN
 
 #include "tests/unit/test.h"
 #include <zlib.h>
@@ -524,22 +522,8 @@ TEST(test_data) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_reference),
-        cmocka_unit_test(test_orient3d),
-        cmocka_unit_test(test_in_sphere),
-        cmocka_unit_test(test_in_sphere_orders_candidates),
-        cmocka_unit_test(test_compare_distance),
-        cmocka_unit_test(test_collinear),
-        cmocka_unit_test(test_lexicographic),
-        cmocka_unit_test(test_stages),
-        cmocka_unit_test(test_portable_integers),
-        cmocka_unit_test(test_two_product),
-        cmocka_unit_test(test_tally),
-        cmocka_unit_test(test_data),
-    };
     reference_start();
-    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    int failed = test_run();
     reference_stop();
     return failed;
 }

@@ -1,11 +1,9 @@
 /* Vectors against plain code, lane by lane, with infinities, signed zeros,
  * denormals and what is not a number; packs touch nothing beyond a vector. */
 #include <stdbool.h>
-#include <stdlib.h>
 
 #include "tests/unit/test.h"
 #include <math.h>
-#include <string.h>
 
 #include "incode/predicates/simd.h"
 
@@ -57,7 +55,7 @@ static int begin(void **unused) {
     return 0;
 }
 
-TEST(doubles) {
+TEST_WITH(doubles, begin, NULL) {
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < D; i++) {
@@ -80,7 +78,7 @@ TEST(doubles) {
     assert_true(same(incode_vd_all(-0.0)[D - 1], -0.0));
 }
 
-TEST(rows) {
+TEST_WITH(rows, begin, NULL) {
     for (int round = 0; round < ROUNDS; round++) {
         incode_vd row[D];
         double least[D];
@@ -98,7 +96,7 @@ TEST(rows) {
     }
 }
 
-TEST(products) {
+TEST_WITH(products, begin, NULL) {
     _Alignas(INCODE_VECTOR) double x[D], y[D];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < D; i++) {
@@ -114,7 +112,7 @@ TEST(products) {
     }
 }
 
-TEST(floats) {
+TEST_WITH(floats, begin, NULL) {
     _Alignas(INCODE_VECTOR) float x[F], y[F];
     _Alignas(INCODE_VECTOR) int32_t known[F];
     for (int round = 0; round < ROUNDS; round++) {
@@ -142,7 +140,7 @@ TEST(floats) {
     }
 }
 
-TEST(whole_numbers) {
+TEST_WITH(whole_numbers, begin, NULL) {
     _Alignas(INCODE_VECTOR) uint32_t x[F], lo[F], span[F];
     for (int round = 0; round < ROUNDS; round++) {
         for (int i = 0; i < F; i++) {
@@ -174,7 +172,7 @@ static void assert_untouched(const uint8_t *bytes, size_t size, size_t first,
         assert_true((i >= first && i < last) || bytes[i] == GUARD);
 }
 
-TEST(packs) {
+TEST_WITH(packs, begin, NULL) {
     _Alignas(INCODE_VECTOR) int32_t x[F];
     _Alignas(INCODE_VECTOR) double y[D];
     for (int round = 0; round < ROUNDS; round++) {
@@ -211,10 +209,3 @@ TEST(packs) {
         assert_untouched((void *)cut, sizeof cut, 4 * at, 4 * (at + D));
     }
 }
-
-TEST_MAIN(cmocka_unit_test_setup(doubles, begin),
-          cmocka_unit_test_setup(rows, begin),
-          cmocka_unit_test_setup(products, begin),
-          cmocka_unit_test_setup(floats, begin),
-          cmocka_unit_test_setup(whole_numbers, begin),
-          cmocka_unit_test_setup(packs, begin))

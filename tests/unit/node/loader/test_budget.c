@@ -83,7 +83,7 @@ static double years(uint32_t erased, uint64_t us) {
            365.25;
 }
 
-TEST(restarts_cannot_wear_out_a_board) {
+TEST_WITH(restarts_cannot_wear_out_a_board, blank_board, NULL) {
     uint32_t starts = 0, at_once = 0;
     while (!start()) {
         assert_true(at_once++ < 2000);
@@ -133,7 +133,7 @@ static bool bring_false(const struct made *made, bool restarts) {
     return true;
 }
 
-TEST(false_transfers_cannot_wear_out_a_slot) {
+TEST_WITH(false_transfers_cannot_wear_out_a_slot, blank_board, NULL) {
     const struct loader_layout layout = loader_layout(&chip.flash);
     uint32_t begun = 0, before[SECTORS];
     uint64_t from_us = 0;
@@ -166,7 +166,7 @@ TEST(false_transfers_cannot_wear_out_a_slot) {
 }
 
 /* Nothing is written for them, and of many few are looked at. */
-TEST(false_signatures_cost_little) {
+TEST_WITH(false_signatures_cost_little, blank_board, NULL) {
     struct made bad = one;
     (void)start();
     bad.image.signature[0] ^= 1;
@@ -192,8 +192,3 @@ TEST(false_signatures_cost_little) {
     assert_int_equal(in.phase, LOADER_TAKES);
     assert_true(loader_incoming_proved(&in));
 }
-
-TEST_MAIN(cmocka_unit_test_setup(restarts_cannot_wear_out_a_board, blank_board),
-          cmocka_unit_test_setup(false_transfers_cannot_wear_out_a_slot,
-                                 blank_board),
-          cmocka_unit_test_setup(false_signatures_cost_little, blank_board))

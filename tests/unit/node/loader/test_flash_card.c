@@ -1,7 +1,5 @@
 /* A flash on a memory card: where it is, its rules, what it asks of the card,
  * and what a block that was torn, or a card that fails, takes with it. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "node/loader/slots.h"
 #include "node/loader/flash.h"
@@ -76,7 +74,7 @@ static int take_out(void **state) {
     return 0;
 }
 
-TEST(test_the_partition_is_found) {
+TEST_WITH(test_the_partition_is_found, insert, NULL) {
     assert_int_equal(card.first, LOADER_CARD_FIRST);
     memmove(entry(2), entry(0), 16);
     entry(0)[4] = 0x0c; /* a partition of files */
@@ -96,7 +94,7 @@ TEST(test_the_partition_is_found) {
 }
 
 /* It is looked for again by who needs it. */
-TEST(test_without_it_nothing_is_taken) {
+TEST_WITH(test_without_it_nothing_is_taken, insert, NULL) {
     uint8_t bytes[4] = {0};
     uint32_t boot;
     entry(0)[4] = 0x83;
@@ -111,7 +109,7 @@ TEST(test_without_it_nothing_is_taken) {
     assert_true(loader_boots_next(&flash, &boot));
 }
 
-TEST(test_it_has_a_flash_s_rules) {
+TEST_WITH(test_it_has_a_flash_s_rules, insert, NULL) {
     uint8_t out[2 * BLOCK], in[4] = {0x0f, 0xf0, 0x55, 0xff};
     uint8_t wide[BLOCK + 1] = {0};
     size_t begin = (size_t)LOADER_CARD_FIRST * BLOCK;
@@ -144,7 +142,7 @@ TEST(test_it_has_a_flash_s_rules) {
 }
 
 /* Bytes of one block are one read; what is erased is not written. */
-TEST(test_it_asks_little_of_the_card) {
+TEST_WITH(test_it_asks_little_of_the_card, insert, NULL) {
     uint8_t out[64], in = 0;
     assert_true(flash.erase(flash.context, 3));
     assert_int_equal(device.writes, LOADER_CARD_SECTOR / BLOCK);
@@ -159,7 +157,7 @@ TEST(test_it_asks_little_of_the_card) {
                      LOADER_CARD_FIRST + 3 * LOADER_CARD_SECTOR / BLOCK);
 }
 
-TEST(test_a_card_that_fails_is_told) {
+TEST_WITH(test_a_card_that_fails_is_told, insert, NULL) {
     uint8_t byte = 0;
     uint32_t boot;
     assert_true(loader_boots_next(&flash, &boot));
@@ -176,7 +174,7 @@ TEST(test_a_card_that_fails_is_told) {
 
 /* What is told of starts and of the serial number outlives every write that
  * leaves a block of which nothing is right. */
-TEST(test_a_torn_block_takes_its_own_alone) {
+TEST_WITH(test_a_torn_block_takes_its_own_alone, insert, NULL) {
     const uint8_t name[LOADER_SERIAL_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8};
     uint8_t serial[LOADER_SERIAL_BYTES];
     static uint32_t last;
@@ -203,14 +201,4 @@ TEST(test_a_torn_block_takes_its_own_alone) {
     assert_true(last > 300);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(test_the_partition_is_found, insert),
-        cmocka_unit_test_setup(test_without_it_nothing_is_taken, insert),
-        cmocka_unit_test_setup(test_it_has_a_flash_s_rules, insert),
-        cmocka_unit_test_setup(test_it_asks_little_of_the_card, insert),
-        cmocka_unit_test_setup(test_a_card_that_fails_is_told, insert),
-        cmocka_unit_test_setup(test_a_torn_block_takes_its_own_alone, insert),
-    };
-    return cmocka_run_group_tests(tests, NULL, take_out);
-}
+TEST_GROUP(NULL, take_out)

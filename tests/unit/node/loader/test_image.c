@@ -1,6 +1,5 @@
 /* The header of an image: what it says comes back, any damage is found, and who
  * has signed it is told apart. */
-#include <string.h>
 
 #include "node/loader/image.h"
 #include "transport/bytes.h"
@@ -124,10 +123,3 @@ TEST(every_fault_has_its_text) {
     for (unsigned i = LOADER_GOOD + 1; i <= LOADER_FAULTS; i++)
         assert_non_null(loader_fault_text((enum loader_fault)i));
 }
-
-TEST_MAIN(cmocka_unit_test(what_is_packed_comes_back),
-          cmocka_unit_test(texts_fill_their_fields),
-          cmocka_unit_test(every_false_bit_is_found),
-          cmocka_unit_test(what_says_nothing_is_zero),
-          cmocka_unit_test(a_signer_is_known_by_key_and_signature),
-          cmocka_unit_test(every_fault_has_its_text))

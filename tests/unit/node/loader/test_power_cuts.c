@@ -185,12 +185,4 @@ static int make_images(void **state) {
     return 0;
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cuts_of_an_empty_board),
-        cmocka_unit_test(test_cuts_of_a_second_image),
-        cmocka_unit_test(test_cuts_of_an_image_that_fails),
-        cmocka_unit_test(test_cuts_at_random),
-    };
-    return cmocka_run_group_tests(tests, make_images, NULL);
-}
+TEST_GROUP(make_images, NULL)

@@ -47,7 +47,7 @@ static int blank_board(void **state) {
     return 0;
 }
 
-TEST(test_slots_layout) {
+TEST_WITH(test_slots_layout, blank_board, NULL) {
     static const uint32_t all[][3] = {
         {4096, 256, 1024}, {4096, 256, 64}, {4096, 256, 63}, {65536, 256, 32},
         {131072, 32, 8},   {512, 64, 45},   {4096, 256, 5},  {4096, 256, 6}};
@@ -71,7 +71,7 @@ TEST(test_slots_layout) {
     }
 }
 
-TEST(test_slots_of_an_empty_board) {
+TEST_WITH(test_slots_of_an_empty_board, blank_board, NULL) {
     assert_int_equal(starts(false), LOADER_SLOTS);
     assert_int_equal(starts(true), LOADER_SLOTS);
     memset(chip.bytes, 0, chip_size(&chip));
@@ -80,7 +80,7 @@ TEST(test_slots_of_an_empty_board) {
     assert_int_equal(starts(false), 0);
 }
 
-TEST(test_slots_install) {
+TEST_WITH(test_slots_install, blank_board, NULL) {
     assert_true(loader_slots_install(&chip.flash, old.all, old.bytes));
     assert_int_equal(starts(true), 0);
     assert_int_equal(slots.image[0].number, 5);
@@ -89,7 +89,7 @@ TEST(test_slots_install) {
 }
 
 /* Three starts that confirm nothing, or one that ends in a fault. */
-TEST(test_slots_fall_back) {
+TEST_WITH(test_slots_fall_back, blank_board, NULL) {
     for (unsigned badly = 0; badly < 2; badly++) {
         blank_board(NULL);
         bring_and_confirm(&old);
@@ -116,7 +116,7 @@ TEST(test_slots_fall_back) {
 
 /* Who turns a board off and on that is not wired yet, and each time lets it run
  * for a while, does not lose the image; one that crashes still falls back. */
-TEST(test_slots_outlive_power_cycles) {
+TEST_WITH(test_slots_outlive_power_cycles, blank_board, NULL) {
     bring_and_confirm(&old);
     bring(&new);
     for (unsigned i = 0; i < 4 * LOADER_TRIES; i++) {
@@ -143,7 +143,7 @@ TEST(test_slots_outlive_power_cycles) {
     assert_int_equal(starts(true), 0); /* it hung, however late */
 }
 
-TEST(test_slots_confirm_once) {
+TEST_WITH(test_slots_confirm_once, blank_board, NULL) {
     bring_and_confirm(&old);
     long done = chip.done;
     assert_true(chip_confirm(&chip, 0));
@@ -156,7 +156,7 @@ TEST(test_slots_confirm_once) {
 
 /* What has lost a bit is not started; the other one is, on trial, as it may be
  * one that never came up. */
-TEST(test_slots_leave_what_has_rotted) {
+TEST_WITH(test_slots_leave_what_has_rotted, blank_board, NULL) {
     bring_and_confirm(&old);
     bring_and_confirm(&new);
     assert_int_equal(starts(false), 1);
@@ -171,7 +171,7 @@ TEST(test_slots_leave_what_has_rotted) {
 }
 
 /* Neither the one in use, nor the only one that has ever come up. */
-TEST(test_slots_are_spared) {
+TEST_WITH(test_slots_are_spared, blank_board, NULL) {
     bring_and_confirm(&old); /* in slot 0 */
     spare_slot(0);
     bring(&new);
@@ -194,11 +194,10 @@ TEST(test_slots_are_spared) {
     chip.sacred_bytes = 0;
 }
 
-static void test_slots_serial(void **state) {
+TEST_WITH(test_slots_serial, blank_board, NULL) {
     static const uint8_t one[LOADER_SERIAL_BYTES] = {1, 2, 3, 4, 5, 6, 7, 8};
     static const uint8_t two[LOADER_SERIAL_BYTES] = {9};
     uint8_t serial[LOADER_SERIAL_BYTES];
-    (void)state;
     for (volatile unsigned tear = 0; tear < 40; tear++) {
         blank_board(NULL);
         chip.random = tear;
@@ -232,7 +231,7 @@ static void refuses(const struct made *made, enum loader_fault fault) {
     assert_memory_equal(before, chip.bytes, chip_size(&chip));
 }
 
-TEST(test_slots_refuse) {
+TEST_WITH(test_slots_refuse, blank_board, NULL) {
     bring_and_confirm(&old);
     struct made bad = new;
     bad.all[20] ^= 1;
@@ -276,7 +275,7 @@ TEST(test_slots_refuse) {
     assert_int_equal(starts(false), 0);
 }
 
-TEST(test_slots_have_no_way_back) {
+TEST_WITH(test_slots_have_no_way_back, blank_board, NULL) {
     bring_and_confirm(&old);
     struct made strict = new;
     strict.image.flags = LOADER_NO_WAY_BACK;
@@ -297,7 +296,7 @@ TEST(test_slots_have_no_way_back) {
 
 /* --- blocks --------------------------------------------------------------- */
 
-TEST(test_slots_take_blocks_in_any_order) {
+TEST_WITH(test_slots_take_blocks_in_any_order, blank_board, NULL) {
     memset(chip.bytes, 0x5a, chip_size(&chip));
     begin(&old);
     for (uint32_t b = in.blocks; b-- > 0;) {
@@ -313,7 +312,7 @@ TEST(test_slots_take_blocks_in_any_order) {
     assert_int_equal(starts(false), 0);
 }
 
-TEST(test_slots_pass_over_bad_blocks) {
+TEST_WITH(test_slots_pass_over_bad_blocks, blank_board, NULL) {
     uint8_t block[LOADER_BLOCK_BYTES + 1] = {0};
     begin(&old);
     memcpy(block, old.all + LOADER_BLOCK_BYTES, LOADER_BLOCK_BYTES);
@@ -335,7 +334,7 @@ TEST(test_slots_pass_over_bad_blocks) {
 }
 
 /* Blocks whose CRC is right, and which are not what was signed. */
-TEST(test_slots_refuse_another_code) {
+TEST_WITH(test_slots_refuse_another_code, blank_board, NULL) {
     bring_and_confirm(&old);
     struct made bad = new;
     bad.all[2000] ^= 1;
@@ -349,7 +348,7 @@ TEST(test_slots_refuse_another_code) {
     assert_int_equal(starts(false), 1);
 }
 
-TEST(test_slots_go_on) {
+TEST_WITH(test_slots_go_on, blank_board, NULL) {
     begin(&old);
     chip_block(&in, &old, 2);
     chip_block(&in, &old, 0);
@@ -366,7 +365,7 @@ TEST(test_slots_go_on) {
 
 /* Without a restart: the same again changes nothing; what is refused costs
  * nothing of what has come; another image takes its place. */
-TEST(test_slots_begin_in_the_midst) {
+TEST_WITH(test_slots_begin_in_the_midst, blank_board, NULL) {
     bring_and_confirm(&old);
     begin(&new);
     chip_block(&in, &new, 2);
@@ -414,7 +413,7 @@ static void starts_not(const struct made *made, enum loader_fault fault) {
     assert_int_equal(slots.fault[0], fault);
 }
 
-TEST(test_slots_start_what_is_signed) {
+TEST_WITH(test_slots_start_what_is_signed, blank_board, NULL) {
     static struct made bad;
     uint32_t boot;
     for (unsigned bit = 0; bit < 8 * SIGN_BYTES; bit += 37) {
@@ -441,7 +440,7 @@ TEST(test_slots_start_what_is_signed) {
 
 /* What runs is what was signed, also where the flash gives something else by
  * then, of code or header. */
-TEST(test_slots_look_at_the_copy) {
+TEST_WITH(test_slots_look_at_the_copy, blank_board, NULL) {
     struct loader_look look;
     uint8_t *code = new.all + LOADER_HEADER_BYTES;
     bring_and_confirm(&new);
@@ -455,7 +454,7 @@ TEST(test_slots_look_at_the_copy) {
     assert_int_equal(slots.fault[0], LOADER_WRONG_DIGEST);
 }
 
-TEST(test_slots_tell_of_a_worn_flash) {
+TEST_WITH(test_slots_tell_of_a_worn_flash, blank_board, NULL) {
     bring_and_confirm(&old);
     chip.worn = 5 + 20 + 3; /* in slot 1 */
     begin(&new);
@@ -467,7 +466,7 @@ TEST(test_slots_tell_of_a_worn_flash) {
 }
 
 /* It would only restart, again and again, and lose what it had. */
-TEST(test_slots_wait_where_no_start_is_recorded) {
+TEST_WITH(test_slots_wait_where_no_start_is_recorded, blank_board, NULL) {
     uint32_t boot = 0, programs;
     bring_and_confirm(&old);
     assert_int_equal(loader_slots_start(&slots, &chip_rules, false, &boot), 0);
@@ -493,7 +492,7 @@ TEST(test_slots_wait_where_no_start_is_recorded) {
 }
 
 /* A trial that cannot be counted would have no end. */
-TEST(test_slots_wait_where_no_trial_is_counted) {
+TEST_WITH(test_slots_wait_where_no_trial_is_counted, blank_board, NULL) {
     bring(&old);
     chip.worn_out = true;
     for (unsigned i = 0; i < 2 * LOADER_TRIES; i++) {
@@ -502,28 +501,3 @@ TEST(test_slots_wait_where_no_trial_is_counted) {
         assert_true(slots.worn);
     }
 }
-
-TEST_MAIN(cmocka_unit_test_setup(test_slots_layout, blank_board),
-          cmocka_unit_test_setup(test_slots_of_an_empty_board, blank_board),
-          cmocka_unit_test_setup(test_slots_install, blank_board),
-          cmocka_unit_test_setup(test_slots_fall_back, blank_board),
-          cmocka_unit_test_setup(test_slots_outlive_power_cycles, blank_board),
-          cmocka_unit_test_setup(test_slots_confirm_once, blank_board),
-          cmocka_unit_test_setup(test_slots_leave_what_has_rotted, blank_board),
-          cmocka_unit_test_setup(test_slots_are_spared, blank_board),
-          cmocka_unit_test_setup(test_slots_serial, blank_board),
-          cmocka_unit_test_setup(test_slots_refuse, blank_board),
-          cmocka_unit_test_setup(test_slots_have_no_way_back, blank_board),
-          cmocka_unit_test_setup(test_slots_take_blocks_in_any_order,
-                                 blank_board),
-          cmocka_unit_test_setup(test_slots_pass_over_bad_blocks, blank_board),
-          cmocka_unit_test_setup(test_slots_refuse_another_code, blank_board),
-          cmocka_unit_test_setup(test_slots_go_on, blank_board),
-          cmocka_unit_test_setup(test_slots_begin_in_the_midst, blank_board),
-          cmocka_unit_test_setup(test_slots_start_what_is_signed, blank_board),
-          cmocka_unit_test_setup(test_slots_look_at_the_copy, blank_board),
-          cmocka_unit_test_setup(test_slots_tell_of_a_worn_flash, blank_board),
-          cmocka_unit_test_setup(test_slots_wait_where_no_start_is_recorded,
-                                 blank_board),
-          cmocka_unit_test_setup(test_slots_wait_where_no_trial_is_counted,
-                                 blank_board))

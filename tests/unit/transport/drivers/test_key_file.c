@@ -2,8 +2,6 @@
  * what is no key is told; and a process that has one leaves no copies. */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
@@ -143,12 +141,4 @@ TEST(a_key_leaves_no_core_and_no_copy) {
     assert_int_equal(core.rlim_cur + core.rlim_max, 0);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_key_leaves_no_core_and_no_copy),
-        cmocka_unit_test(others_that_can_write_it_are_refused),
-        cmocka_unit_test(another_users_is_refused),
-        cmocka_unit_test(what_is_no_key_is_told),
-    };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
-}
+TEST_GROUP(make_folder, remove_folder)

@@ -1,6 +1,6 @@
 /* Pipes over MPI, from a rank to itself: what goes in comes out, whole and in
  * order, room is bounded, the end is noticed, and sleep ends when it should. */
-#include <string.h>
+#define TEST_OWN_MAIN
 
 #include <time.h>
 
@@ -40,7 +40,7 @@ static int close_end(void **unused) {
 }
 
 /* Pieces of all sizes, read in others. */
-TEST(bytes_come_out_as_they_went_in) {
+TEST_WITH(bytes_come_out_as_they_went_in, open_end, close_end) {
     static uint8_t bytes[200000], got[sizeof bytes];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
@@ -61,7 +61,7 @@ TEST(bytes_come_out_as_they_went_in) {
     assert_memory_equal(bytes, got, sizeof bytes);
 }
 
-TEST(a_pipe_that_is_not_read_takes_no_more) {
+TEST_WITH(a_pipe_that_is_not_read_takes_no_more, open_end, close_end) {
     static uint8_t bytes[MPI_PIPE_BYTES];
     struct link_pipe pipe = mpi_link_pipe(&end);
     size_t sent = 0, received = 0;
@@ -80,7 +80,7 @@ TEST(a_pipe_that_is_not_read_takes_no_more) {
     assert_false(end.blocked);
 }
 
-TEST(sleep_ends_with_time_or_bytes) {
+TEST_WITH(sleep_ends_with_time_or_bytes, open_end, close_end) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t byte = 1;
     uint64_t start = clock_us(); /* clock: sleep is no shorter, and ends
@@ -94,7 +94,7 @@ TEST(sleep_ends_with_time_or_bytes) {
     assert_int_equal(pipe.receive(pipe.context, &byte, 1), 1);
 }
 
-TEST(an_end_is_noticed) {
+TEST_WITH(an_end_is_noticed, open_end, close_end) {
     struct link_pipe pipe = mpi_link_pipe(&end);
     uint8_t bytes[8] = "last";
     assert_int_equal(pipe.send(pipe.context, bytes, sizeof bytes), 8);
@@ -108,19 +108,10 @@ TEST(an_end_is_noticed) {
 }
 
 int main(int argc, char **argv) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(bytes_come_out_as_they_went_in,
-                                        open_end, close_end),
-        cmocka_unit_test_setup_teardown(a_pipe_that_is_not_read_takes_no_more,
-                                        open_end, close_end),
-        cmocka_unit_test_setup_teardown(sleep_ends_with_time_or_bytes, open_end,
-                                        close_end),
-        cmocka_unit_test_setup_teardown(an_end_is_noticed, open_end, close_end),
-    };
     MPI_Init(&argc, &argv);
     if (mpi_place_open(&place) != 0)
         return 1;
-    int failed = cmocka_run_group_tests(tests, NULL, NULL);
+    int failed = test_run();
     mpi_place_close(&place);
     MPI_Finalize();
     return failed;

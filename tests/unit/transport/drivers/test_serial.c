@@ -1,13 +1,10 @@
 /* Serial wires: pseudo-terminals pass every byte, wires that break come back, a
  * port in use is named with its user, and a link fills a paced wire. */
-#include <stdlib.h>
-#include <string.h>
 
 #include <fcntl.h>
 #include <linux/magic.h>
 #include <poll.h>
 #include <signal.h>
-#include <stdio.h>
 #include <sys/socket.h>
 #include <sys/vfs.h>
 #include <sys/wait.h>
@@ -493,14 +490,3 @@ TEST(little_is_written_ahead) {
     close(fds[0]);
     close(fds[1]);
 }
-
-TEST_MAIN(cmocka_unit_test(a_pair_passes_every_byte),
-          cmocka_unit_test(a_wire_that_breaks_comes_back),
-          cmocka_unit_test(rates_and_modes),
-          cmocka_unit_test(a_port_in_use_says_by_whom),
-          cmocka_unit_test(who_made_a_terminal_is_no_user),
-          cmocka_unit_test(a_link_is_followed_each_time),
-          cmocka_unit_test(ports_that_are_not_there),
-          cmocka_unit_test(a_clean_wire_resends_nothing),
-          cmocka_unit_test(a_link_fills_a_paced_wire),
-          cmocka_unit_test(little_is_written_ahead))

@@ -1,7 +1,5 @@
 /* Wires in virtual time: rate, latency, room, what strikes them, and that the
  * same seed is the same wire. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "transport/drivers/sim.h"
 #include "tests/unit/test.h"
@@ -211,9 +209,3 @@ TEST(wires_fail_one_way_and_both) {
     assert_int_equal(lab->wire.direction[0].struck[SIM_DEAF], 1);
     free(lab);
 }
-
-TEST_MAIN(cmocka_unit_test(bytes_take_their_time),
-          cmocka_unit_test(a_full_wire_takes_no_more),
-          cmocka_unit_test(faults_strike_as_often_as_they_should),
-          cmocka_unit_test(a_frame_meets_its_fate),
-          cmocka_unit_test(wires_fail_one_way_and_both))

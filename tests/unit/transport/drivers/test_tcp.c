@@ -1,13 +1,11 @@
 /* Pipes over TCP: pairs are what they claim to be, a link runs over them, and
  * an end that goes away is noticed. */
-#include <string.h>
 
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <stdlib.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -167,8 +165,3 @@ TEST(what_was_heard_spares_one_call) {
     assert_int_equal(to.receive(to.context, &byte, 1), LINK_PIPE_CLOSED);
     close(fds[1]);
 }
-
-TEST_MAIN(cmocka_unit_test(a_pair_is_connected_and_set_up),
-          cmocka_unit_test(a_pipe_tells_room_and_end),
-          cmocka_unit_test(what_was_heard_spares_one_call),
-          cmocka_unit_test(a_link_over_tcp))

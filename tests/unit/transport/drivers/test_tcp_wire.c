@@ -431,17 +431,3 @@ TEST(openings_are_drawn_from_the_board) {
     close_end(&ends[0]);
     close_end(&ends[1]);
 }
-
-TEST_MAIN(cmocka_unit_test(addresses), cmocka_unit_test(paths),
-          cmocka_unit_test(wires_that_break_go_on),
-          cmocka_unit_test(another_key_never_connects),
-          cmocka_unit_test(a_lone_key_is_told_of),
-          cmocka_unit_test(another_key_that_is_gone_is_forgotten),
-          cmocka_unit_test(one_who_is_led_elsewhere_ends_nothing),
-          cmocka_unit_test(strangers_change_nothing),
-          cmocka_unit_test(strangers_without_a_key_change_nothing),
-          cmocka_unit_test(a_flood_keeps_nobody_out),
-          cmocka_unit_test(a_silent_caller_is_taken_for_want_of_a_better),
-          cmocka_unit_test(a_lost_proof_is_asked_for_again),
-          cmocka_unit_test(without_a_key_only_if_it_is_meant),
-          cmocka_unit_test(openings_are_drawn_from_the_board))

@@ -113,11 +113,4 @@ TEST(another_user_is_sent_away) {
     tcp_wire_close(&wire);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_path_is_a_wire),
-        cmocka_unit_test(left_over_files_are_replaced_and_no_others),
-        cmocka_unit_test(another_user_is_sent_away),
-    };
-    return cmocka_run_group_tests(tests, make_directory, remove_directory);
-}
+TEST_GROUP(make_directory, remove_directory)

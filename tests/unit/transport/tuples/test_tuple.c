@@ -1,6 +1,5 @@
 /* Tuples as bytes: what is written is read, whatever its fields; nothing else
  * is read; and templates match what they say. */
-#include <string.h>
 
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
@@ -123,6 +122,3 @@ TEST(spreads) {
     for (unsigned i = 0; i < 7; i++)
         assert_true(count[i] > 850 && count[i] < 1150);
 }
-
-TEST_MAIN(cmocka_unit_test(round_trip), cmocka_unit_test(matches),
-          cmocka_unit_test(spreads))

@@ -466,9 +466,3 @@ TEST(survives_nonsense) {
     }
     assert_true(sound > 300);
 }
-
-TEST_MAIN(cmocka_unit_test(equals_model), cmocka_unit_test(first_come),
-          cmocka_unit_test(pushes_back), cmocka_unit_test(room_in_order),
-          cmocka_unit_test(begins_anew), cmocka_unit_test(gives_up),
-          cmocka_unit_test(evaluates), cmocka_unit_test(keeps_limits),
-          cmocka_unit_test(survives_nonsense))

@@ -47,5 +47,3 @@ TEST(tells_wrong) {
     h.call[1][0].ended = NEVER; /* they wait for what is there */
     assert_false(is_explained(&h));
 }
-
-TEST_MAIN(cmocka_unit_test(explained), cmocka_unit_test(tells_wrong))

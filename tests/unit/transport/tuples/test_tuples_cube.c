@@ -202,5 +202,3 @@ TEST(triangulates) {
         }
     }
 }
-
-TEST_MAIN(cmocka_unit_test(triangulates))

@@ -16,5 +16,3 @@ TEST(found) {
     print_message("found by %u seeds of %u\n", wrong, (unsigned)SEEDS);
     assert_true(wrong > 0);
 }
-
-TEST_MAIN(cmocka_unit_test(found))

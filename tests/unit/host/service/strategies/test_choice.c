@@ -1,5 +1,4 @@
 /* The table of strategies, and the choice among them. */
-#include <string.h>
 
 #include "host/service/strategies/strategies.h"
 #include "tests/unit/test.h"
@@ -83,5 +82,3 @@ TEST(test_auto) {
     task.with_host = false;
     assert_ptr_equal(best_of(&task), &host_spatial);
 }
-
-TEST_MAIN(cmocka_unit_test(test_table), cmocka_unit_test(test_auto))

@@ -2,7 +2,6 @@
  * commits, and what a loss leaves; and what holds for every row of the table.
  */
 #include <math.h>
-#include <stdio.h>
 
 #include "begun_strategy.h"
 
@@ -364,17 +363,4 @@ TEST(test_arena) {
     }
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sequential),
-        cmocka_unit_test(test_spatial_first),
-        cmocka_unit_test(test_spatial_loss),
-        cmocka_unit_test(test_spatial_restart),
-        cmocka_unit_test(test_master_slaves),
-        cmocka_unit_test(test_hybrid),
-        cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_lost_tetrahedra),
-        cmocka_unit_test(test_arena),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_GROUP(set_up, tear_down)
