@@ -1,8 +1,8 @@
 /* What every unit test includes: cmocka with the headers that it asks for, and
  * tests that list themselves, in the order in which they stand.
  *
- *     TEST(test_sum) { assert_int_equal(sum(1, 2), 3); }
- *     TEST_WITH(test_file, open_file, close_file) { use(*fixture); }
+ *   TEST(test_sum) { assert_int_equal(sum(1, 2), 3); }
+ *   TEST_WITH(test_file, open_file, close_file) { use(*fixture); }
  */
 #ifndef TESTS_UNIT_TEST_H
 #define TESTS_UNIT_TEST_H
