@@ -8,7 +8,7 @@
 #define NODE_ANSWERS_H
 
 #include "board.h"
-#include "setup.h"
+#include "common.h"
 #include "message.h"
 
 enum {

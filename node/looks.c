@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "setup.h"
+#include "common.h"
 
 enum {
     LOOK_US = 50000,

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "answers.h"
-#include "setup.h"
+#include "common.h"
 #include "incode/predicates/check.h"
 #include "looks.h"
 #include "node/roles/roles.h"

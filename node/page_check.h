@@ -18,7 +18,7 @@
 
 #include <stdbool.h>
 
-#include "setup.h"
+#include "common.h"
 #include "message.h"
 
 /* HalfSipHash-2-4 of some words, then some bytes. */

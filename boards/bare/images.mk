@@ -146,7 +146,7 @@ bare_sign = $(bare_copy_$(1)) -O binary $< $@ && \
 # distribution's libsodium, made small (boards/bare/libsodium).
 loader_parts := boards/bare/loader.c boards/sodium_utils.c \
 	transport/drivers/sign_sodium.c $(wildcard node/loader/*.c transport/*.c) \
-	$(addprefix node/,answers.c setup.c identity.c looks.c)
+	$(addprefix node/,answers.c common.c identity.c looks.c)
 sodium       := $(BUILD)/libsodium
 sodium_parts := crypto_generichash/blake2b/ref/blake2b-compress-ref \
 	crypto_generichash/blake2b/ref/blake2b-ref \

@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "parts.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 enum {
     CHECK_EVERY_US = 20000,

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "sim_draw.h"
 #include "transport/tuples/tuples.h"
 

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "transport/cube_internal.h"
 #include "transport/routes.h"
 #include "sim_stand_ins.h"

@@ -5,7 +5,7 @@
 #include "incode/predicates/check.h"
 #include "incoming.h"
 #include "node/answers.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/looks.h"
 #include "node/version.h"
 #include "transport/text.h"

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "manager.h"
 #include "incode/paper/builder.h"
 #include "lists.h"

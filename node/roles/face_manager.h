@@ -8,7 +8,7 @@
 #include "lists.h"
 #include "incode/paper/manager.h"
 #include "triangulation.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "outlet.h"
 
 struct node_face_manager {

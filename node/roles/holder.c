@@ -4,7 +4,7 @@
 
 #include "incode/pages/pages.h"
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/page_check.h"
 
 struct frame {

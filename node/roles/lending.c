@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 static uint32_t queue_max(uint32_t nodes) {
     return (nodes - 1) * NODE_PAGES_LENT_MAX;

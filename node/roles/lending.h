@@ -12,7 +12,7 @@
 #include <stdbool.h>
 
 #include "incode/front/job.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "incode/triangulator.h"
 #include "node/page_check.h"

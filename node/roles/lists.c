@@ -4,7 +4,7 @@
 
 #include "incode/paper/list.h"
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 size_t node_lists_bytes(uint32_t places) {
     return node_aligned(NODE_OUTBOX_BYTES(places));

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "node/result.h"
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 enum {
     HEADER_BYTES = sizeof(struct node_result_header),

@@ -5,7 +5,7 @@
 #define NODE_OUTLET_H
 
 #include "incode/front/job.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/result.h"
 
 struct node_outlet {

@@ -4,7 +4,7 @@
 
 #include "incode/pages/pages.h"
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 /* A bit in a wanted page's number: the page is to come from the host, even if a
  * node keeps it.  No page has so high a number. */

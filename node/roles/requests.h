@@ -11,7 +11,7 @@
 
 #include "incode/pages/pager.h"
 #include "lending.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "node/page_check.h"
 

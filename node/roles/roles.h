@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 
 struct node_role {

@@ -4,7 +4,7 @@
 
 #include "incode/paper/list.h"
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 enum {
     HEAD = 2 + 2 + 4 + 2, /* bytes of a tuple (kind, bytes) beside them */

@@ -12,7 +12,7 @@
 #define NODE_SHARE_H
 
 #include "lists.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "transport/tuples/tuples.h"
 

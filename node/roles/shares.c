@@ -4,7 +4,7 @@
 
 #include "incode/pages/bricks.h"
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 
 enum { OTHERS_MAX = 3 /* owners of the other vertices of a tetrahedron */ };
 

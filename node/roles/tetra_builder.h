@@ -7,7 +7,7 @@
 
 #include "lists.h"
 #include "incode/paper/builder.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "requests.h"
 
 struct node_tetra_builder {

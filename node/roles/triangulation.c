@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "incode/predicates/check.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "worker.h"
 
 void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,

@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "outlet.h"
 #include "requests.h"

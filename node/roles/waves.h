@@ -22,7 +22,7 @@
 
 #include <stdbool.h>
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 
 enum { NODE_WAVES_UNCHANGED = 1000, NODE_WAVES_UNCHANGED_US = 60000000 };

@@ -1,6 +1,6 @@
 /* Texts of faults: what a node tells its user. */
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/message.h"
 #include "tests/unit/test.h"
 

@@ -1,6 +1,6 @@
 /* Results that wait for more. */
 
-#include "node/setup.h"
+#include "node/common.h"
 #include "node/roles/outlet.h"
 #include "tests/unit/test.h"
 

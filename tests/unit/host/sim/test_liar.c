@@ -2,7 +2,7 @@
  * it is to, nothing else, and always so that what leaves is a message. */
 
 #include "host/sim/liar.h"
-#include "node/setup.h"
+#include "node/common.h"
 #include "transport/drivers/sim.h"
 #include "transport/tuples/tuples.h"
 #include "tests/unit/test.h"

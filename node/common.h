@@ -1,6 +1,7 @@
-/* What a setup must be before a role looks at it. */
-#ifndef NODE_SETUP_H
-#define NODE_SETUP_H
+/* What all roles of a node share: faults, the check of a setup, counted messages,
+ * the keepers of pages, the arena, and the pace of work. */
+#ifndef NODE_COMMON_H
+#define NODE_COMMON_H
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,4 +1,4 @@
-#include "setup.h"
+#include "common.h"
 
 #include <string.h>
 
