@@ -77,9 +77,9 @@ struct incode_triangulator *incode_triangulator_init(
     memcpy(points.lo, setup->lo, sizeof points.lo);
     memcpy(points.hi, setup->hi, sizeof points.hi);
     memcpy(points.cells, setup->cells, sizeof points.cells);
-    struct incode_pause pause = outside->pause;
+    struct incode_yield yield = outside->yield;
     memset(t, 0, sizeof *t);
-    incode_breathe(&pause, INCODE_PAUSE_UNITS);
+    incode_yield_after(&yield, INCODE_YIELD_UNITS);
     t->map = map;
     t->shares = shares;
     size_t bits = incode_arena_bits(setup, bytes);
@@ -92,11 +92,11 @@ struct incode_triangulator *incode_triangulator_init(
     t->phase = INCODE_PHASE_IDLE;
     size_t maker = incode_maker_bytes(&shares.maker);
     incode_maker_init(&t->maker, t->arena, &shares.maker, &points,
-                      &outside->pages, &pause);
-    incode_maker_breathe(&t->maker, INCODE_PAUSE_UNITS);
+                      &outside->pages, &yield);
+    incode_maker_yield(&t->maker, INCODE_YIELD_UNITS);
     incode_front_init(&t->front, t->arena + maker, &shares.front, setup->bricks,
                       (enum incode_face_rule)setup->face_rule, &outside->front,
-                      &t->maker.counts.tally.pause);
+                      &t->maker.counts.tally.yield);
     t->front.owner_rule = (enum incode_owner_rule)setup->owner_rule;
     if (outside->peers.share != NULL)
         incode_front_exchange(&t->front, &outside->peers, setup->lo,

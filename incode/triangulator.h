@@ -90,7 +90,7 @@ struct incode_outside {
      * none. */
     struct incode_front_peers peers;
     /* Who is called while a step is long; look = NULL: nobody. */
-    struct incode_pause pause;
+    struct incode_yield yield;
 };
 
 /* The memory map, in bytes but for the three counts.  control, frames, afl and

@@ -1,5 +1,5 @@
-/* What all roles of a node share: faults, the check of a setup, counted messages,
- * the keepers of pages, the arena, and the pace of work. */
+/* What all roles of a node share: faults, the check of a setup, counted
+ * messages, the keepers of pages, the arena, and the pace of work. */
 #ifndef NODE_COMMON_H
 #define NODE_COMMON_H
 
@@ -8,7 +8,7 @@
 #include <stdint.h>
 
 #include "message.h"
-#include "incode/predicates/pause.h"
+#include "incode/predicates/yield.h"
 #include "transport/cube.h"
 
 /* Why a node cannot go on, as a text with figures for its user.  The first
@@ -42,7 +42,7 @@ struct node_counted {
     struct cube *cube;
     uint16_t self;             /* the node's number */
     uint32_t received, sent;   /* from and to the host, in this generation */
-    struct incode_pause pause; /* what looks at the links in long work */
+    struct incode_yield yield; /* what looks at the links in long work */
     /* The board's `write` and its context, or NULL: see board.h. */
     int (*write)(void *context, struct node_counted *counted, uint16_t dest,
                  uint8_t type, const void *data, size_t size);

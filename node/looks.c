@@ -52,7 +52,7 @@ static void measure(struct node_looks *looks, uint64_t passed_us) {
                          : looks->unit_ns - (looks->unit_ns - unit_ns) / FALL;
     uint64_t fit = CLOCK_US * UINT64_C(1000) / (looks->unit_ns + 1);
     looks->units = fit < UNITS_MIN                ? UNITS_MIN
-                   : fit > INCODE_PAUSE_UNITS_MAX ? INCODE_PAUSE_UNITS_MAX
+                   : fit > INCODE_YIELD_UNITS_MAX ? INCODE_YIELD_UNITS_MAX
                                                   : (uint32_t)fit;
 }
 
@@ -70,10 +70,10 @@ void node_looks_between(struct node_looks *looks) {
         (void)tend(looks, looks->board->now_us(looks->board->context));
 }
 
-static uint32_t at_pause(void *context) {
+static uint32_t at_yield(void *context) {
     struct node_looks *looks = context;
     if (!looks->tends)
-        return INCODE_PAUSE_UNITS_MAX;
+        return INCODE_YIELD_UNITS_MAX;
     uint64_t now_us = looks->board->now_us(looks->board->context);
     if (looks->working)
         measure(looks, now_us - looks->paused_us);
@@ -83,8 +83,8 @@ static uint32_t at_pause(void *context) {
     return looks->units;
 }
 
-struct incode_pause node_looks_pause(struct node_looks *looks) {
-    return (struct incode_pause){.look = at_pause, .context = looks};
+struct incode_yield node_looks_yield(struct node_looks *looks) {
+    return (struct incode_yield){.poll = at_yield, .context = looks};
 }
 
 void node_looks_idle(struct node_looks *looks) {

@@ -5,7 +5,7 @@
 #define NODE_LOOKS_H
 
 #include "board.h"
-#include "incode/predicates/pause.h"
+#include "incode/predicates/yield.h"
 #include "message.h"
 
 struct node_looks {
@@ -38,7 +38,7 @@ unsigned node_looks_poll(struct node_looks *looks, uint64_t now_us);
 /* For a role in the midst of its work: looks at the clock, and tends the links
  * where NODE_PACE_US / 4 have passed.  Nothing that came is given to the role
  * meanwhile, and its node stays in the generation that it is in. */
-struct incode_pause node_looks_pause(struct node_looks *looks);
+struct incode_yield node_looks_yield(struct node_looks *looks);
 
 /* The node sleeps now: the time until the next poll is no matter of its. */
 void node_looks_idle(struct node_looks *looks);

@@ -94,7 +94,7 @@ struct node *node_start(const struct node_board *board, const char **why) {
     node_looks_init(&node->looks, board, node->cube);
     node->counted.cube = node->cube;
     node->counted.self = board->identity.self;
-    node->counted.pause = node_looks_pause(&node->looks);
+    node->counted.yield = node_looks_yield(&node->looks);
     node->counted.write = board->write;
     node->counted.context = board->context;
     node_answers_init(&node->answers, board, &node->counted);

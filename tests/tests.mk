@@ -15,7 +15,7 @@ $(own_libc): private HOSTED += -fno-builtin -fno-tree-loop-distribute-patterns \
 # incode/ once more, for tests that count the basic blocks it executes: the same
 # code on every machine, whatever vectors and sanitizers the others are made for.
 counted := $(patsubst %.c,$(BUILD)/counted/%.o,$(filter incode/%,$(freestanding)))
-$(BUILD)/tests/test_pause $(BUILD)/tests/test_pace: $(counted)
+$(BUILD)/tests/test_yield $(BUILD)/tests/test_pace: $(counted)
 $(BUILD)/counted/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<

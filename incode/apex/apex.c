@@ -15,14 +15,14 @@
 /* ---- among the local points ---- */
 
 enum {
-    CONSIDER_UNITS = 2, /* of incode/predicates/pause.h */
+    CONSIDER_UNITS = 2, /* of incode/predicates/yield.h */
     FACE_UNITS = 10,
     POINTS_A_UNIT = 4 /* of a look at all of them */
 };
 
-static void breathe_over_points(const struct incode_make *n) {
+static void yield_over_points(const struct incode_make *n) {
     struct incode_maker *m = n->maker;
-    incode_maker_breathe(m, FACE_UNITS + m->local.near / POINTS_A_UNIT);
+    incode_maker_yield(m, FACE_UNITS + m->local.near / POINTS_A_UNIT);
 }
 
 /* A regular face's circumcentre is right to 1e-9 of its distance: the sine of
@@ -59,7 +59,7 @@ static void consider(struct incode_make *n, uint32_t i) {
     struct incode_tally *tally = &n->maker->counts.tally;
     if (i == n->b || i == n->c || i == n->best || i == local->self)
         return;
-    incode_breathe(&tally->pause, CONSIDER_UNITS);
+    incode_yield_after(&tally->yield, CONSIDER_UNITS);
     double p[3], r[3];
     incode_local_relative(local, i, r);
     bool any = n->best != INCODE_LOCAL_NONE, inside = !any;
@@ -84,7 +84,7 @@ static void consider(struct incode_make *n, uint32_t i) {
     memcpy(n->store[3], p, sizeof p);
     incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
     if (incode_sphere_is_ill_conditioned(&n->sphere)) {
-        incode_breathe(&tally->pause, INCODE_FINE_UNITS);
+        incode_yield_after(&tally->yield, INCODE_FINE_UNITS);
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, p, local->scale);
     }
 }
@@ -95,7 +95,7 @@ void incode_make_sphere(struct incode_make *n) {
     incode_local_relative(&n->maker->local, n->best, r);
     incode_sphere_apex(&n->sphere, n->rb, n->rc, r);
     if (incode_sphere_is_ill_conditioned(&n->sphere)) {
-        incode_maker_breathe(n->maker, INCODE_FINE_UNITS);
+        incode_maker_yield(n->maker, INCODE_FINE_UNITS);
         incode_sphere_refine(&n->sphere, n->pv, n->pb, n->pc, n->store[3],
                              n->maker->local.scale);
     }
@@ -123,7 +123,7 @@ static bool rank_first(struct incode_make *n, const uint16_t *first,
             if (close.count < INCODE_CLOSE_MAX)
                 continue;
         }
-        incode_maker_breathe(n->maker, INCODE_CLOSE_UNITS);
+        incode_maker_yield(n->maker, INCODE_CLOSE_UNITS);
         uint32_t k = incode_close_first(&close, n->pv, n->pb, n->pc,
                                         local->scale, &n->maker->counts.tally);
         if (k == INCODE_CLOSE_NONE)
@@ -144,7 +144,7 @@ static bool contest_first(struct incode_make *n, double *t) {
     uint16_t first[INCODE_NEAR_ALL];
     double most;
     uint32_t only = INCODE_LOCAL_NONE, others = 0;
-    breathe_over_points(n);
+    yield_over_points(n);
     uint32_t count = incode_local_first(local, &n->pencil, &most, first);
     for (uint32_t i = 0; i < count; i++) {
         if (first[i] == n->b || first[i] == n->c || first[i] == local->self)
@@ -183,7 +183,7 @@ static uint32_t deepest(const struct incode_make *n, const uint16_t *inside,
     const struct incode_local_points *local = &n->maker->local;
     uint32_t at = inside[0];
     double most = -__builtin_inf();
-    incode_maker_breathe(n->maker, count / POINTS_A_UNIT);
+    incode_maker_yield(n->maker, count / POINTS_A_UNIT);
     for (uint32_t i = 0; i < count; i++) {
         double r[3];
         incode_local_relative(local, inside[i], r);
@@ -212,7 +212,7 @@ static void contest(struct incode_make *n) {
         return;
     for (uint32_t best = INCODE_LOCAL_NONE; best != n->best;) {
         best = n->best;
-        breathe_over_points(n);
+        yield_over_points(n);
         uint32_t count = incode_local_inside(local, &n->sphere, inside);
         if (count > 0)
             consider(n, deepest(n, inside, count));
@@ -269,7 +269,7 @@ void incode_search_from(struct incode_make *n, struct incode_search *s) {
     if (n->bare)
         incode_make_sphere(n);
     q->sphere = n->sphere;
-    incode_maker_breathe(n->maker, INCODE_LESSEN_UNITS);
+    incode_maker_yield(n->maker, INCODE_LESSEN_UNITS);
     incode_query_start(q, local->id[n->best], n->store[3]);
     incode_search_last(n->maker, s);
     q->done = true;
@@ -291,7 +291,7 @@ static bool is_doubtful(const struct incode_make *n) {
         return !n->bare && incode_sphere_is_near_degenerate(s);
     if (!n->regular)
         return true;
-    breathe_over_points(n);
+    yield_over_points(n);
     for (uint32_t i = 0; i < local->near && count < COPLANAR_POINTS; i++) {
         uint32_t at = local->at[i];
         double r[3];
@@ -337,13 +337,13 @@ static bool reach_fits(struct incode_make *n) {
          i++) {
         uint32_t at = i == 0 ? n->best : local->at[i - 1];
         double p[3];
-        incode_maker_breathe(n->maker, CONSIDER_UNITS);
+        incode_maker_yield(n->maker, CONSIDER_UNITS);
         copy_point(p, local, at);
         if (at == local->self || at == n->b || at == n->c ||
             incode_orient3d(&n->maker->counts.tally, n->pv, n->pb, n->pc, p) <=
                 0)
             continue;
-        incode_maker_breathe(n->maker, INCODE_LESSEN_UNITS);
+        incode_maker_yield(n->maker, INCODE_LESSEN_UNITS);
         const double *const q[4] = {n->pv, n->pb, n->pc, p};
         incode_near_degenerate_lessen(&n->degenerate, q, local->scale);
         const struct incode_ball *ball = &n->degenerate.ball;
@@ -396,7 +396,7 @@ enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
     incode_local_relative(local, c, n.rc);
     incode_sphere_plane(&n.sphere, n.rb, n.rc);
     if (incode_plane_is_ill_conditioned(&n.sphere)) {
-        incode_maker_breathe(m, INCODE_FINE_UNITS);
+        incode_maker_yield(m, INCODE_FINE_UNITS);
         incode_sphere_refine(&n.sphere, n.pv, n.pb, n.pc, NULL, local->scale);
     }
     set_pencil(&n, &n.sphere);
@@ -592,7 +592,7 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
     while (search->stage == INCODE_SEARCH_FIRST && m->fault == NULL) {
         if (s->stage == INCODE_FIRST_NEAREST ||
             s->stage == INCODE_FIRST_CIRCLE) {
-            q->pauses = true;
+            q->yields = true;
             enum incode_walk r =
                 incode_walk(&m->walker, q, incode_visit_points, NULL);
             if (r == INCODE_WALK_WAIT)

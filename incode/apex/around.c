@@ -11,7 +11,7 @@
  * keeps all that lie in the ball of the first so far, and the predicates
  * compare only what is still in the last ball. */
 
-/* Units of work, as incode/predicates/pause.h counts them. */
+/* Units of work, as incode/predicates/yield.h counts them. */
 enum { BOXES_A_UNIT = 5, HITS_A_UNIT = 5, BRICK_UNITS = 10 };
 
 /* ---- what is left to be looked at ---- */
@@ -33,7 +33,7 @@ static void set_done(struct look *look, uint32_t index) {
 static void reach(struct incode_maker *m, struct look *look) {
     const struct incode_horizon *h = &m->horizon;
     uint32_t pages[INCODE_HORIZON_MAX];
-    incode_maker_breathe(m, h->count / BOXES_A_UNIT);
+    incode_maker_yield(m, h->count / BOXES_A_UNIT);
     uint32_t count =
         incode_horizon_reached(h, &look->cap, look->done, look->index);
     look->bricks = look->pages = 0;
@@ -58,7 +58,7 @@ static void bound(struct incode_maker *m, const struct incode_query *q,
         look->cap.bounded)
         return;
     const double *const p[4] = {q->pv, q->pb, q->pc, q->best_p};
-    incode_maker_breathe(m, INCODE_RADICAL_UNITS);
+    incode_maker_yield(m, INCODE_RADICAL_UNITS);
     incode_radical_bound_set(&radical, &m->empty, p, q->scale, q->sphere.n);
     if (!radical.set)
         return;
@@ -146,7 +146,7 @@ static void choose_first(struct incode_maker *m, struct look *look,
                          const float c0[3]) {
     const struct incode_horizon *h = &m->horizon;
     uint32_t count = look->bricks + look->pages, first = 0;
-    incode_maker_breathe(m, count / BOXES_A_UNIT);
+    incode_maker_yield(m, count / BOXES_A_UNIT);
     float least = __builtin_inff();
     for (uint32_t i = 0; i < count; i++) {
         float t = middle(h, look, c0, look->index[i]);
@@ -174,7 +174,7 @@ static bool points_of(struct incode_maker *m, struct look *look, uint32_t index,
     uint32_t brick = h->page[index];
     const struct incode_frame *f = NULL;
     *missing = brick;
-    incode_maker_breathe(m, BRICK_UNITS);
+    incode_maker_yield(m, BRICK_UNITS);
     m->counts.candidates += INCODE_BRICK_POINTS;
     if (h->copy[index] == INCODE_NO_COPY) {
         f = incode_pager_get(&m->pager, brick);
@@ -266,7 +266,7 @@ static bool search_spheres(struct incode_make *n, struct incode_search *s) {
         if (q->best != best && strictly) {
             strictly = false;
             memset(look.done, 0, sizeof look.done);
-            incode_maker_breathe(m, INCODE_LESSEN_UNITS);
+            incode_maker_yield(m, INCODE_LESSEN_UNITS);
             incode_search_last(m, s);
         }
     }
@@ -319,12 +319,12 @@ static bool look_at(struct incode_make *n, struct incode_query *q,
         uint64_t in;
         if (!points_of(n->maker, look, index[i], &in, &f, &q->missing))
             return false;
-        incode_maker_breathe(n->maker, (uint32_t)__builtin_popcountll(in) / 2);
+        incode_maker_yield(n->maker, (uint32_t)__builtin_popcountll(in) / 2);
         if (in != 0 &&
             !incode_hits_add(&n->pencil, q, f, in & others(q, f), hits))
             return false;
     }
-    incode_maker_breathe(n->maker, (hits->count - hits->placed) / HITS_A_UNIT);
+    incode_maker_yield(n->maker, (hits->count - hits->placed) / HITS_A_UNIT);
     incode_hits_place(q, &n->pencil, hits);
     return true;
 }
@@ -404,7 +404,7 @@ static void settle(struct incode_make *n, struct incode_query *q, double t,
     for (uint32_t i = 0; i < hits->count; i++) {
         const double p[3] = {hits->p[0][i], hits->p[1][i], hits->p[2][i]};
         bool beyond = hits->t[i] < __builtin_inf();
-        incode_breathe(&tally->pause, 2);
+        incode_yield_after(&tally->yield, 2);
         if (!incode_hits_contends(q, hits, i, last) ||
             (!beyond && incode_orient3d(tally, n->pv, n->pb, n->pc, p) <= 0) ||
             (any &&

@@ -11,7 +11,7 @@
 enum {
     NUMBERS = 24, /* floats a box */
     BOX_BYTES = NUMBERS * 4 + 2 * 4 + 2,
-    PAGE_UNITS = 24, /* of incode/predicates/pause.h */
+    PAGE_UNITS = 24, /* of incode/predicates/yield.h */
     BOX_UNITS = 2
 };
 
@@ -21,11 +21,11 @@ size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies) {
 }
 
 void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
-                         uint32_t copies, struct incode_pause *pause) {
+                         uint32_t copies, struct incode_yield *yield) {
     INCODE_ASSERT(boxes >= INCODE_HORIZON_MIN && boxes <= INCODE_HORIZON_MAX &&
                   boxes % 64 == 0 && copies >= 1 &&
                   copies <= INCODE_HORIZON_COPIES);
-    incode_pause_fill(pause, memory, 0, incode_horizon_bytes(boxes, copies));
+    incode_yield_fill(yield, memory, 0, incode_horizon_bytes(boxes, copies));
     memset(h, 0, sizeof *h);
     h->boxes = boxes;
     h->room = copies;
@@ -250,7 +250,7 @@ static enum incode_horizon_made add_page(struct making *m, uint32_t level,
     m->missing = page;
     if (f == NULL)
         return INCODE_HORIZON_WAIT;
-    incode_walker_breathe(m->walker, PAGE_UNITS);
+    incode_walker_yield(m->walker, PAGE_UNITS);
     set_view(&view, m->h, f);
     uint32_t all = children_of(tree, level, index);
     uint32_t near = all & near_children(m, &view);
@@ -259,7 +259,7 @@ static enum incode_horizon_made add_page(struct making *m, uint32_t level,
     for (; near != 0; near &= near - 1) {
         unsigned child = (unsigned)__builtin_ctz(near);
         enum incode_horizon_made r = INCODE_HORIZON_MADE;
-        incode_walker_breathe(m->walker, BOX_UNITS);
+        incode_walker_yield(m->walker, BOX_UNITS);
         if (level > 1)
             r = add_page(m, level - 1, first + child);
         else if (!add_brick(m->h, &view, child, first + child))
@@ -499,7 +499,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
     *missing = page;
     if (f == NULL)
         return INCODE_HORIZON_WAIT;
-    incode_walker_breathe(walker, PAGE_UNITS);
+    incode_walker_yield(walker, PAGE_UNITS);
     set_view(&view, h, f);
     uint32_t first = (page - tree->base[level]) * INCODE_FANOUT;
     uint32_t in = h->left[index] & reached_children(&view, cap);
@@ -508,7 +508,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
         if (h->count == h->boxes)
             return INCODE_HORIZON_FULL;
         uint32_t at = tree->base[level - 1] + first + child;
-        incode_walker_breathe(walker, BOX_UNITS);
+        incode_walker_yield(walker, BOX_UNITS);
         uint32_t i = add_box(h, &view, child, at, level - 1);
         set_lifted(h, i, &view, child);
         /* It is likely to be looked at again, which costs less here. */

@@ -68,7 +68,7 @@ size_t incode_horizon_bytes(uint32_t boxes, uint32_t copies);
 /* memory: so many bytes, aligned to 64.  boxes: INCODE_HORIZON_MIN to
  * INCODE_HORIZON_MAX, a multiple of 64; copies: 1 to INCODE_HORIZON_COPIES. */
 void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
-                         uint32_t copies, struct incode_pause *pause);
+                         uint32_t copies, struct incode_yield *yield);
 
 /* Boxes that are listed from the start, at most; the others are for splitting.
  */
@@ -175,7 +175,7 @@ enum {
 };
 
 struct incode_local_points {
-    struct incode_pause *pause; /* or NULL */
+    struct incode_yield *yield; /* or NULL */
     /* Around the vertex: relative to p0 and scaled; w = |p|^2; e: of this the
      * error of n . p is at most max|n|; at: the point's index below. */
     alignas(64) float x[INCODE_NEAR_ALL];

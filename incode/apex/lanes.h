@@ -100,7 +100,7 @@ INCODE_INLINE struct incode_lanes incode_lanes_difference(incode_vd a, double b,
 enum {
     INCODE_CLOSE_MAX = 16,
     INCODE_CLOSE_NONE = 0xffff,
-    INCODE_CLOSE_UNITS = 72 /* of work (incode/predicates/pause.h) */
+    INCODE_CLOSE_UNITS = 72 /* of work (incode/predicates/yield.h) */
 };
 
 struct incode_close_candidates {

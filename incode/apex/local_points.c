@@ -122,17 +122,17 @@ bool incode_hits_add(const struct incode_pencil *pencil, struct incode_query *q,
 
 #define INFINITE __builtin_inff()
 
-/* Of work, as incode/predicates/pause.h counts it. */
+/* Of work, as incode/predicates/yield.h counts it. */
 enum {
     LEAF_UNITS = 5,
     POINTS_A_UNIT = 2,
-    AT_ONCE = 128 /* points, in a breath */
+    AT_ONCE = 128 /* points between two yields */
 };
 
 /* So many points are about to be worked on. */
-static void breathe_over(const struct incode_local_points *local, uint32_t n) {
-    if (local->pause != NULL)
-        incode_breathe(local->pause, n / POINTS_A_UNIT);
+static void yield_over(const struct incode_local_points *local, uint32_t n) {
+    if (local->yield != NULL)
+        incode_yield_after(local->yield, n / POINTS_A_UNIT);
 }
 
 void incode_local_reset(struct incode_local_points *local) {
@@ -174,7 +174,7 @@ static bool copy_leaves(struct incode_walker *walker, struct incode_query *q,
         box.hi[d] = incode_vd_all(q->hi[d]);
     }
     for (; leaves != 0; leaves &= leaves - 1) {
-        incode_walker_breathe(walker, LEAF_UNITS);
+        incode_walker_yield(walker, LEAF_UNITS);
         uint32_t slot = (uint32_t)__builtin_ctz(leaves) * INCODE_LEAF_POINTS;
         uint32_t in = inside(&box, axis, slot), n = frame->count - slot;
         if (n < INCODE_LEAF_POINTS)
@@ -258,7 +258,7 @@ static void set_units(struct incode_local_points *local, const double origin[3],
     local->per_unit =
         incode_scale_for(half > 0x1p-900 ? half : 0x1p-900) * UNITS_HALF;
     memcpy(local->origin, origin, sizeof local->origin);
-    breathe_over(local, local->around);
+    yield_over(local, local->around);
     for (uint32_t i = 0; i < local->around; i += INCODE_VD_LANES)
         for (int d = 0; d < 3; d++)
             incode_vd_cut(local->unit[d] + i,
@@ -295,7 +295,7 @@ static void choose_units(struct incode_local_points *local, const double p[3],
 /* Relative coordinates from units, w and e of points [0, n), and padding that
  * no scan mistakes for a point: up to two vectors, with e infinite. */
 static void set_near(struct incode_local_points *local, uint32_t n) {
-    breathe_over(local, n);
+    yield_over(local, n);
     incode_vi lane = incode_vi_count();
     incode_vf zero = incode_vf_all(0), infinite = incode_vf_all(INFINITE);
     double share = local->scale / local->per_unit;
@@ -346,7 +346,7 @@ static bool select_near(struct incode_local_points *local) {
     }
     uint32_t n = 0;
     for (uint32_t i = 0, end = 0; i < local->around && whole;) {
-        breathe_over(local, AT_ONCE);
+        yield_over(local, AT_ONCE);
         end = end + AT_ONCE < local->around ? end + AT_ONCE : local->around;
         for (; i < end; i += INCODE_VF_LANES) {
             incode_vi x = incode_vi_load(local->unit[0] + i),

@@ -42,12 +42,12 @@ static uint32_t lookahead_of(const struct incode_maker *m) {
 static void take(struct incode_maker *m, void *memory,
                  const struct incode_maker_share *share, uint32_t bricks) {
     INCODE_ASSERT(share->frames >= INCODE_FRAMES_MIN);
-    incode_maker_breathe(m, INCODE_PAUSE_UNITS);
+    incode_maker_yield(m, INCODE_YIELD_UNITS);
     incode_horizon_init(&m->horizon, memory, share->boxes, share->copies,
-                        &m->counts.tally.pause);
-    incode_maker_breathe(m, INCODE_PAUSE_UNITS);
+                        &m->counts.tally.yield);
+    incode_maker_yield(m, INCODE_YIELD_UNITS);
     incode_pager_init(&m->pager, (uint8_t *)memory + horizon_bytes(share),
-                      share->frames, bricks, &m->counts.tally.pause);
+                      share->frames, bricks, &m->counts.tally.yield);
     m->lookahead = lookahead_of(m);
     m->local.pages_max = share->frames / 2;
     incode_local_reset(&m->local);
@@ -57,10 +57,10 @@ void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
                        const struct incode_page_source *source,
-                       const struct incode_pause *pause) {
+                       const struct incode_yield *yield) {
     INCODE_ASSERT(points->bricks > 0);
     memset(m, 0, sizeof *m);
-    m->counts.tally.pause = *pause;
+    m->counts.tally.yield = *yield;
     m->index = points->index;
     memcpy(m->lo, points->lo, sizeof m->lo);
     memcpy(m->hi, points->hi, sizeof m->hi);
@@ -75,7 +75,7 @@ void incode_maker_init(struct incode_maker *m, void *memory,
     m->pager.shuffle = points->shuffle_seed;
     m->walker = (struct incode_walker){&m->pager, &m->tree, &m->counts.tally,
                                        &m->counts.candidates, UINT32_MAX};
-    m->local.pause = &m->counts.tally.pause;
+    m->local.yield = &m->counts.tally.yield;
     m->spread = 1.6;
     m->reach = 2;
 }

@@ -124,10 +124,9 @@ struct incode_maker {
     struct incode_local_points local;
 };
 
-/* So many units of incode/predicates/pause.h are about to be worked. */
-static inline void incode_maker_breathe(struct incode_maker *m,
-                                        uint32_t units) {
-    incode_breathe(&m->counts.tally.pause, units);
+/* So many units of incode/predicates/yield.h are about to be worked. */
+static inline void incode_maker_yield(struct incode_maker *m, uint32_t units) {
+    incode_yield_after(&m->counts.tally.yield, units);
 }
 
 /* ---- memory ---- */
@@ -146,13 +145,13 @@ size_t incode_maker_bytes(const struct incode_maker_share *share);
 uint32_t incode_maker_frames(const struct incode_maker_share *share,
                              size_t bytes);
 
-/* memory: aligned to 64 bytes, incode_maker_bytes of the share.  pause: is told
+/* memory: aligned to 64 bytes, incode_maker_bytes of the share.  yield: is told
  * of what takes long, from now on; the maker has a copy. */
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
                        const struct incode_page_source *source,
-                       const struct incode_pause *pause);
+                       const struct incode_yield *yield);
 
 /* Moves to other memory, of another share: what was there is forgotten, counts
  * stay.  No page may be on its way. */

@@ -132,7 +132,7 @@ void incode_query_start(struct incode_query *q, uint32_t id,
 
 enum {
     CONTESTS = 8,      /* by the predicates, before twice the precision */
-    CONSIDER_UNITS = 4 /* of work, as incode/predicates/pause.h counts it */
+    CONSIDER_UNITS = 4 /* of work, as incode/predicates/yield.h counts it */
 };
 
 /* Whether a point is certainly outside the best's sphere, looked at more
@@ -146,7 +146,7 @@ static bool is_outside(struct incode_query *q, struct incode_tally *tally,
     }
     if (q->degenerate.spread == 0) {
         const double *const f[4] = {q->pv, q->pb, q->pc, q->best_p};
-        incode_breathe(&tally->pause, INCODE_FINE_UNITS);
+        incode_yield_after(&tally->yield, INCODE_FINE_UNITS);
         incode_near_degenerate_sphere(&q->degenerate, f, q->scale);
     }
     return incode_near_degenerate_outside(&q->degenerate, q->pv, p, q->scale);
@@ -154,7 +154,7 @@ static bool is_outside(struct incode_query *q, struct incode_tally *tally,
 
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3]) {
-    incode_breathe(&tally->pause, CONSIDER_UNITS);
+    incode_yield_after(&tally->yield, CONSIDER_UNITS);
     if (q->best != INCODE_NONE && is_outside(q, tally, p))
         return;
     if (incode_orient3d(tally, q->pv, q->pb, q->pc, p) <= 0)
@@ -166,13 +166,13 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     incode_query_relative(r, q, p);
     incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
     if (incode_sphere_is_ill_conditioned(&q->sphere)) {
-        incode_breathe(&tally->pause, INCODE_FINE_UNITS);
+        incode_yield_after(&tally->yield, INCODE_FINE_UNITS);
         incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
     }
     if (q->degenerate.known)
-        incode_breathe(&tally->pause, INCODE_LESSEN_UNITS);
+        incode_yield_after(&tally->yield, INCODE_LESSEN_UNITS);
     if (q->looked >= INCODE_QUERY_CROWD)
-        incode_breathe(&tally->pause, INCODE_RADICAL_UNITS);
+        incode_yield_after(&tally->yield, INCODE_RADICAL_UNITS);
     incode_query_start(q, id, p);
 }
 
@@ -358,7 +358,7 @@ struct walk {
 
 enum {
     ASK_AHEAD = 8,
-    /* Of work, as incode/predicates/pause.h counts it: the leaves of a brick, a
+    /* Of work, as incode/predicates/yield.h counts it: the leaves of a brick, a
      * page of boxes, a lifted one. */
     VISIT_UNITS = 6,
     PAGE_UNITS = 20,
@@ -399,7 +399,7 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
                                     const struct incode_frame *frame) {
     uint32_t leaves = passing_leaves(w->q, frame);
     incode_walker_spend(w->walker, 1);
-    incode_walker_breathe(w->walker, VISIT_UNITS);
+    incode_walker_yield(w->walker, VISIT_UNITS);
     w->visited = true;
     if (leaves != 0 &&
         !w->visit(w->walker, w->q, frame, brick, leaves, w->context))
@@ -476,7 +476,7 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
     uint32_t count = tree->count[level - 1] - first;
     if (count > INCODE_FANOUT)
         count = INCODE_FANOUT;
-    incode_walker_breathe(w->walker, PAGE_UNITS);
+    incode_walker_yield(w->walker, PAGE_UNITS);
     uint32_t mask = passing_children(w->q, &frame->page.boxes, count);
     for (uint32_t left = mask; left != 0;) {
         unsigned child = next_child(w->q, left);
@@ -484,13 +484,13 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         left &= ~(UINT32_C(1) << child);
         if (to <= w->q->cursor)
             continue;
-        incode_walker_breathe(w->walker, LIFTED_UNITS);
+        incode_walker_yield(w->walker, LIFTED_UNITS);
         if (!may_reach(w->q, &frame->page.boxes, child)) {
             w->q->cursor = to;
             continue;
         }
         uint32_t page = tree->base[level - 1] + first + child;
-        if (w->q->pauses && w->visited && w->walker->left == 0) {
+        if (w->q->yields && w->visited && w->walker->left == 0) {
             w->q->missing = INCODE_NONE;
             return INCODE_WALK_WAIT;
         }

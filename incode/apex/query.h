@@ -35,7 +35,7 @@ struct incode_query {
     bool lens;           /* round: it is less than the sphere (half_space.h) */
     bool large;          /* round, and the sphere itself tells of boxes, too */
     bool done;           /* not what lies within [done_lo, done_hi] */
-    bool pauses;         /* the walk is suspended where the walker has no more
+    bool yields;         /* the walk is suspended where the walker has no more
                             units left, with INCODE_NONE missing */
     double lo[3], hi[3]; /* absolute coordinates */
     double done_lo[3], done_hi[3];
@@ -91,10 +91,10 @@ static inline void incode_walker_spend(struct incode_walker *walker,
     walker->left = walker->left > units ? walker->left - units : 0;
 }
 
-/* So many units of incode/predicates/pause.h are about to be worked. */
-static inline void incode_walker_breathe(const struct incode_walker *walker,
-                                         uint32_t units) {
-    incode_breathe(&walker->tally->pause, units);
+/* So many units of incode/predicates/yield.h are about to be worked. */
+static inline void incode_walker_yield(const struct incode_walker *walker,
+                                       uint32_t units) {
+    incode_yield_after(&walker->tally->yield, units);
 }
 
 /* Called with a brick and its leaves that pass, one bit each; false stops the

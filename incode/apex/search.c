@@ -33,7 +33,7 @@ bool incode_hull_known(struct incode_maker *m, const double pv[3],
     for (uint32_t i = 0; i < m->plane_count; i++) {
         const struct incode_hull_plane *h = &m->planes[i];
         const double *a = h->p[0], *b = h->p[1], *c = h->p[2];
-        incode_breathe(&tally->pause, 2);
+        incode_yield_after(&tally->yield, 2);
         if (incode_orient3d(tally, a, b, c, pv) == 0 &&
             incode_orient3d(tally, a, b, c, pb) == 0 &&
             incode_orient3d(tally, a, b, c, pc) == 0)
@@ -67,7 +67,7 @@ void incode_hull_learn(struct incode_maker *m, const struct incode_query *q) {
         unsigned d = (largest + i / 2) % 3;
         double below[3] = {q->pv[0], q->pv[1], q->pv[2]};
         below[d] += (n[d] > 0) == (i % 2 == 0) ? -side : side;
-        incode_maker_breathe(m, 1);
+        incode_maker_yield(m, 1);
         if (__builtin_fabs(below[d]) <= DBL_MAX &&
             incode_orient3d(&m->counts.tally, q->pv, q->pb, q->pc, below) < 0) {
             incode_hull_remember(m, q, below);
@@ -161,7 +161,7 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
     struct incode_query *q = &s->query;
     for (;;) {
         uint64_t before = m->counts.candidates;
-        q->pauses = true;
+        q->yields = true;
         enum incode_walk r =
             incode_walk(&m->walker, q, incode_visit_points, NULL);
         s->looked += m->counts.candidates - before;
@@ -181,7 +181,7 @@ enum incode_outcome incode_search_run(struct incode_maker *m,
             return INCODE_ANSWERED;
         }
         if (q->best != INCODE_NONE || !q->boxed) {
-            incode_maker_breathe(m, INCODE_LESSEN_UNITS);
+            incode_maker_yield(m, INCODE_LESSEN_UNITS);
             incode_search_last(m, s);
             continue;
         }
@@ -262,7 +262,7 @@ static bool more_beyond(const struct incode_cell_search *c,
 enum {
     LANES = 8,
     ASK_AHEAD = 16,
-    BATCH_UNITS = 8 /* of incode/predicates/pause.h */
+    BATCH_UNITS = 8 /* of incode/predicates/yield.h */
 };
 
 struct batch {
@@ -357,7 +357,7 @@ static enum incode_walk finish_piece(struct incode_cell_search *c,
                                      struct incode_query *q, uint32_t *work) {
     while (c->list < c->end) {
         struct batch batch;
-        incode_walker_breathe(walker, BATCH_UNITS);
+        incode_walker_yield(walker, BATCH_UNITS);
         bool all = fill_batch(c, g, &batch, &q->missing);
         if (batch.count > 0)
             look_at(c, walker, q, &batch);
@@ -414,7 +414,7 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
         for (;; whole = false) {
             set_range(&s->box, g, 0, (struct range){c->x, last});
             s->work++;
-            incode_walker_breathe(walker, BATCH_UNITS);
+            incode_walker_yield(walker, BATCH_UNITS);
             if (!whole && passing(q, &s->box, 1) == 0)
                 break;
             uint32_t from, to;
@@ -458,7 +458,7 @@ static bool passes(const struct incode_grid *g,
     }
     tested->first = i;
     tested->end = i + count;
-    incode_walker_breathe(walker, BATCH_UNITS);
+    incode_walker_yield(walker, BATCH_UNITS);
     tested->mask = passing(q, &boxes, count);
     s->work++;
     return (tested->mask & 1) != 0;
@@ -494,7 +494,7 @@ static enum incode_walk run_layer(struct incode_cell_search *c,
     set_range(&s->box, g, 2, (struct range){c->z, c->z});
     s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
-        incode_walker_breathe(walker, 1);
+        incode_walker_yield(walker, 1);
         enum incode_walk r = run_row(c, g, walker, q, s);
         if (r == INCODE_WALK_DONE && s->work >= work_of(walker))
             r = INCODE_WALK_STOP;
@@ -519,7 +519,7 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
     }
     enum incode_walk r = finish_piece(c, g, walker, q, &s.work);
     for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
-        incode_walker_breathe(walker, 1);
+        incode_walker_yield(walker, 1);
         r = run_layer(c, g, walker, q, &s);
         if (r != INCODE_WALK_DONE)
             break;

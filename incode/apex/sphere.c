@@ -261,7 +261,7 @@ void incode_radical_bound_set(struct incode_radical_bound *c,
 
 enum {
     HORIZON_UNITS =
-        16, /* of incode/predicates/pause.h: a look over its boxes */
+        16, /* of incode/predicates/yield.h: a look over its boxes */
     NEAR_WANTED = 96,
     COPY_TRIES = 64
 };
@@ -313,7 +313,7 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
     }
     double radius = first_radius(m, lo, hi);
     for (int tries = 0;; tries++) {
-        incode_maker_breathe(m, HORIZON_UNITS);
+        incode_maker_yield(m, HORIZON_UNITS);
         enum incode_local_outcome r =
             incode_local_around(local, &m->walker, &m->horizon,
                                 v / INCODE_LEAF_POINTS, lo, hi, radius);

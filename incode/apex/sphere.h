@@ -120,7 +120,7 @@ void incode_sphere_fine(struct incode_fine *f, const double v[3],
                         const double b[3], const double c[3], const double *a,
                         double scale);
 
-enum { INCODE_FINE_UNITS = 32 }; /* of incode/predicates/pause.h, at the most */
+enum { INCODE_FINE_UNITS = 32 }; /* of incode/predicates/yield.h, at the most */
 
 /* Sharpens the bounds of an ill-conditioned plane or sphere; where that is not
  * enough, computes it again from absolute coordinates in twice the precision,
@@ -165,7 +165,7 @@ static inline double incode_plane_error(const struct incode_sphere *s,
 
 enum {
     INCODE_EMPTY_SPHERES = 8,
-    INCODE_RADICAL_UNITS = 150 /* of work (incode/predicates/pause.h) */
+    INCODE_RADICAL_UNITS = 150 /* of work (incode/predicates/yield.h) */
 };
 
 /* The sphere of four points. */
@@ -236,7 +236,7 @@ struct incode_near_degenerate {
 bool incode_half_space_faces(const struct incode_half_space *half_space,
                              const double n[3]);
 
-enum { INCODE_LESSEN_UNITS = 64 }; /* of work (incode/predicates/pause.h) */
+enum { INCODE_LESSEN_UNITS = 64 }; /* of work (incode/predicates/yield.h) */
 
 /* Lessens degenerate->ball: no point outside it comes before p[3] in Delaunay
  * distance from the face (p[0], p[1], p[2]).  Nothing changes where neither the

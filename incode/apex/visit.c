@@ -7,7 +7,7 @@
 
 enum {
     LEAF_ALL = (1 << INCODE_LEAF_POINTS) - 1, /* its points, a bit each */
-    LEAF_UNITS = 5, /* of work, as incode/predicates/pause.h counts it */
+    LEAF_UNITS = 5, /* of work, as incode/predicates/yield.h counts it */
     FINE_LEAF_UNITS = 32,
     POINT_UNITS = 2
 };
@@ -252,7 +252,7 @@ static uint32_t apex_leaf(const struct incode_query *q,
     return in;
 }
 
-/* Of work, as incode/predicates/pause.h counts it: in twice the precision, too,
+/* Of work, as incode/predicates/yield.h counts it: in twice the precision, too,
  * where points are nearly degenerate. */
 static uint32_t leaf_units(const struct incode_query *q) {
     return q->degenerate.spread == 0 ? LEAF_UNITS : FINE_LEAF_UNITS;
@@ -269,10 +269,10 @@ static void choose(struct incode_walker *walker, struct incode_query *q,
         uint32_t lanes =
             count >= INCODE_LEAF_POINTS ? LEAF_ALL : (1U << count) - 1;
         *walker->candidates += (unsigned)__builtin_popcount(lanes);
-        incode_walker_breathe(walker, leaf_units(q));
+        incode_walker_yield(walker, leaf_units(q));
         if (q->question == INCODE_QUERY_APEX) {
             if (q->looked + 1 == INCODE_QUERY_CROWD)
-                incode_walker_breathe(walker, INCODE_RADICAL_UNITS);
+                incode_walker_yield(walker, INCODE_RADICAL_UNITS);
             incode_query_look(q);
             lanes = apex_leaf(q, frame, first, lanes, chosen);
         }
@@ -318,7 +318,7 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
         unsigned slot = take(&chosen);
         uint32_t id = brick * INCODE_BRICK_POINTS + slot;
         double p[3];
-        incode_walker_breathe(walker, POINT_UNITS);
+        incode_walker_yield(walker, POINT_UNITS);
         if (id == q->v || id == q->b || id == q->c || id == q->best)
             continue;
         point_of(p, frame, slot);
@@ -327,8 +327,8 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
         if (q->question == INCODE_QUERY_APEX) {
             incode_query_consider(q, walker->tally, id, p);
             if (q->best == id) {
-                incode_walker_breathe(walker,
-                                      INCODE_BRICK_LEAVES * leaf_units(q));
+                incode_walker_yield(walker,
+                                    INCODE_BRICK_LEAVES * leaf_units(q));
                 choose_again(q, frame, &chosen);
             }
         } else if (q->question == INCODE_QUERY_HALF_SPACE)

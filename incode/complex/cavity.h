@@ -126,7 +126,7 @@ static inline double incode_sphere_power(const struct incode_complex_point *v,
 enum {
     INCODE_SPHERE_BATCH = 8,
     INCODE_SPHERE_UNITS =
-        12 /* of work (incode/predicates/pause.h), that a batch takes */
+        12 /* of work (incode/predicates/yield.h), that a batch takes */
 };
 
 /* Three vertices of each of some cells, as seen from the fourth, coordinate by

@@ -183,7 +183,7 @@ enum {
     POINTS_MAX = FACETS_MAX / 2 + 2,
     SLOTS_MAX = FACETS_MAX + INCODE_SPHERE_BATCH,
     LOOKED_AT_MAX = INCODE_COMPLEX_CAVITY, /* cells */
-    AT_ONCE = 64,                          /* of them in a breath */
+    AT_ONCE = 64,                          /* of them between two yields */
     WRITTEN = 40,                          /* new ones, likewise */
     WRITTEN_UNITS = WRITTEN / INCODE_SPHERE_BATCH * INCODE_SPHERE_UNITS
 };
@@ -247,7 +247,7 @@ tell_many(struct incode_complex *x, struct incode_tally *tally,
     while (from < cavity->looked_at) {
         uint32_t left = cavity->looked_at - from;
         uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
-        incode_breathe(&tally->pause, AT_ONCE);
+        incode_yield_after(&tally->yield, AT_ONCE);
         tell(x, tally, p, from, end, cavity);
         from = end;
     }
@@ -257,8 +257,8 @@ tell_many(struct incode_complex *x, struct incode_tally *tally,
 static bool find(struct incode_complex *x, struct incode_tally *tally,
                  const double at[3], uint32_t first, struct cavity *cavity) {
     const double p[3] = {at[0], at[1], at[2]};
-    uint32_t from = 0, breath = AT_ONCE;
-    incode_breathe(&tally->pause, AT_ONCE);
+    uint32_t from = 0, due = AT_ONCE;
+    incode_yield_after(&tally->yield, AT_ONCE);
     cavity->cell[0] = cavity->other[0] = first;
     cavity->gone = cavity->looked_at = 1;
     incode_complex_cell(x, first)->flags |= INCODE_CELL_GOES;
@@ -268,11 +268,11 @@ static bool find(struct incode_complex *x, struct incode_tally *tally,
             return false;
         look_around(x, cavity, from);
         from = gone;
-        if (__builtin_expect(cavity->looked_at <= breath, 1)) {
+        if (__builtin_expect(cavity->looked_at <= due, 1)) {
             tell(x, tally, p, j, cavity->looked_at, cavity);
         } else {
             tell_many(x, tally, p, j, cavity);
-            breath = cavity->looked_at;
+            due = cavity->looked_at;
         }
     }
     return true;
@@ -291,9 +291,9 @@ incode_complex_find_small(struct incode_complex *x, struct incode_tally *tally,
 }
 
 static bool list_facets(const struct incode_complex *x,
-                        struct incode_pause *pause, struct cavity *cavity) {
+                        struct incode_yield *yield, struct cavity *cavity) {
     uint32_t facets = 0;
-    incode_breathe(pause, cavity->gone / 4);
+    incode_yield_after(yield, cavity->gone / 4);
     for (uint32_t j = 0; j < cavity->gone && facets <= FACETS_MAX; j++) {
         uint32_t at = cavity->cell[j];
         const struct incode_cell *c = incode_complex_cell(x, at);
@@ -401,7 +401,7 @@ static inline void write_one(struct incode_complex *x,
     incode_cell_join(x->cell - fill->outer[f], fill->back[f], fill->cell[f]);
 }
 
-static void write(struct incode_complex *x, struct incode_pause *pause,
+static void write(struct incode_complex *x, struct incode_yield *yield,
                   struct filling *fill, uint32_t facets) {
     enum { BATCH = INCODE_SPHERE_BATCH };
     struct incode_sphere_batch b;
@@ -423,7 +423,7 @@ static void write(struct incode_complex *x, struct incode_pause *pause,
             incode_sphere_keep(x->cell - fill->cell[first + j], &b, j);
         }
         if (first % WRITTEN == 0)
-            incode_breathe(pause, WRITTEN_UNITS);
+            incode_yield_after(yield, WRITTEN_UNITS);
     }
 }
 
@@ -434,7 +434,7 @@ incode_complex_insert_small(struct incode_complex *x,
     struct cavity cavity;
     struct filling fill;
     if (!find(x, tally, x->point[v].p, first, &cavity) ||
-        !list_facets(x, &tally->pause, &cavity)) {
+        !list_facets(x, &tally->yield, &cavity)) {
         forget(x, &cavity);
         return INCODE_CAVITY_LARGE;
     }
@@ -445,11 +445,11 @@ incode_complex_insert_small(struct incode_complex *x,
         forget(x, &cavity);
         return INCODE_CAVITY_FULL;
     }
-    incode_breathe(&tally->pause, cavity.facets / 4);
+    incode_yield_after(&tally->yield, cavity.facets / 4);
     take_cells(x, &cavity, fill.cell);
     see_from(x, &fill, number(x, &cavity, &fill, v), v);
     free_cells(x, &cavity);
-    write(x, &tally->pause, &fill, cavity.facets);
+    write(x, &tally->yield, &fill, cavity.facets);
     /* The analyser does not see that a cavity has facets.
      * NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign) */
     x->point[v].cell = fill.cell[0];
@@ -490,23 +490,26 @@ static void free_some(struct incode_complex *x, uint32_t first, uint32_t end) {
     }
 }
 
-enum { RELEASE_AT_ONCE = 128, UNITS = 64 /* points or cells in a breath */ };
+enum {
+    RELEASE_AT_ONCE = 128,
+    UNITS = 64 /* points or cells between two yields */
+};
 
 void incode_complex_release(struct incode_complex *x,
-                            struct incode_pause *pause) {
+                            struct incode_yield *yield) {
     for (uint32_t v = 0; v < x->points; v++) {
         if (v % RELEASE_AT_ONCE == 0)
-            incode_breathe(pause, UNITS / 8);
+            incode_yield_after(yield, UNITS / 8);
         x->point[v].cell = INCODE_NONE;
     }
     for (uint32_t i = FIRST; i < x->cells; i += RELEASE_AT_ONCE) {
-        incode_breathe(pause, UNITS);
+        incode_yield_after(yield, UNITS);
         settle_some(x, i,
                     x->cells - i < RELEASE_AT_ONCE ? x->cells
                                                    : i + RELEASE_AT_ONCE);
     }
     for (uint32_t i = FIRST; i < x->cells; i += RELEASE_AT_ONCE) {
-        incode_breathe(pause, UNITS / 4);
+        incode_yield_after(yield, UNITS / 4);
         free_some(x, i,
                   x->cells - i < RELEASE_AT_ONCE ? x->cells
                                                  : i + RELEASE_AT_ONCE);
@@ -514,7 +517,7 @@ void incode_complex_release(struct incode_complex *x,
     x->free_point = 0;
     for (uint32_t v = x->points - 1; v > 0; v--) {
         if (v % RELEASE_AT_ONCE == 0)
-            incode_breathe(pause, UNITS / 8);
+            incode_yield_after(yield, UNITS / 8);
         if (x->point[v].cell != INCODE_NONE)
             continue;
         x->point[v].id = x->free_point;

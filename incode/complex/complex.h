@@ -105,7 +105,7 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
  * their places taken by points that are added; so is what is no vertex yet.
  * n[0] and the points' `cell` may have been used for lists before. */
 void incode_complex_release(struct incode_complex *x,
-                            struct incode_pause *pause);
+                            struct incode_yield *yield);
 
 /* Inserts a point that is no vertex yet, and is none of theirs, from the vertex
  * `near` on, best one near by.  False: there is no room, or the same point is a

@@ -71,7 +71,7 @@ static uint32_t descend(const struct incode_complex *x,
     *found = least < -bound;
     while (!*found) {
         uint32_t next = INCODE_NONE;
-        incode_breathe(&tally->pause, 3);
+        incode_yield_after(&tally->yield, 3);
         for (unsigned i = 0; i < 4; i++) {
             const struct incode_cell *n = incode_complex_cell(x, c->n[i].cell);
             double t = incode_sphere_power(x->point, n, p, &bound);
@@ -103,7 +103,7 @@ static uint32_t walk(const struct incode_complex *x, struct incode_tally *tally,
         const struct incode_cell *c = incode_complex_cell(x, at);
         if (incode_cell_is_infinite(c))
             return at;
-        incode_breathe(&tally->pause, 4);
+        incode_yield_after(&tally->yield, 4);
         bool barred = false;
         for (unsigned i = 0; i < 4 && next == INCODE_NONE; i++) {
             if (c->n[i].cell == before || orient_with(x, tally, c, i, p) >= 0)
@@ -127,7 +127,7 @@ static uint32_t scan(struct incode_complex *x, struct incode_tally *tally,
     x->scans++;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         const struct incode_cell *c = incode_complex_cell(x, i);
-        incode_breathe(&tally->pause, 1);
+        incode_yield_after(&tally->yield, 1);
         if (!incode_cell_is_free(c) &&
             incode_cell_proved(c) != INCODE_CELL_FINAL &&
             incode_complex_gives_way(x, tally, c, p))
@@ -145,7 +145,7 @@ static uint32_t nearest(const struct incode_complex *x,
         const struct incode_complex_point *q = &x->point[v];
         double square = 0;
         if (v % 8 == 0)
-            incode_breathe(&tally->pause, 2);
+            incode_yield_after(&tally->yield, 2);
         for (int d = 0; d < 3; d++)
             square += (q->p[d] - p[d]) * (q->p[d] - p[d]);
         if (square < least && q->cell != INCODE_NONE) {
@@ -220,7 +220,7 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
     set_next(c, INCODE_NONE);
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
         c = incode_complex_cell(x, at);
-        incode_breathe(&tally->pause, 4);
+        incode_yield_after(&tally->yield, 4);
         for (unsigned i = 0; i < 4; i++) {
             uint32_t next = c->n[i].cell;
             struct incode_cell *n = incode_complex_cell(x, next);
@@ -240,14 +240,14 @@ static uint32_t find(struct incode_complex *x, struct incode_tally *tally,
 }
 
 /* Takes the marks away and brings the spheres back. */
-static void forget(struct incode_complex *x, struct incode_pause *pause,
+static void forget(struct incode_complex *x, struct incode_yield *yield,
                    uint32_t first) {
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
         struct incode_cell *c = incode_complex_cell(x, at);
         unsigned proved = incode_cell_proved(c);
         next = next_of(c);
-        incode_breathe(pause, INCODE_SPHERE_UNITS);
+        incode_yield_after(yield, INCODE_SPHERE_UNITS);
         incode_complex_set_spheres(x, c->v[3], &at, 1);
         incode_cell_set_proved(c, proved);
         for (unsigned i = 0; i < 4; i++)
@@ -256,13 +256,13 @@ static void forget(struct incode_complex *x, struct incode_pause *pause,
 }
 
 /* Puts a cell between each facet of the boundary and the new point. */
-static void fill(struct incode_complex *x, struct incode_pause *pause,
+static void fill(struct incode_complex *x, struct incode_yield *yield,
                  uint32_t first, uint32_t v) {
     struct incode_cell *c;
     uint32_t some[BATCH], count = 0;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
         c = incode_complex_cell(x, at);
-        incode_breathe(pause, 1);
+        incode_yield_after(yield, 1);
         for (unsigned i = 0; i < 4; i++) {
             struct incode_cell *n = incode_complex_cell(x, c->n[i].cell);
             if (incode_cell_mark(n) != INCODE_CELL_STAYS)
@@ -281,13 +281,13 @@ static void fill(struct incode_complex *x, struct incode_pause *pause,
             x->point[v].cell = new;
             some[count++] = new;
             if (count == BATCH) {
-                incode_breathe(pause, BATCH_UNITS);
+                incode_yield_after(yield, BATCH_UNITS);
                 incode_complex_set_spheres(x, v, some, count);
                 count = 0;
             }
         }
     }
-    incode_breathe(pause, BATCH_UNITS);
+    incode_yield_after(yield, BATCH_UNITS);
     incode_complex_set_spheres(x, v, some, count);
 }
 
@@ -296,7 +296,7 @@ static void fill(struct incode_complex *x, struct incode_pause *pause,
  * the cells that give way.  `pivot`, beside the edge, is what the next cell is
  * left opposite to. */
 static uint32_t around_edge(const struct incode_complex *x,
-                            struct incode_pause *pause, uint32_t at, unsigned i,
+                            struct incode_yield *yield, uint32_t at, unsigned i,
                             unsigned j) {
     const struct incode_cell *c = incode_complex_cell(x, at);
     uint32_t next = c->n[i].cell;
@@ -304,7 +304,7 @@ static uint32_t around_edge(const struct incode_complex *x,
     while ((next & NEW) == 0) {
         const struct incode_cell *d = incode_complex_cell(x, next);
         unsigned back = 0;
-        incode_breathe(pause, 1);
+        incode_yield_after(yield, 1);
         while (d->n[back].cell != at)
             back++;
         at = next;
@@ -315,7 +315,7 @@ static uint32_t around_edge(const struct incode_complex *x,
 }
 
 /* Joins the new cells to each other. */
-static void join(struct incode_complex *x, struct incode_pause *pause,
+static void join(struct incode_complex *x, struct incode_yield *yield,
                  uint32_t first) {
     const struct incode_cell *c;
     for (uint32_t at = first; at != INCODE_NONE; at = next_of(c)) {
@@ -325,10 +325,10 @@ static void join(struct incode_complex *x, struct incode_pause *pause,
                 continue;
             struct incode_cell *d = incode_complex_cell(x, c->n[j].cell & ~NEW);
             incode_cell_unmark(incode_complex_cell(x, d->n[3].cell));
-            incode_breathe(pause, 1);
+            incode_yield_after(yield, 1);
             for (unsigned k = 0; k < 3; k++)
                 incode_cell_join(d, k,
-                                 around_edge(x, pause, at,
+                                 around_edge(x, yield, at,
                                              incode_cell_index(c, d->v[k]), j));
         }
     }
@@ -338,19 +338,19 @@ enum incode_cavity_result
 incode_complex_insert_large(struct incode_complex *x,
                             struct incode_tally *tally, uint32_t v,
                             uint32_t first) {
-    struct incode_pause *pause = &tally->pause;
+    struct incode_yield *yield = &tally->yield;
     uint32_t facets = find(x, tally, x->point[v].p, first);
     if (!incode_complex_has_room(x, 0, facets)) {
-        forget(x, pause, first);
+        forget(x, yield, first);
         return INCODE_CAVITY_FULL;
     }
-    fill(x, pause, first, v);
-    join(x, pause, first);
+    fill(x, yield, first, v);
+    join(x, yield, first);
     /* What gave way is free. */
     uint32_t next;
     for (uint32_t at = first; at != INCODE_NONE; at = next) {
         next = next_of(incode_complex_cell(x, at));
-        incode_breathe(pause, 1);
+        incode_yield_after(yield, 1);
         incode_complex_free_cell(x, at);
     }
     return INCODE_CAVITY_FILLED;
@@ -382,7 +382,7 @@ static uint32_t go_through(struct incode_complex *x, struct incode_tally *tally,
     *were += disprove(incode_complex_cell(x, first));
     while (i < 4 || at != first) {
         const struct incode_cell *c = incode_complex_cell(x, at);
-        incode_breathe(&tally->pause, 1);
+        incode_yield_after(&tally->yield, 1);
         if (i == 4) {
             uint32_t before = c->n[c->n[3].low].cell;
             i = side_of(incode_complex_cell(x, before), at) + 1;

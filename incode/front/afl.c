@@ -29,10 +29,10 @@ size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks) {
 }
 
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
-                     uint32_t bricks, struct incode_pause *pause) {
+                     uint32_t bricks, struct incode_yield *yield) {
     INCODE_ASSERT(capacity > 0 && bricks > 0);
     memset(afl, 0, sizeof *afl);
-    afl->pause = pause;
+    afl->yield = yield;
     afl->touched = memory;
     afl->held = (uint64_t *)(void *)(afl->touched + bricks);
     afl->foreign = afl->held + held_words(capacity);
@@ -47,14 +47,14 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
     incode_afl_clear(afl);
 }
 
-enum { AT_ONCE = 512 /* entries emptied in a breath */ };
+enum { AT_ONCE = 512 /* entries emptied between two yields */ };
 
 static void empty_heads(const struct incode_afl *afl, uint32_t *heads,
                         uint32_t mask) {
     for (uint32_t from = 0; from <= mask; from += AT_ONCE) {
         uint32_t left = mask + 1 - from;
         uint32_t end = from + (left < AT_ONCE ? left : AT_ONCE);
-        incode_afl_breathe(afl, AT_ONCE / INCODE_AFL_BREATH);
+        incode_afl_yield(afl, AT_ONCE / INCODE_AFL_BREATH);
         for (uint32_t i = from; i < end; i++)
             heads[i] = INCODE_AFL_NIL;
     }
@@ -64,7 +64,7 @@ static void empty_entries(struct incode_afl *afl) {
     uint32_t all = afl->touched_capacity;
     for (uint32_t from = 0; from < all; from += AT_ONCE) {
         uint32_t end = from + (all - from < AT_ONCE ? all - from : AT_ONCE);
-        incode_afl_breathe(afl, AT_ONCE / INCODE_AFL_BREATH);
+        incode_afl_yield(afl, AT_ONCE / INCODE_AFL_BREATH);
         for (uint32_t i = from; i < end; i++) {
             afl->touched[i].brick = INCODE_NONE;
             afl->touched[i].next = i + 1 < all ? i + 1 : INCODE_AFL_NIL;
@@ -191,7 +191,7 @@ static uint32_t walk_begin(const struct incode_afl *afl, uint32_t key,
 
 static uint32_t walk_on(const struct incode_afl *afl, struct walk *walk,
                         uint32_t i) {
-    incode_afl_breathe_at(afl, ++walk->looks);
+    incode_afl_yield_at(afl, ++walk->looks);
     i = afl->nodes[i].next;
     return i != INCODE_AFL_NIL ? i : walk_from(afl, walk);
 }
@@ -205,7 +205,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts) {
         while (*link != INCODE_AFL_NIL) {
             uint32_t i = *link;
             struct incode_afl_node *node = &afl->nodes[i];
-            incode_afl_breathe_at(afl, (uint32_t)afl->looks++);
+            incode_afl_yield_at(afl, (uint32_t)afl->looks++);
             if (node->key != key) {
                 link = &node->next;
                 continue;
@@ -217,7 +217,7 @@ static void list_anew(struct incode_afl *afl, uint32_t key, uint32_t parts) {
     }
     while (all != INCODE_AFL_NIL) {
         struct incode_afl_node *node = &afl->nodes[all];
-        incode_afl_breathe_at(afl, all);
+        incode_afl_yield_at(afl, all);
         uint32_t *head = incode_afl_list(afl, key, node->b, node->c);
         uint32_t next = node->next;
         node->next = *head;
@@ -299,10 +299,10 @@ static void unlink_node(struct incode_afl *afl, uint32_t *link) {
 }
 
 /* So many faces of a list have been passed. */
-static __attribute__((noinline)) void breathe_over(const struct incode_afl *afl,
-                                                   uint32_t passed) {
+static __attribute__((noinline)) void yield_over(const struct incode_afl *afl,
+                                                 uint32_t passed) {
     for (; passed > INCODE_AFL_BREATH; passed -= INCODE_AFL_BREATH)
-        incode_afl_breathe(afl, 1);
+        incode_afl_yield(afl, 1);
 }
 
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
@@ -321,7 +321,7 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
             }
             unlink_node(afl, link);
             if (passed > INCODE_AFL_BREATH)
-                breathe_over(afl, passed);
+                yield_over(afl, passed);
             return true;
         }
         if (node->key == key && node->b == b && node->c == c) {
@@ -334,7 +334,7 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
     if (passed >= INCODE_AFL_CROWD && afl->crowded == INCODE_NONE)
         afl->crowded = key;
     if (passed > INCODE_AFL_BREATH)
-        breathe_over(afl, passed);
+        yield_over(afl, passed);
     if (passed >= 2 * INCODE_AFL_CROWD)
         widen(afl, key);
     return false;
@@ -377,7 +377,7 @@ uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
         while (*link != INCODE_AFL_NIL && !pending) {
             struct incode_afl_node *node = &afl->nodes[*link];
             bool held = is_held(afl, *link);
-            incode_afl_breathe_at(afl, ++looks);
+            incode_afl_yield_at(afl, ++looks);
             if (node->key != v || held || taken == limit) {
                 *more = *more || node->key == v;
                 pending = node->key == v && !held;

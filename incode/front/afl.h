@@ -19,7 +19,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "incode/predicates/pause.h"
+#include "incode/predicates/yield.h"
 
 enum incode_face_state {
     INCODE_FACE_OPEN,
@@ -49,7 +49,7 @@ enum {
 };
 
 struct incode_afl {
-    struct incode_pause *pause; /* or NULL */
+    struct incode_yield *yield; /* or NULL */
     struct incode_afl_node *nodes;
     uint32_t *heads;
     uint64_t *held, *foreign; /* a bit a node; what is foreign is held, too */
@@ -76,17 +76,17 @@ static inline bool incode_touched_used(const struct incode_touched *entry) {
     return entry->brick != UINT32_MAX;
 }
 
-static inline void incode_afl_breathe(const struct incode_afl *afl,
-                                      uint32_t units) {
-    if (afl->pause != NULL)
-        incode_breathe(afl->pause, units);
+static inline void incode_afl_yield(const struct incode_afl *afl,
+                                    uint32_t units) {
+    if (afl->yield != NULL)
+        incode_yield_after(afl->yield, units);
 }
 
 /* In a loop over many, at number i: now and then. */
-static inline void incode_afl_breathe_at(const struct incode_afl *afl,
-                                         uint32_t i) {
+static inline void incode_afl_yield_at(const struct incode_afl *afl,
+                                       uint32_t i) {
     if (i % INCODE_AFL_BREATH == 0)
-        incode_afl_breathe(afl, 1);
+        incode_afl_yield(afl, 1);
 }
 
 /* Asks for what each of some lists has next, in the cache, and goes on to where
@@ -109,7 +109,7 @@ static inline uint32_t incode_afl_fetch(const struct incode_afl *afl,
 /* Bytes for so many faces and touched bricks. */
 size_t incode_afl_bytes(uint32_t capacity, uint32_t bricks);
 void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
-                     uint32_t bricks, struct incode_pause *pause);
+                     uint32_t bricks, struct incode_yield *yield);
 void incode_afl_clear(struct incode_afl *afl);
 
 /* The entry of a brick, made where there is none.  The caller keeps enough free

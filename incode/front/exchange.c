@@ -259,7 +259,7 @@ int incode_front_take(struct incode_front *front, const uint32_t v[4]) {
         if (!incode_front_key(front, f, NULL, &turn))
             continue;
         const uint32_t g[3] = {f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]};
-        incode_afl_breathe(&front->afl, 1);
+        incode_afl_yield(&front->afl, 1);
         incode_front_toggle(front, g, false);
     }
     return 0;
@@ -308,7 +308,7 @@ static void sweep_entries(struct incode_front *front) {
     for (; e->sweep_entry < end && commits < SWEEP_COMMITS; e->sweep_entry++) {
         const struct incode_touched *entry =
             &front->afl.touched[e->sweep_entry];
-        incode_afl_breathe_at(&front->afl, e->sweep_entry);
+        incode_afl_yield_at(&front->afl, e->sweep_entry);
         if (!is_closed(front, entry))
             continue;
         set_bit(e->committed, position_of(front, entry->brick));
@@ -330,9 +330,9 @@ static enum incode_turn sweep_on(struct incode_front *front) {
     }
     for (uint32_t i = 0; i < SWEEP_HEADS && e->sweep_head <= afl->mask; i++) {
         uint32_t at = afl->heads[e->sweep_head++];
-        incode_afl_breathe_at(&front->afl, i);
+        incode_afl_yield_at(&front->afl, i);
         for (; at != INCODE_AFL_NIL; at = afl->nodes[at].next) {
-            incode_afl_breathe(afl, 1);
+            incode_afl_yield(afl, 1);
             mark(front, afl->nodes[at].key);
             mark(front, afl->nodes[at].b);
             mark(front, afl->nodes[at].c);

@@ -26,10 +26,10 @@ void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside,
-                       struct incode_pause *pause) {
+                       struct incode_yield *yield) {
     INCODE_ASSERT(bricks > 0);
     memset(front, 0, sizeof *front);
-    front->afl.pause = pause;
+    front->afl.yield = yield;
     front->bricks = bricks;
     front->face_rule = rule;
     front->outside = *outside;
@@ -53,7 +53,7 @@ void incode_front_move(struct incode_front *front, void *memory,
                   (share->entries >= INCODE_ENTRIES_MIN ||
                    share->entries >= incode_front_entries(front->bricks)));
     incode_afl_init(&front->afl, memory, share->faces, share->entries,
-                    front->afl.pause);
+                    front->afl.yield);
     front->afl.count_max = most;
     front->room_entries = share->entries / 4;
 }
@@ -246,7 +246,7 @@ bool incode_front_drain(struct incode_front *front) {
     uint32_t n = incode_afl_take(&front->afl, v, pairs, FACES, &more);
     for (uint32_t i = 0; i < n; i++) {
         const uint32_t f[3] = {v, pairs[i][0], pairs[i][1]};
-        incode_afl_breathe(&front->afl, 2);
+        incode_afl_yield(&front->afl, 2);
         if (key_of(front, f) == 0)
             memcpy(pairs[stay++], f + 1, sizeof pairs[0]);
         else
@@ -271,7 +271,7 @@ static uint32_t spill_position(const struct incode_front *front) {
     uint32_t nearest = UINT32_MAX, farthest = 0, work = front->current;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         const struct incode_touched *entry = &front->afl.touched[i];
-        incode_afl_breathe_at(&front->afl, i);
+        incode_afl_yield_at(&front->afl, i);
         if (!incode_touched_used(entry))
             continue;
         uint32_t position = incode_position(front, entry->brick);
@@ -295,7 +295,7 @@ static bool evict_brick(struct incode_front *front,
     for (uint32_t slot = 0; slot < INCODE_BRICK_POINTS; slot++) {
         uint32_t v = brick * INCODE_BRICK_POINTS + slot, pairs[8][2];
         bool more = true;
-        incode_afl_breathe(&front->afl, 1);
+        incode_afl_yield(&front->afl, 1);
         incode_afl_free(&front->afl, v);
         while (more) {
             if (front->spill_count > 0 && !incode_front_flush(front))
@@ -326,7 +326,7 @@ static void evict_next(struct incode_front *front) {
     while (front->spill_cursor < front->afl.touched_max) {
         const struct incode_touched *entry =
             &front->afl.touched[front->spill_cursor];
-        incode_afl_breathe_at(&front->afl, front->spill_cursor);
+        incode_afl_yield_at(&front->afl, front->spill_cursor);
         if (incode_touched_used(entry) && is_spilled(front, entry->brick)) {
             (void)evict_brick(front, entry);
             return;
@@ -382,7 +382,7 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
     struct incode_touched *entry = NULL;
     for (size_t i = 0; i < count; i++) {
         const uint32_t *f = faces[i].v;
-        incode_afl_breathe(&front->afl, 1);
+        incode_afl_yield(&front->afl, 1);
         if (!may_return(front, brick, f))
             return -1;
         if (front->afl.count + 1 >= front->afl.capacity ||

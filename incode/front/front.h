@@ -176,12 +176,12 @@ static inline uint32_t incode_front_entries(uint32_t bricks) {
 size_t incode_front_bytes(const struct incode_front_share *share);
 
 /* memory: aligned to 64 bytes, incode_front_bytes of the share.  bricks: of the
- * whole set, 1 at least.  pause: told of what takes long, or NULL; it stays. */
+ * whole set, 1 at least.  yield: told of what takes long, or NULL; it stays. */
 void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside,
-                       struct incode_pause *pause);
+                       struct incode_yield *yield);
 
 /* Abandons the job at work, its fault and what it waits for, if there is one.
  */

@@ -191,7 +191,7 @@ static struct incode_touched *next_foreign(struct incode_front *front) {
     uint32_t least = 0;
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
         struct incode_touched *entry = &front->afl.touched[i];
-        incode_afl_breathe_at(&front->afl, i);
+        incode_afl_yield_at(&front->afl, i);
         if (!incode_touched_used(entry) || is_returning(front, entry->brick))
             continue;
         if (entry->faces == 0 && entry->waiting == 0)
@@ -223,7 +223,7 @@ static enum incode_turn finish(struct incode_front *front) {
             front->outside.commit(front->outside.context, brick);
     }
     for (uint32_t i = 0; i < front->afl.touched_max; i++) {
-        incode_afl_breathe_at(&front->afl, i);
+        incode_afl_yield_at(&front->afl, i);
         if (incode_touched_used(&front->afl.touched[i]))
             incode_afl_drop(&front->afl, front->afl.touched[i].brick);
     }

@@ -22,7 +22,7 @@
 
 enum {
     JUDGED = 1024,  /* cells a step */
-    AT_ONCE = 16,   /* cells, in a breath */
+    AT_ONCE = 16,   /* cells between two yields */
     SHOWN = 256,    /* cells looked at as a unit of work */
     LARGE = 32,     /* a cavity of more than such a part of the cells */
     FEW = 128,      /* cells: looking at all is better than a search */
@@ -73,16 +73,16 @@ enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n) {
 }
 
 /* Now and then in a loop over cells. */
-static inline void breathe_at(const struct incode_insertion *n, uint32_t cell) {
+static inline void yield_at(const struct incode_insertion *n, uint32_t cell) {
     if (cell % AT_ONCE == 0)
-        incode_maker_breathe(n->maker, AT_ONCE / 4);
+        incode_maker_yield(n->maker, AT_ONCE / 4);
 }
 
 /* Where to stop after some cells. */
 static uint32_t some_cells(const struct incode_insertion *n) {
     uint32_t cells = n->complex.cells;
     incode_walker_spend(&n->maker->walker, JUDGED / INCODE_INSERTION_CELLS);
-    incode_maker_breathe(n->maker, JUDGED / AT_ONCE);
+    incode_maker_yield(n->maker, JUDGED / AT_ONCE);
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
@@ -92,7 +92,7 @@ enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n) {
     for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
         if (n->cell % 4 == 0)
-            incode_maker_breathe(n->maker, units);
+            incode_maker_yield(n->maker, units);
         if (incode_cell_is_free(c))
             continue;
         bool final = !incode_rest_reaches(&n->work->rest, x, c);
@@ -147,7 +147,7 @@ enum incode_insertion_step incode_insertion_look(struct incode_insertion *n) {
     struct incode_look *look = &n->work->look;
     uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
     for (; n->cell < end && !incode_look_is_full(look); n->cell++) {
-        breathe_at(n, n->cell);
+        yield_at(n, n->cell);
         if (is_wanted(n, incode_complex_cell(x, n->cell)))
             incode_look_add(look, x, n->cell);
     }
@@ -186,7 +186,7 @@ static uint32_t next_wanted(const struct incode_insertion *n, uint32_t brick) {
 /* Shows a point to a cell that is reached; whether it still is. */
 static bool show(struct incode_insertion *n, struct incode_cell *c,
                  const double p[3]) {
-    incode_maker_breathe(n->maker, 1);
+    incode_maker_yield(n->maker, 1);
     if (!incode_complex_gives_way(&n->complex, &n->maker->counts.tally, c, p))
         return true;
     incode_cell_set_proved(c, UNKNOWN);
@@ -200,7 +200,7 @@ static void show_all(struct incode_insertion *n, const double p[3]) {
     uint32_t left = 0;
     for (uint32_t i = INCODE_COMPLEX_CELLS_FIRST; i < x->cells; i++) {
         struct incode_cell *c = incode_complex_cell(x, i);
-        breathe_at(n, i);
+        yield_at(n, i);
         if (incode_cell_is_free(c) || incode_cell_proved(c) != REACHED ||
             !show(n, c, p))
             continue;
@@ -385,7 +385,7 @@ void incode_look_add(struct incode_look *look, const struct incode_complex *x,
     struct incode_region r;
     const struct incode_cell *c = incode_complex_cell(x, cell);
     INCODE_ASSERT(!incode_look_is_full(look));
-    incode_maker_breathe(look->maker, ADD_UNITS);
+    incode_maker_yield(look->maker, ADD_UNITS);
     if (!incode_region_set_sharp(&r, x, c, look->scale) &&
         !incode_region_set(&r, x, c))
         incode_region_set_all(&r);
@@ -407,11 +407,11 @@ static uint64_t meeting(const struct incode_look *look,
                         const double lo[3], const double hi[3],
                         uint64_t cells) {
     struct incode_lifted l;
-    incode_maker_breathe(look->maker, 2 + count_of(cells) / 2);
+    incode_maker_yield(look->maker, 2 + count_of(cells) / 2);
     uint64_t met = incode_regions_meeting(&look->regions, cells, lo, hi);
     if (met == 0 || !incode_boxes_lifted(boxes, child, &l))
         return met;
-    incode_maker_breathe(look->maker, count_of(met));
+    incode_maker_yield(look->maker, count_of(met));
     return incode_regions_meeting_lifted(&look->regions, met, boxes, &l);
 }
 
@@ -442,7 +442,7 @@ static enum incode_look_result look_below(struct incode_look *look,
     uint32_t first = index * INCODE_FANOUT;
     uint32_t count = tree->count[level - 1] - first;
     count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
-    incode_maker_breathe(look->maker, 4);
+    incode_maker_yield(look->maker, 4);
     incode_boxes_axes(&boxes, lo, hi);
     for (uint32_t i = 0; i < count; i++) {
         uint64_t end = (first + i + 1) * span;
@@ -484,15 +484,15 @@ enum incode_look_result incode_look_go(struct incode_look *look) {
 
 enum {
     CELLS = 256,          /* a step */
-    HANDOVER_AT_ONCE = 16 /* points or cells, in a breath */
+    HANDOVER_AT_ONCE = 16 /* points or cells between two yields */
 };
 
 /* A vertex's `cell`, which is not needed any more. */
 enum { NOT_REACHED = 0, HANDOVER_REACHED = 1 };
 
-static void handover_breathe_at(const struct incode_handover *h, uint32_t i) {
+static void handover_yield_at(const struct incode_handover *h, uint32_t i) {
     if (i % HANDOVER_AT_ONCE == 0)
-        incode_maker_breathe(h->n->maker, HANDOVER_AT_ONCE / 4);
+        incode_maker_yield(h->n->maker, HANDOVER_AT_ONCE / 4);
 }
 
 void incode_handover_begin(struct incode_handover *h,
@@ -504,7 +504,7 @@ void incode_handover_begin(struct incode_handover *h,
     h->vertex = 1;
     h->brick = n->own_first;
     for (uint32_t v = 0; v < x->points; v++) {
-        handover_breathe_at(h, v);
+        handover_yield_at(h, v);
         if (incode_complex_is_vertex(x, v))
             x->point[v].cell = NOT_REACHED;
     }
@@ -546,7 +546,7 @@ static enum incode_insertion_step send_faces(struct incode_handover *h,
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
         const struct incode_cell *c = incode_complex_cell(x, h->cell);
-        handover_breathe_at(h, h->cell);
+        handover_yield_at(h, h->cell);
         if (incode_cell_is_free(c))
             continue;
         if (h->count + 4 > INCODE_BRICK_POINTS && !send(h))
@@ -587,7 +587,7 @@ static enum incode_insertion_step send_reached(struct incode_handover *h) {
         return INCODE_INSERTION_WAITING;
     uint64_t reached = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - points);
     for (uint32_t v = 1; v < x->points; v++) {
-        handover_breathe_at(h, v);
+        handover_yield_at(h, v);
         if (x->point[v].cell == NOT_REACHED &&
             x->point[v].id / INCODE_BRICK_POINTS == brick)
             reached &= ~(UINT64_C(1) << x->point[v].id % INCODE_BRICK_POINTS);

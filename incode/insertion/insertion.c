@@ -16,7 +16,7 @@ enum {
     SAMPLE_SHARE = 16,       /* of the room for points */
     RESERVE = 4096,          /* bytes */
     ALIGNED = 64,            /* the same */
-    AT_ONCE = 16,            /* points, in a breath */
+    AT_ONCE = 16,            /* points between two yields */
     A_STEP = 8,              /* units, of what is the same for all points */
     LOAD_A_UNIT = 2          /* points */
 };
@@ -63,7 +63,7 @@ static void begin_job(struct incode_insertion *n, bool whole) {
     uint32_t bricks = n->maker->tree.bricks;
     incode_complex_clear(&n->complex);
     if (n->inserted != NULL)
-        incode_pause_fill(&n->maker->counts.tally.pause, n->inserted, 0,
+        incode_yield_fill(&n->maker->counts.tally.yield, n->inserted, 0,
                           bricks * sizeof *n->inserted);
     n->whole = whole;
     n->from = n->to = n->own_first;
@@ -133,9 +133,9 @@ static bool is_short(const struct incode_insertion *n) {
 /* ---- the points ---- */
 
 /* Now and then in a loop over all points. */
-static inline void breathe_at(const struct incode_insertion *n, uint32_t v) {
+static inline void yield_at(const struct incode_insertion *n, uint32_t v) {
     if (v % AT_ONCE == 0)
-        incode_maker_breathe(n->maker, 2);
+        incode_maker_yield(n->maker, 2);
 }
 
 /* The points of the bricks at work that are vertices. */
@@ -143,7 +143,7 @@ static void mark_there(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     memset(n->there, 0, sizeof n->there);
     for (uint32_t v = 1; v < x->points; v++) {
-        breathe_at(n, v);
+        yield_at(n, v);
         uint32_t id = x->point[v].id, brick = id / INCODE_BRICK_POINTS;
         if (incode_complex_is_vertex(x, v) && brick >= n->from && brick < n->to)
             n->there[brick - n->from] |= UINT64_C(1)
@@ -194,7 +194,7 @@ static uint32_t staged(const struct incode_insertion *n, uint32_t i) {
 static uint32_t vertices(const struct incode_insertion *n) {
     uint32_t count = 0;
     for (uint32_t v = 1; v < n->complex.points; v++) {
-        breathe_at(n, v);
+        yield_at(n, v);
         count += incode_complex_is_vertex(&n->complex, v);
     }
     return count;
@@ -286,7 +286,7 @@ static enum incode_insertion_step load(struct incode_insertion *n) {
     if (f == NULL)
         return INCODE_INSERTION_WAITING;
     const struct incode_brick *b = &f->page.brick;
-    incode_maker_breathe(n->maker, f->count / LOAD_A_UNIT);
+    incode_maker_yield(n->maker, f->count / LOAD_A_UNIT);
     for (uint32_t i = 0; i < f->count; i++) {
         const double p[3] = {b->x[i], b->y[i], b->z[i]};
         uint32_t id = n->brick * INCODE_BRICK_POINTS + i;
@@ -312,7 +312,7 @@ static uint32_t find_off(struct incode_insertion *n, uint32_t from,
     uint32_t all = n->complex.points - 1;
     for (uint32_t i = 0; i < all; i++) {
         uint32_t at = 1 + (from + i) % all;
-        incode_maker_breathe(n->maker, 1);
+        incode_maker_yield(n->maker, 1);
         if (count == 2 ? !incode_collinear(p[v[0]].p, p[v[1]].p, p[at].p)
                        : incode_orient3d(&n->maker->counts.tally, p[v[0]].p,
                                          p[v[1]].p, p[v[2]].p, p[at].p) != 0)
@@ -411,7 +411,7 @@ static enum incode_insertion_step insert(struct incode_insertion *n) {
     unsigned done = 0;
     for (; n->next < n->staged_count; n->next++) {
         uint32_t v = staged(n, n->next);
-        breathe_at(n, n->next);
+        yield_at(n, n->next);
         if (!incode_complex_is_vertex(x, v)) {
             if (round_of(x->point[v].id) < n->level)
                 continue;
@@ -491,7 +491,7 @@ enum incode_insertion_step incode_insertion_step(struct incode_insertion *n) {
     enum incode_insertion_step r = INCODE_INSERTION_WORKED;
     for (unsigned i = 0;
          i < INCODE_INSERTION_STEPS && r == INCODE_INSERTION_WORKED; i++) {
-        incode_maker_breathe(n->maker, A_STEP);
+        incode_maker_yield(n->maker, A_STEP);
         r = step(n);
         note_used(n);
         incode_walker_spend(&n->maker->walker, 1);

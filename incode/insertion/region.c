@@ -299,10 +299,10 @@ uint64_t incode_regions_meeting_lifted(const struct incode_regions *r,
 
 enum {
     EMIT_A_UNIT = 8,   /* tetrahedra, of what a step may work */
-    EMIT_A_BREATH = 2, /* of incode/predicates/pause.h */
+    EMIT_A_BREATH = 2, /* of incode/predicates/yield.h */
     FETCHED = 32,      /* lists, side by side */
     FETCHED_MOST = 8,  /* of each, cells that come first */
-    AT_ONCE = 16       /* points or cells, in a breath */
+    AT_ONCE = 16       /* points or cells between two yields */
 };
 
 /* Which of a cell's vertices is the smallest, whose brick owns it. */
@@ -323,7 +323,7 @@ static void forget_cells(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     for (uint32_t v = 0; v < x->points; v++) {
         if (v % AT_ONCE == 0)
-            incode_maker_breathe(n->maker, 1);
+            incode_maker_yield(n->maker, 1);
         x->point[v].cell = INCODE_NONE;
     }
 }
@@ -340,7 +340,7 @@ static void keep_pending(struct incode_insertion *n) {
             struct incode_cell *c = incode_complex_cell(x, i);
             bool kept = incode_cell_proved(c) == 0;
             if (i % AT_ONCE == 0)
-                incode_maker_breathe(n->maker, AT_ONCE / 4);
+                incode_maker_yield(n->maker, AT_ONCE / 4);
             if (incode_cell_is_free(c) || kept != (pass == 0))
                 continue;
             for (unsigned k = 0; k < 4 && pass == 1; k++)
@@ -370,7 +370,7 @@ enum incode_insertion_step incode_insertion_list(struct incode_insertion *n) {
     uint32_t end = x->cells - n->cell < INCODE_INSERTION_CELLS
                        ? x->cells
                        : n->cell + INCODE_INSERTION_CELLS;
-    incode_maker_breathe(n->maker, INCODE_INSERTION_CELLS / 4);
+    incode_maker_yield(n->maker, INCODE_INSERTION_CELLS / 4);
     for (; n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
         if (incode_cell_is_free(c) || incode_cell_proved(c) == 0 ||
@@ -423,7 +423,7 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
     n->outside.emit(n->outside.context, v->id, (const uint32_t(*)[3])n->apexes,
                     count);
     n->kept += count;
-    incode_maker_breathe(n->maker, (uint32_t)count / EMIT_A_BREATH);
+    incode_maker_yield(n->maker, (uint32_t)count / EMIT_A_BREATH);
     incode_walker_spend(&n->maker->walker, (uint32_t)count / EMIT_A_UNIT);
     return INCODE_INSERTION_WORKED;
 }
@@ -434,7 +434,7 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
 static void fetch(const struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     uint32_t next[FETCHED], count = 0, end = x->points - n->v;
-    incode_maker_breathe(n->maker, FETCHED * FETCHED_MOST / 8);
+    incode_maker_yield(n->maker, FETCHED * FETCHED_MOST / 8);
     for (uint32_t i = 0; i < FETCHED && i < end; i++) {
         next[count] = x->point[n->v + i].cell;
         if (next[count] == INCODE_NONE)
@@ -475,14 +475,14 @@ incode_insertion_release(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t words = (n->maker->tree.bricks + 63) / 64, latest = 0;
     uint32_t free = x->free_count;
-    incode_complex_release(x, &n->maker->counts.tally.pause);
+    incode_complex_release(x, &n->maker->counts.tally.yield);
     if (free == x->free_count && !n->closed)
         return INCODE_INSERTION_FULL; /* all of it is kept for bricks to come */
     memset(n->touched, 0, words * sizeof *n->touched);
     for (uint32_t v = 1; v < x->points; v++) {
         uint32_t id = x->point[v].id;
         if (v % AT_ONCE == 0)
-            incode_maker_breathe(n->maker, 1);
+            incode_maker_yield(n->maker, 1);
         if (!incode_complex_is_vertex(x, v))
             continue;
         incode_insertion_set_bit(n->touched, id / INCODE_BRICK_POINTS);
@@ -505,13 +505,13 @@ static bool is_half_full(const struct incode_insertion *n) {
 enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n) {
     for (; n->brick < n->from; n->brick++) {
         if (n->brick % AT_ONCE == 0)
-            incode_maker_breathe(n->maker, 1);
+            incode_maker_yield(n->maker, 1);
         if ((n->touched[n->brick / 64] >> n->brick % 64 & 1) != 0 ||
             incode_insertion_has_committed(n, n->brick))
             continue;
         if (n->outside.emit_room(n->outside.context) == 0)
             return INCODE_INSERTION_WAITING;
-        incode_maker_breathe(n->maker, 1);
+        incode_maker_yield(n->maker, 1);
         incode_insertion_set_bit(n->committed, n->brick);
         n->outside.commit(n->outside.context, n->brick);
     }

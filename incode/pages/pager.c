@@ -24,7 +24,7 @@ size_t incode_pager_bytes(uint32_t frames) {
 
 void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks,
-                       struct incode_pause *pause) {
+                       struct incode_yield *yield) {
     INCODE_ASSERT(frames >= 1 && frames < INCODE_NO_FRAME &&
                   (uintptr_t)memory % alignof(struct incode_frame) == 0);
     memset(pager, 0, sizeof *pager);
@@ -40,7 +40,7 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
     pager->loading_max = frames / 4 < 1 ? 1 : frames / 4;
     pager->bricks = bricks;
     memset(pager->oldest, 0, pager->group_count * sizeof pager->oldest[0]);
-    incode_pause_fill(pause, pager->heads, 0xff, /* INCODE_NO_FRAME each */
+    incode_yield_fill(yield, pager->heads, 0xff, /* INCODE_NO_FRAME each */
                       (pager->hash_mask + 1) * sizeof pager->heads[0]);
 }
 

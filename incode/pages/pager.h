@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "incode/predicates/pause.h"
+#include "incode/predicates/yield.h"
 #include "pages.h"
 
 enum incode_frame_state {
@@ -89,11 +89,11 @@ struct incode_pager {
 
 size_t incode_pager_bytes(uint32_t frames);
 
-/* memory: aligned to 64 bytes; 1 <= frames < INCODE_NO_FRAME.  pause: counts
+/* memory: aligned to 64 bytes; 1 <= frames < INCODE_NO_FRAME.  yield: counts
  * the work, which grows with the frames. */
 void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks,
-                       struct incode_pause *pause);
+                       struct incode_yield *yield);
 
 /* The frame of a page that is ready, now the most recently used; NULL: it is
  * not, and is asked for as far as credit and frames allow. */

@@ -27,7 +27,7 @@ size_t incode_builder_min(uint32_t lists) {
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
                          const struct incode_page_source *source,
-                         const struct incode_pause *pause) {
+                         const struct incode_yield *yield) {
     INCODE_ASSERT(lists >= 1 && lists <= INCODE_LISTS_MAX);
     INCODE_ASSERT(bytes >= incode_builder_min(lists));
     size_t places = lent_bytes(lists);
@@ -38,9 +38,9 @@ void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
     memcpy(points.lo, setup->lo, sizeof points.lo);
     memcpy(points.hi, setup->hi, sizeof points.hi);
     memcpy(points.cells, setup->cells, sizeof points.cells);
-    struct incode_pause began = *pause;
+    struct incode_yield began = *yield;
     memset(b, 0, sizeof *b);
-    incode_breathe(&began, INCODE_PAUSE_UNITS);
+    incode_yield_after(&began, INCODE_YIELD_UNITS);
     b->lent = memory;
     b->lists = lists;
     b->bytes = places + incode_maker_bytes(&share);

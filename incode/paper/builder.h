@@ -42,12 +42,12 @@ struct incode_builder {
 size_t incode_builder_min(uint32_t lists);
 
 /* memory: aligned to 64 bytes, at least incode_builder_min(lists) of it; lists:
- * at a time, 1 to INCODE_LISTS_MAX.  setup: sound.  pause: who is called while
+ * at a time, 1 to INCODE_LISTS_MAX.  setup: sound.  yield: who is called while
  * a step is long. */
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
                          const struct incode_page_source *source,
-                         const struct incode_pause *pause);
+                         const struct incode_yield *yield);
 
 /* Takes a list, of which incode_list_bytes are read; false: there is no room
  * for it.  What is no list is a fault. */

@@ -50,15 +50,15 @@ size_t incode_manager_min(void) {
 void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_front_outside *outside,
-                         const struct incode_pause *pause) {
+                         const struct incode_yield *yield) {
     struct incode_front_share share = share_of(bytes);
     INCODE_ASSERT(setup->face_rule == INCODE_FACE_OWN);
     INCODE_ASSERT(incode_front_bytes(&share) <= bytes);
     memset(m, 0, sizeof *m);
-    m->pause = *pause;
+    m->yield = *yield;
     m->bytes = incode_front_bytes(&share);
     incode_front_init(&m->front, memory, &share, setup->bricks, INCODE_FACE_OWN,
-                      outside, &m->pause);
+                      outside, &m->yield);
     m->front.window = WINDOW;
     m->front.owner_rule = (enum incode_owner_rule)setup->owner_rule;
 }

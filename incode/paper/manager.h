@@ -19,7 +19,7 @@
 enum { INCODE_COUNTS = 64 /* bricks whose points are known, at most */ };
 
 struct incode_manager {
-    struct incode_pause pause;
+    struct incode_yield yield;
     struct incode_front front;
     size_t bytes;                        /* of the active face list */
     struct incode_answers taken;         /* at work, */
@@ -40,12 +40,12 @@ struct incode_manager {
 size_t incode_manager_min(void);
 
 /* memory: aligned to 64 bytes, at least incode_manager_min() of it.  setup:
- * sound, and of the face rule `own`, as the other one asks for points.  pause:
+ * sound, and of the face rule `own`, as the other one asks for points.  yield:
  * who is called while a step is long. */
 void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_front_outside *outside,
-                         const struct incode_pause *pause);
+                         const struct incode_yield *yield);
 
 /* Begins a job; no list may be out. */
 void incode_manager_start(struct incode_manager *m,

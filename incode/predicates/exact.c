@@ -247,7 +247,7 @@ static void settle(struct settled *to, const struct problem *s) {
 
 enum {
     TOP = 8,   /* limbs of an orient3d: the others seldom matter */
-    UNITS = 40 /* of pause.h, an orient3d or its product with a square */
+    UNITS = 40 /* of yield.h, an orient3d or its product with a square */
 };
 
 /* Sums of positive terms and of negative ones. */
@@ -283,7 +283,7 @@ static void add_times(uint32_t *sum, const uint32_t *limb, int32_t count,
 }
 
 /* sums += sign * |p|^2 * (limbs [first, last) of d), square by square. */
-static void add_lifted(struct sums *sums, struct incode_pause *pause,
+static void add_lifted(struct sums *sums, struct incode_yield *yield,
                        const struct settled *d, const struct term p[3],
                        int32_t first, int32_t last, int sign) {
     uint32_t *sum = sums->limb[sign < 0];
@@ -292,7 +292,7 @@ static void add_lifted(struct sums *sums, struct incode_pause *pause,
         uint64_t carry = 0;
         if (p[k].sign == 0)
             continue;
-        incode_breathe(pause, UNITS);
+        incode_yield_after(yield, UNITS);
         term_product(&square, &p[k], &p[k]);
         int32_t at = first + square.e / 32, shift = square.e % 32;
         for (int32_t i = 0; i <= square.limbs; i++) {
@@ -328,7 +328,7 @@ static int compare(const struct sums *sums, int32_t bits) {
 
 /* The sums of the top limbs of each orient3d, or of the others. */
 static void add_all(struct sums *sums, struct problem *s,
-                    struct incode_pause *pause, bool top) {
+                    struct incode_yield *yield, bool top) {
     /* -det with rows (x, y, z, |p|^2, 1), by its fourth column: the orient3d of
      * the four other points, times -(-1)^i |p_i|^2. */
     for (int32_t i = 0; i < 5; i++) {
@@ -341,19 +341,19 @@ static void add_all(struct sums *sums, struct problem *s,
         for (uint8_t k = 0; k < 5; k++)
             if (k != i)
                 rest[n++] = k;
-        incode_breathe(pause, UNITS);
+        incode_yield_after(yield, UNITS);
         set_orient3d(s, rest);
         settle(&d, s);
         int32_t middle = d.last - TOP > d.first ? d.last - TOP : d.first;
         int sign = i % 2 == 0 ? -d.sign : d.sign;
         if (sign != 0 && (top || middle > d.first))
-            add_lifted(sums, pause, &d, q, top ? middle : d.first,
+            add_lifted(sums, yield, &d, q, top ? middle : d.first,
                        top ? d.last : middle, sign);
     }
 }
 
 int incode_exact_in_sphere(const double *const p[5],
-                           struct incode_pause *pause) {
+                           struct incode_yield *yield) {
     struct problem s;
     struct sums sums;
     problem_init(&s, p, 5, 3);
@@ -362,11 +362,11 @@ int incode_exact_in_sphere(const double *const p[5],
     INCODE_ASSERT(sums.limbs <= LIFTED_LIMBS_MAX);
     for (int32_t i = 0; i < 2; i++)
         memset(sums.limb[i], 0, (size_t)sums.limbs * sizeof sums.limb[0][0]);
-    add_all(&sums, &s, pause, true);
+    add_all(&sums, &s, yield, true);
     int sign = compare(&sums, sums.doubt);
     if (sign != 0 || sums.doubt == 0)
         return sign;
-    add_all(&sums, &s, pause, false);
+    add_all(&sums, &s, yield, false);
     return compare(&sums, 0);
 }
 

@@ -10,14 +10,14 @@
  * Memory: at most 6 KB of stack (INCODE_EXACT_STACK).  Work: 24 (orient3d), 12
  * (compare_distance) or 18 (collinear) monomials; in_sphere 5 times orient3d
  * and, of the widest exponents, up to 15 products of 5 limbs and 200, as often
- * as not 8; it breathes. */
+ * as not 8; it yields. */
 #ifndef INCODE_EXACT_H
 #define INCODE_EXACT_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pause.h"
+#include "yield.h"
 
 /* Stack of the deepest call here, bytes, on any of the machines built for. */
 #define INCODE_EXACT_STACK 6144
@@ -28,7 +28,7 @@ int incode_exact_orient3d(const double *const p[4]);
 /* +1: p4 inside the sphere through p0..p3, 0: on it, -1: outside, where
  * orient3d(p0..p3) > 0; antisymmetric in all five points. */
 int incode_exact_in_sphere(const double *const p[5],
-                           struct incode_pause *pause);
+                           struct incode_yield *yield);
 
 /* Sign of |p1-p0|^2 - |p2-p0|^2. */
 int incode_exact_compare_distance(const double *const p[3]);

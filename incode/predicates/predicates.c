@@ -4,27 +4,27 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "pause.h"
+#include "yield.h"
 #include "check.h"
 #include "exact.h"
 #include "tie.h"
 
 enum { FILLED = 8192, FILLED_UNITS = 16 }; /* bytes at once, and their work */
 
-void incode_pause_look(struct incode_pause *pause) {
-    uint32_t units = INCODE_PAUSE_UNITS_MAX;
-    if (pause->look != NULL)
-        units = pause->look(pause->context);
-    INCODE_ASSERT(units >= 1 && units <= INCODE_PAUSE_UNITS_MAX);
-    pause->left = (int32_t)units;
+void incode_yield_poll(struct incode_yield *yield) {
+    uint32_t units = INCODE_YIELD_UNITS_MAX;
+    if (yield->poll != NULL)
+        units = yield->poll(yield->context);
+    INCODE_ASSERT(units >= 1 && units <= INCODE_YIELD_UNITS_MAX);
+    yield->left = (int32_t)units;
 }
 
-void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
+void incode_yield_fill(struct incode_yield *yield, void *memory, int byte,
                        size_t bytes) {
     uint8_t *at = memory;
     for (size_t done; bytes > 0; at += done, bytes -= done) {
         done = bytes < FILLED ? bytes : FILLED;
-        incode_breathe(pause, FILLED_UNITS);
+        incode_yield_after(yield, FILLED_UNITS);
         memset(at, byte, done);
     }
 }
@@ -38,7 +38,7 @@ void incode_pause_fill(struct incode_pause *pause, void *memory, int byte,
  *   the polynomial itself, without rounding (exact.h).
  * Stack: below INCODE_EXACT_STACK + 1024 bytes. */
 
-/* Units of work, as pause.h counts them, of what no filter decides, at the
+/* Units of work, as yield.h counts them, of what no filter decides, at the
  * most: fixed.h and pair.h, then exact.h, which counts in_sphere itself. */
 enum { ORIENT3D_UNITS = 10, IN_SPHERE_UNITS = 32, EXACT_ORIENT3D_UNITS = 64 };
 
@@ -73,7 +73,7 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
             return -1;
     }
     tally->exact_orient3d++;
-    incode_breathe(&tally->pause, ORIENT3D_UNITS);
+    incode_yield_after(&tally->yield, ORIENT3D_UNITS);
     const double *p[4] = {a, b, c, d};
     int64_t n[3][3];
     if (incode_fixed_differences(n, p + 1, 3, a, most))
@@ -81,7 +81,7 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     int sign;
     if (incode_pair_orient3d(p, most, &sign))
         return sign;
-    incode_breathe(&tally->pause, EXACT_ORIENT3D_UNITS);
+    incode_yield_after(&tally->yield, EXACT_ORIENT3D_UNITS);
     return incode_exact_orient3d(p);
 }
 
@@ -117,12 +117,12 @@ static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
     int64_t n[4][3];
     int sign;
     tally->exact_in_sphere++;
-    incode_breathe(&tally->pause, IN_SPHERE_UNITS);
+    incode_yield_after(&tally->yield, IN_SPHERE_UNITS);
     if (incode_fixed_differences(n, p, 4, p[4], most))
         return incode_fixed_in_sphere((const int64_t(*)[3])n, near_zero);
     if (incode_pair_in_sphere(p, most, &sign))
         return sign;
-    sign = incode_exact_in_sphere(p, &tally->pause);
+    sign = incode_exact_in_sphere(p, &tally->yield);
     return sign != 0 ? sign : in_sphere_tie(tally, p);
 }
 

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pause.h"
+#include "yield.h"
 
 /* How often the static filter could not tell and the exact stage decided, and
  * who is to be called while much is asked: what is exact counts itself there,
@@ -21,7 +21,7 @@
 struct incode_tally {
     uint64_t exact_orient3d;
     uint64_t exact_in_sphere;
-    struct incode_pause pause;
+    struct incode_yield yield;
 };
 
 /* Static filters of Devillers and Pion: the sign of the rounded determinant, as

@@ -58,7 +58,7 @@ bool node_face_manager_start(struct node_face_manager *f, void *memory,
     node_outlet_init(&f->outlet, memory, bytes, setup, counted, fault);
     const struct incode_front_outside outside = node_outlet_outside(&f->outlet);
     incode_manager_init(&f->manager, (uint8_t *)memory + boxes, bytes - boxes,
-                        &setup->setup, &outside, &counted->pause);
+                        &setup->setup, &outside, &counted->yield);
     return true;
 }
 

@@ -50,7 +50,7 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
     node_requests_init(&t->requests, setup, NULL, counted, fault);
     const struct incode_page_source source = node_requests_source(&t->requests);
     incode_builder_init(&t->builder, memory, bytes, &setup->setup,
-                        setup->jobs_per_worker, &source, &counted->pause);
+                        setup->jobs_per_worker, &source, &counted->yield);
     t->builder.number = counted->self;
     return true;
 }

@@ -113,7 +113,7 @@ bool node_triangulation_start(struct node_triangulation *t, void *arena,
         .pages = node_requests_source(&t->requests),
         .front = node_outlet_outside(&t->outlet),
         .peers = *peers,
-        .pause = counted->pause};
+        .yield = counted->yield};
     t->triangulator = incode_triangulator_init(memory + before, bytes - before,
                                                &setup->setup, &outside, &why);
     if (t->triangulator == NULL)

@@ -222,7 +222,7 @@ static void stages_orient3d(struct record *record, const double *const p[5]) {
 static void stages_in_sphere(struct record *record, const double *const p[5]) {
     int64_t n[4][3];
     double most = reach(p, 4, p[4]);
-    struct incode_pause pause = {0};
+    struct incode_yield pause = {0};
     int exact = incode_exact_in_sphere(p, &pause), sign;
     record_sign(record, "in_sphere, exact", exact);
     sign = incode_pair_in_sphere(p, most, &sign) ? sign : exact;

@@ -275,7 +275,7 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
     memcpy(s->setup.cells, s->order.cells, sizeof s->setup.cells);
     const struct incode_front_outside outside = {
         s, lend_emit_room, lend_emit, lend_commit, lend_spill, lend_unspill};
-    const struct incode_pause pause = {0};
+    const struct incode_yield yield = {0};
     size_t bytes = s->memory == 0 ? incode_manager_min() : s->memory;
     s->memory_of_manager = aligned_alloc(64, (bytes + 63) / 64 * 64);
     s->builder = calloc(s->builders, sizeof *s->builder);
@@ -284,7 +284,7 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
     assert_non_null(s->builder);
     assert_non_null(s->committed);
     incode_manager_init(&s->manager, s->memory_of_manager, bytes, &s->setup,
-                        &outside, &pause);
+                        &outside, &yield);
     for (uint32_t i = 0; i < s->builders; i++) {
         struct lend_builder *b = &s->builder[i];
         size_t least = incode_builder_min(s->jobs);
@@ -294,7 +294,7 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
         memset(b->memory, 0xa5, least);
         const struct incode_page_source source = {b, lend_request};
         incode_builder_init(&b->builder, b->memory, least, &s->setup, s->jobs,
-                            &source, &pause);
+                            &source, &yield);
     }
 }
 

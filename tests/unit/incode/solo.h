@@ -32,7 +32,7 @@ struct solo {
     uint32_t pressure, brick_pressure;
     bool false_start; /* each job is begun twice, the first one abandoned */
     uint32_t units;   /* that a step may work; 0: as many as it likes */
-    struct incode_pause pause;
+    struct incode_yield yield;
 
     /* What became of it. */
     struct host_digest digest;
@@ -187,8 +187,8 @@ static inline bool solo_deliver(struct solo *s) {
     }
     while (s->page_count > 0) {
         solo_deliver_page(s, 0);
-        if (s->pause.look != NULL) /* as a node does between two messages */
-            (void)s->pause.look(s->pause.context);
+        if (s->yield.poll != NULL) /* as a node does between two messages */
+            (void)s->yield.poll(s->yield.context);
     }
     return true;
 }
@@ -279,7 +279,7 @@ static inline void solo_make(struct solo *s,
                                                      solo_emit, solo_commit,
                                                      solo_spill, solo_unspill},
                                            .peers = *peers,
-                                           .pause = s->pause};
+                                           .yield = s->yield};
     const char *why = "";
     s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
                                     &why);

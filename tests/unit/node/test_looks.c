@@ -75,11 +75,11 @@ static void tear_down(void) {
 /* Works so many units of that length each, without a step's end, in pieces of
  * up to `most`. */
 static void work(uint32_t units, uint64_t unit_ns, uint32_t most) {
-    struct incode_pause pause = node_looks_pause(&world.looks);
+    struct incode_yield yield = node_looks_yield(&world.looks);
     uint64_t random = 5;
     for (uint32_t done = 0; done < units;) {
         uint32_t piece = 1 + (uint32_t)(sim_draw(&random) >> 32) % most;
-        incode_breathe(&pause, piece);
+        incode_yield_after(&yield, piece);
         pass(piece * unit_ns);
         (void)cube_poll(world.cube[1], world.now_us);
         done += piece;

@@ -172,7 +172,7 @@ static inline const struct incode_frame *frame_of(struct scene *s,
 /* No page is there; there is room for all. */
 static inline void forget_pages(struct scene *s) {
     const struct incode_page_source source = {s, request};
-    struct incode_pause none = {0};
+    struct incode_yield none = {0};
     incode_pager_init(&s->pager, s->frames, s->order.tree.pages,
                       s->order.bricks, &none);
     s->pager.source = source;
@@ -202,7 +202,7 @@ static inline void open_scene(struct scene *s, making *make, size_t n) {
     s->frames = aligned(incode_pager_bytes(s->order.tree.pages));
     s->memory = aligned(incode_horizon_bytes(BOXES, COPIES));
     s->h = aligned(sizeof *s->h);
-    struct incode_pause nobody = {NULL, NULL, 0};
+    struct incode_yield nobody = {NULL, NULL, 0};
     incode_horizon_init(s->h, s->memory, BOXES, COPIES, &nobody);
     s->walker = (struct incode_walker){&s->pager, &s->order.tree, &s->tally,
                                        &s->candidates, UINT32_MAX};

@@ -115,7 +115,7 @@ static void open_bench(struct bench *b, const struct host_points *set,
     b->memory = aligned_alloc(64, (b->bytes + GUARD + 63) / 64 * 64);
     assert_non_null(b->memory);
     memset(b->memory, 0xa5, b->bytes + GUARD);
-    const struct incode_pause nobody = {NULL, NULL, 0};
+    const struct incode_yield nobody = {NULL, NULL, 0};
     incode_maker_init(&b->maker, b->memory, &share, &points, &source, &nobody);
 }
 

@@ -101,7 +101,7 @@ static uint32_t release(struct scene *s, const double (*p)[3],
         if (final)
             append(s, c, tets);
     }
-    incode_complex_release(x, &s->tally.pause);
+    incode_complex_release(x, &s->tally.yield);
     check_left(s);
     return count;
 }

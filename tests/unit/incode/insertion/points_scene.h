@@ -53,7 +53,7 @@ static inline void points_forget(struct points_scene *s, uint32_t frames,
     const struct incode_page_source source = {s, points_request};
     incode_pager_init(&s->maker.pager, s->set.frames,
                       frames < all ? frames : all, s->set.order.bricks,
-                      &s->maker.counts.tally.pause);
+                      &s->maker.counts.tally.yield);
     s->maker.pager.source = source;
     s->pages = 0;
     s->limit = limit;

@@ -288,7 +288,7 @@ static void trace(uint32_t frames, uint32_t pages, bool shuffled) {
     assert_non_null(memory);
     memset(memory, 0xa5, bytes + 64);
     struct incode_pager pager;
-    struct incode_pause none = {0};
+    struct incode_yield none = {0};
     incode_pager_init(&pager, memory, frames, BRICKS, &none);
     struct model m = {.frames = frames,
                       .loading_max = pager.loading_max,
@@ -346,7 +346,7 @@ TEST(large_numbers) {
     assert_non_null(memory);
     struct incode_pager pager;
     struct model m = {.credit = true};
-    struct incode_pause none = {0};
+    struct incode_yield none = {0};
     incode_pager_init(&pager, memory, FRAMES, 0, &none);
     pager.source.request = request;
     pager.source.context = &m;

@@ -304,8 +304,8 @@ static void check_in_sphere_stages(double (*p)[3], int family, long number,
     int want = reference_in_sphere(p, false), sign;
     double most = largest_difference(p, 0, 4, p[4]);
     int64_t d[4][3];
-    struct incode_pause pause = {0};
-    expect(incode_exact_in_sphere(q, &pause), want, "exact in_sphere", family,
+    struct incode_yield yield = {0};
+    expect(incode_exact_in_sphere(q, &yield), want, "exact in_sphere", family,
            number, p);
     use->exact++;
     if (incode_pair_in_sphere(q, most, &sign)) {

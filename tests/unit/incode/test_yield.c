@@ -7,7 +7,7 @@
 #include "tests/unit/test.h"
 
 enum {
-    ASKED = 64,  /* units, and INCODE_PAUSE_OVER more: 25,600 instructions of a
+    ASKED = 64,  /* units, and INCODE_YIELD_OVER more: 25,600 instructions of a
                     Cortex-M7, of which a basic block has four or five */
     MOST = 10000 /* basic blocks */
 };
@@ -37,7 +37,7 @@ static void holds(const char *kind, uint64_t n, uint8_t index, uint8_t build) {
                      .regions = 1,
                      .memory = 16 << 20,
                      .units = 1000,
-                     .pause = {look, &l, 0}};
+                     .yield = {look, &l, 0}};
     if (host_gen(kind, n, 5, &points, &error) != 0)
         fail_msg("%s", error.text);
     solo_run(&s, points.xyz, points.count);
@@ -58,20 +58,20 @@ static uint32_t ask(void *context) {
     return ++*asked;
 }
 
-TEST(test_pause_asks) {
+TEST(test_yield_asks) {
     uint32_t asked = 0;
-    struct incode_pause pause = {ask, &asked, 0}, none = {0};
-    incode_breathe(&pause, 1); /* nothing was allowed yet */
+    struct incode_yield yield = {ask, &asked, 0}, none = {0};
+    incode_yield_after(&yield, 1); /* nothing was allowed yet */
     assert_int_equal(asked, 1);
-    incode_breathe(&pause, 1);
+    incode_yield_after(&yield, 1);
     assert_int_equal(asked, 1);
-    incode_breathe(&pause, 1);
+    incode_yield_after(&yield, 1);
     assert_int_equal(asked, 2);
     for (int i = 0; i < 1000000; i++)
-        incode_breathe(&none, INCODE_PAUSE_OVER);
+        incode_yield_after(&none, INCODE_YIELD_OVER);
 }
 
-TEST(test_pause_in_points) {
+TEST(test_yield_in_points) {
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_POINTS);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_POINTS);
     holds("sphere", 1000, INCODE_KD, INCODE_BUILD_POINTS);
@@ -80,14 +80,14 @@ TEST(test_pause_in_points) {
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_POINTS);
 }
 
-TEST(test_pause_in_faces) {
+TEST(test_yield_in_faces) {
     holds("hub", 2001, INCODE_KD, INCODE_BUILD_FACES);
     holds("grid", 2744, INCODE_KD, INCODE_BUILD_FACES);
     holds("sphere", 500, INCODE_KD, INCODE_BUILD_FACES);
     holds("uniform", 5000, INCODE_KD, INCODE_BUILD_FACES);
 }
 
-TEST(test_pause_in_searches) {
+TEST(test_yield_in_searches) {
     holds("uniform", 1000, INCODE_NAIVE, INCODE_BUILD_FACES);
     holds("uniform", 2000, INCODE_GRID, INCODE_BUILD_FACES);
     holds("grid", 1000, INCODE_GRID, INCODE_BUILD_FACES);
