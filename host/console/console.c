@@ -279,7 +279,7 @@ static int wait_for_all(struct host_shell *shell, struct host_error *error) {
     return host_visit_settle(&shell->visit, &all, SETTLE_US, error);
 }
 
-/* Beside another program it looks on, and says beside whom. */
+/* Beside another program it watches, and says beside whom. */
 static int reach(struct host_shell *shell, struct host_error *error) {
     struct host_holder holder;
     char text[HOST_HOLDER_TEXT];

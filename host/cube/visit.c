@@ -5,7 +5,7 @@
 
 #include "host/service/parts.h"
 #include "visit_wiring.h"
-#include "host/service/onlookers.h"
+#include "host/service/watchers.h"
 
 enum {
     CHECK_EVERY_US = 20000,
@@ -155,8 +155,8 @@ static void take_answer(struct host_visit *v,
     size_t size = message->size - sizeof head;
     if (head.what == NODE_WHO)
         take_who(v, message->source, data, size);
-    if (v->machine->onlookers != NULL &&
-        host_onlooking_take(&v->onlooking, v->machine, message))
+    if (v->machine->watchers != NULL &&
+        host_watching_take(&v->watching, v->machine, message))
         return;
     if (head.tag != v->tag || head.what != v->what ||
         !host_node_set_has(&v->wanted, message->source))
@@ -244,9 +244,9 @@ static unsigned serve(struct host_visit *v, unsigned i) {
         sent++;
     }
     struct node_question_message theirs;
-    if (node->there && host_onlooking_due(&v->onlooking, i, &theirs) &&
+    if (node->there && host_watching_due(&v->watching, i, &theirs) &&
         write_question(v, i, theirs.tag, theirs.what, 0)) {
-        host_onlooking_sent(&v->onlooking, i);
+        host_watching_sent(&v->watching, i);
         sent++;
     }
     if (node->ping_due && write_ping(v, i)) {
@@ -330,11 +330,11 @@ static int check(struct host_visit *v, struct host_error *error) {
 }
 
 static void look_out(struct host_visit *v) {
-    static const struct host_onlookers_progress none;
-    host_onlooking_look(&v->onlooking, v->machine, v->now_us, &none);
-    for (unsigned i = 0; v->onlooking.asked && i < v->machine->nodes; i++)
+    static const struct host_watchers_progress none;
+    host_watching_look(&v->watching, v->machine, v->now_us, &none);
+    for (unsigned i = 0; v->watching.asked && i < v->machine->nodes; i++)
         if (!v->node[i].there)
-            host_onlooking_leave_out(&v->onlooking, i);
+            host_watching_leave_out(&v->watching, i);
 }
 
 int host_visit_round(struct host_visit *visit, uint64_t wait_us,
@@ -530,7 +530,7 @@ int host_visit_ask(struct host_visit *visit, const struct host_node_set *set,
                    struct host_error *error) {
     struct host_visit *v = visit;
     v->tag =
-        v->tag + 1 == HOST_ONLOOKERS_TAG ? HOST_VISIT_WHO_TAG + 1 : v->tag + 1;
+        v->tag + 1 == HOST_WATCHERS_TAG ? HOST_VISIT_WHO_TAG + 1 : v->tag + 1;
     v->what = what;
     v->target = target;
     v->wanted = *set;

@@ -9,7 +9,7 @@
 
 #include "host/base/node_set.h"
 #include "host/service/in_use.h"
-#include "host/service/onlookers.h"
+#include "host/service/watchers.h"
 #include "node/message.h"
 
 enum { HOST_VISIT_ANSWER_BYTES = CUBE_PAYLOAD_MAX };
@@ -59,7 +59,7 @@ struct host_visit {
     struct host_node_set wanted; /* who is asked, and has not answered */
     uint8_t *answers;            /* of all nodes */
     struct host_in_use use;
-    struct host_onlooking onlooking;
+    struct host_watching watching;
     uint64_t now_us, check_us, ping_us, opened_us;
     uint64_t pong_rtt_us; /* from ping to pong, of late */
     unsigned turn;        /* who is served next, */

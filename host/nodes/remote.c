@@ -385,6 +385,6 @@ struct host_machine host_remote_machine(struct host_remote *remote) {
     machine.ended = machine_ended;
     machine.stop = machine_stop;
     host_offer_machine(&remote->offer, &machine);
-    machine.onlookers = &remote->offer.onlookers;
+    machine.watchers = &remote->offer.watchers;
     return machine;
 }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "in_use.h"
-#include "onlookers.h"
+#include "watchers.h"
 #include "parts.h"
 #include "host/base/progress.h"
 #include "transport/routes.h"
@@ -41,7 +41,7 @@ enum host_in_use_state host_in_use_look(struct host_in_use *in_use,
 
 int host_in_use_fail(const struct host_machine *machine, unsigned node,
                      struct host_error *error) {
-    const struct host_onlookers *them = machine->onlookers;
+    const struct host_watchers *them = machine->watchers;
     const char *holder = them == NULL ? NULL : them->holder(them->context);
     return holder == NULL
                ? host_fail(error, HOST_CUBE,
@@ -190,7 +190,7 @@ static bool is_with_another(const struct host_service *s, unsigned node) {
 }
 
 static void tell_holder(const struct host_service *s, char *text, size_t size) {
-    const struct host_onlookers *them = s->machine->onlookers;
+    const struct host_watchers *them = s->machine->watchers;
     const char *holder = them == NULL ? NULL : them->holder(them->context);
     if (holder == NULL) {
         snprintf(text, size,
@@ -413,7 +413,7 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
                           struct host_error *error) {
     struct host_service *s = service;
     host_detector_begin(s, now_us);
-    host_onlooking_again(&s->onlooking);
+    host_watching_again(&s->watching);
     if (check_outdone(s, error) != 0 || check_renewed(s, error) != 0)
         return error->code;
     s->late = false;

@@ -303,8 +303,7 @@ static int take(struct host_service *service,
     case NODE_WRONG_PAGE:
         return take_wrong_page(service, message, error);
     case NODE_ANSWER:
-        return host_onlooking_take(&service->onlooking, service->machine,
-                                   message)
+        return host_watching_take(&service->watching, service->machine, message)
                    ? 0
                    : unsound(message, error, "answer to what was not asked");
     default:

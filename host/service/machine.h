@@ -11,7 +11,7 @@
 #include "host/base/error.h"
 #include "transport/cube.h"
 
-struct host_onlookers;
+struct host_watchers;
 
 enum {
     HOST_NODES_MAX = 1024,    /* of any machine: 2^CUBE_DIMENSION_MAX */
@@ -74,8 +74,8 @@ struct host_machine {
     /* Leaves the host's wires alone for a time, as another host has them; NULL:
      * there is no other. */
     void (*rest)(void *context, uint64_t rest_us);
-    /* Others who look on at its cube: onlookers.h; NULL: nobody can. */
-    const struct host_onlookers *onlookers;
+    /* Others who watch its cube: watchers.h; NULL: nobody can. */
+    const struct host_watchers *watchers;
     /* Whether every node has ended: true as well where nothing tells.  Called
      * at the end, when no node is to be started again. */
     bool (*ended)(void *context);

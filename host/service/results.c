@@ -512,13 +512,12 @@ static bool serve_work(struct host_service *s, uint16_t to,
 }
 
 /* What goes before the first answer may get lost. */
-static bool serve_onlookers(struct host_service *s, uint16_t to) {
+static bool serve_watchers(struct host_service *s, uint16_t to) {
     struct node_question_message question;
-    if (!host_onlooking_due(&s->onlooking, to, &question) ||
-        !s->report[to].up ||
+    if (!host_watching_due(&s->watching, to, &question) || !s->report[to].up ||
         !send_counted(s, to, NODE_QUESTION, &question, sizeof question))
         return false;
-    host_onlooking_sent(&s->onlooking, to);
+    host_watching_sent(&s->watching, to);
     return true;
 }
 
@@ -533,7 +532,7 @@ static bool serve_node(struct host_service *s, uint16_t to,
         node->ping_last = host_detector_ping(s, to);
         return node->ping_last;
     }
-    if (serve_onlookers(s, to))
+    if (serve_watchers(s, to))
         return true;
     if (serve_work(s, to, error)) {
         node->ping_last = false;

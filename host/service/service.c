@@ -39,15 +39,15 @@ static int read_all(struct host_service *s, unsigned *moved,
     return status;
 }
 
-/* Who looks on asks those nodes alone that have a part in this generation. */
+/* Who watches asks those nodes alone that have a part in this generation. */
 static void look_out(struct host_service *s, uint64_t now_us) {
-    struct host_onlookers_progress progress = {s->ledger.committed,
-                                               s->ledger.bricks, 0};
+    struct host_watchers_progress progress = {s->ledger.committed,
+                                              s->ledger.bricks, 0};
     progress.tetrahedra = s->tets == NULL ? 0 : s->tets->count;
-    host_onlooking_look(&s->onlooking, s->machine, now_us, &progress);
-    for (unsigned i = 0; s->onlooking.asked && i < s->machine->nodes; i++)
+    host_watching_look(&s->watching, s->machine, now_us, &progress);
+    for (unsigned i = 0; s->watching.asked && i < s->machine->nodes; i++)
         if (s->work.lost[i])
-            host_onlooking_leave_out(&s->onlooking, i);
+            host_watching_leave_out(&s->watching, i);
 }
 
 /* One round of the loop: read, serve, and sleep where nothing moved. */
@@ -63,7 +63,7 @@ int host_service_round(struct host_service *service, struct host_error *error) {
         return error->code;
     bool pages = s->started && host_sending_pages_wait(s);
     uint64_t begun = pages ? now_of(s) : 0;
-    if (s->machine->onlookers != NULL)
+    if (s->machine->watchers != NULL)
         look_out(s, now);
     moved += host_sending_serve(s, error);
     s->pages_us += pages ? now_of(s) - begun : 0;

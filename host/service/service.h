@@ -21,7 +21,7 @@
 #include "ledger.h"
 #include "machine.h"
 #include "node/message.h"
-#include "onlookers.h"
+#include "watchers.h"
 #include "host/mesh/spill.h"
 
 enum {
@@ -170,7 +170,7 @@ struct host_service {
     unsigned up, ready;  /* living nodes that are up; that have their setup */
     unsigned working;    /* that have a job */
     unsigned turn, ping_turn; /* the node to be served, and pinged, next */
-    struct host_onlooking onlooking;
+    struct host_watching watching;
     uint64_t ping_us, check_us, began_us, wire_down_us;
     struct host_in_use in_use;
 };

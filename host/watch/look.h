@@ -100,7 +100,7 @@ int host_look_ask(struct host_look *look, const struct host_node_set *set,
 /* After host_look_open, whatever that returned. */
 void host_look_close(struct host_look *look);
 
-/* What those who look on may ask, as look.h names it. */
+/* What those who watch may ask, as look.h names it. */
 
 /* Of a question's line, every second node of the largest cube named. */
 enum { HOST_LOOK_QUESTION_BYTES = 4096 };

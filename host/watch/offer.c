@@ -142,7 +142,7 @@ static bool welcome(struct host_offer *o, uint64_t now_us) {
 
 /* 0, or -1: it is no question. */
 static int read_question(const struct host_offer *o, const char *line,
-                         struct host_onlookers_question *question) {
+                         struct host_watchers_question *question) {
     json_t *object = json_loads(line, 0, NULL);
     const char *ask = json_string_value(json_object_get(object, "ask"));
     const char *nodes = json_string_value(json_object_get(object, "nodes"));
@@ -196,7 +196,7 @@ static void serve(struct host_offer *o, unsigned i, uint64_t now_us) {
 /* --- as the service sees it ----------------------------------------------- */
 
 static bool ask(void *context, uint64_t now_us,
-                struct host_onlookers_question *question) {
+                struct host_watchers_question *question) {
     struct host_offer *o = context;
     if (o->listener < 0 && now_us - o->tried_us > TRY_US)
         take_place(o, now_us);
@@ -229,7 +229,7 @@ static void answer(void *context, unsigned node, const uint8_t *data,
 }
 
 static void answered(void *context, uint64_t now_us,
-                     const struct host_onlookers_progress *progress) {
+                     const struct host_watchers_progress *progress) {
     struct host_offer *o = context;
     int asked = o->asked;
     o->asked = -1;
@@ -261,11 +261,11 @@ void host_offer_begin(struct host_offer *offer, const char *wire) {
     offer->asked = -1;
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         offer->looker[i].file = -1;
-    offer->onlookers = (struct host_onlookers){.context = offer,
-                                               .ask = ask,
-                                               .answer = answer,
-                                               .answered = answered,
-                                               .holder = holder};
+    offer->watchers = (struct host_watchers){.context = offer,
+                                             .ask = ask,
+                                             .answer = answer,
+                                             .answered = answered,
+                                             .holder = holder};
     take_place(offer, 0);
 }
 
@@ -277,7 +277,7 @@ void host_offer_machine(struct host_offer *offer,
 }
 
 void host_offer_end(struct host_offer *offer) {
-    if (offer->onlookers.context == NULL)
+    if (offer->watchers.context == NULL)
         return; /* it has not begun */
     for (unsigned i = 0; i < HOST_LOOKERS_MAX; i++)
         if (offer->looker[i].file >= 0)

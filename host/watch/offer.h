@@ -8,12 +8,12 @@
 #include <jansson.h>
 
 #include "look.h"
-#include "host/service/onlookers.h"
+#include "host/service/watchers.h"
 
 struct host_looker {
     int file; /* -1: none */
     bool asks;
-    struct host_onlookers_question question;
+    struct host_watchers_question question;
     char line[HOST_LOOK_QUESTION_BYTES];
     size_t used;
     char *out; /* to be freed */
@@ -22,7 +22,7 @@ struct host_looker {
 };
 
 struct host_offer {
-    struct host_onlookers onlookers;
+    struct host_watchers watchers;
     char wire[HOST_WIRE_NAME], holder[HOST_HOLDER_TEXT];
     unsigned nodes, dimension;
     uint32_t serial_baud;
@@ -32,7 +32,7 @@ struct host_offer {
     unsigned turn;   /* of whom to take a question next */
     int asked;       /* whose question is out; -1: none */
     json_t *answers; /* to it */
-    struct host_onlookers_progress progress;
+    struct host_watchers_progress progress;
 };
 
 /* Before the wire is opened: of two that begin at once, one has the place.  Who

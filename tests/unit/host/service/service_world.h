@@ -46,7 +46,7 @@ static struct {
     bool sick;           /* node 0 starts again whenever it has work */
     uint64_t patience_s; /* 0: 8 */
     struct host_sharing sharing;
-    const struct host_onlookers *onlookers;
+    const struct host_watchers *watchers;
     /* Where the machine has started its nodes: what it says of them. */
     uint64_t (*starved_us)(void *context, unsigned node);
     uint64_t stopped_us; /* when a run that failed ended its nodes */
@@ -212,7 +212,7 @@ static inline struct host_machine make_machine(void) {
     machine.stop = machine_stop;
     machine.check = machine_check;
     machine.ended = machine_ended;
-    machine.onlookers = world.onlookers;
+    machine.watchers = world.watchers;
     machine.starved_us = world.starved_us;
     if (world.starved_us != NULL)
         machine.restarts = machine_restarts;

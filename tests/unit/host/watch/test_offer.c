@@ -35,11 +35,11 @@ static uint64_t holder_us(void *context) {
     return 10 * host_now_us();
 }
 
-static void answer_for(struct host_onlooking *onlooking,
+static void answer_for(struct host_watching *watching,
                        const struct host_machine *machine, unsigned node) {
     struct node_question_message question;
     uint8_t bytes[CUBE_PAYLOAD_MAX] = {0};
-    if (!host_onlooking_due(onlooking, node, &question))
+    if (!host_watching_due(watching, node, &question))
         return;
     struct node_answer_head head = {question.tag, question.what};
     struct cube_message message = {.data = bytes, .source = (uint16_t)node};
@@ -48,28 +48,28 @@ static void answer_for(struct host_onlooking *onlooking,
     for (size_t i = sizeof head; i < size; i++)
         bytes[i] = (uint8_t)(i * 7 + node + question.what);
     message.size = (uint16_t)size;
-    host_onlooking_sent(onlooking, node);
+    host_watching_sent(watching, node);
     if (node != SILENT || question.what != NODE_LINKS)
-        assert_true(host_onlooking_take(onlooking, machine, &message));
+        assert_true(host_watching_take(watching, machine, &message));
 }
 
 static _Noreturn void hold(int begun, int ended) {
     static struct host_offer offer;
-    struct host_onlooking onlooking = {0};
+    struct host_watching watching = {0};
     struct host_machine machine = {.nodes = NODES,
                                    .dimension = 2,
                                    .serial_baud = 115200,
                                    .now_us = holder_us};
-    struct host_onlookers_progress progress = {1, 9, 100};
+    struct host_watchers_progress progress = {1, 9, 100};
     char byte;
     host_offer_begin(&offer, wire);
     host_offer_machine(&offer, &machine);
-    machine.onlookers = &offer.onlookers;
+    machine.watchers = &offer.watchers;
     (void)!write(begun, "b", 1);
     while (read(ended, &byte, 1) < 0 && errno == EAGAIN) {
-        host_onlooking_look(&onlooking, &machine, holder_us(NULL), &progress);
+        host_watching_look(&watching, &machine, holder_us(NULL), &progress);
         for (unsigned i = 0; i < NODES; i++)
-            answer_for(&onlooking, &machine, i);
+            answer_for(&watching, &machine, i);
         progress.tetrahedra++;
         usleep(1000); /* clock: looks again */
     }
