@@ -22,7 +22,7 @@ struct incode_triangulator {
     struct incode_front front;
     struct incode_maker maker;
     struct incode_insertion insertion;
-    struct incode_handover handover;
+    struct incode_fallback fallback;
     uint64_t *committed; /* a bit a brick; NULL: there is no room for them */
     struct incode_job job;
     enum incode_phase phase;

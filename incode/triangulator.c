@@ -432,7 +432,7 @@ static enum incode_step insert_points(struct incode_triangulator *t) {
         t->build = INCODE_BUILD_FACES;
         t->phase = INCODE_PHASE_CHOOSE;
         if (t->insertion.emitted) {
-            incode_handover_begin(&t->handover, &t->insertion);
+            incode_fallback_begin(&t->fallback, &t->insertion);
             t->front.job = t->job;
             t->phase = INCODE_PHASE_HANDOVER;
         }
@@ -448,7 +448,7 @@ static enum incode_step insert_points(struct incode_triangulator *t) {
 /* What is open goes out, and comes back brick by brick. */
 static enum incode_step hand_over(struct incode_triangulator *t) {
     enum incode_insertion_step r =
-        incode_handover_step(&t->handover, &t->front);
+        incode_fallback_step(&t->fallback, &t->front);
     if (r != INCODE_INSERTION_FINISHED)
         return r == INCODE_INSERTION_WAITING ? INCODE_WAITING : INCODE_WORKED;
     if (!incode_arena_turn(t, false))

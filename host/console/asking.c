@@ -32,7 +32,7 @@ static int host_shell_node(struct host_shell *shell, const char *word,
 
 const void *host_shell_answer(const struct host_shell *shell, unsigned node,
                               size_t size) {
-    const struct host_visit_node *n = &shell->visit.node[node];
+    const struct host_session_node *n = &shell->session.node[node];
     return n->answered && n->size >= size ? n->answer : NULL;
 }
 
@@ -42,24 +42,24 @@ static int host_shell_look_ask(struct host_shell *shell,
 
 int host_shell_ask(struct host_shell *shell, const struct host_node_set *set,
                    enum node_question what, unsigned target) {
-    struct host_visit *visit = &shell->visit;
+    struct host_session *session = &shell->session;
     if (shell->looking)
         return host_shell_look_ask(shell, set, what);
     struct host_node_set there = {{0}};
     uint64_t age_us =
         shell->machine.now_us(shell->machine.context) - shell->opened_us;
     if (age_us < BEGIN_US &&
-        host_visit_wait(visit, set, BEGIN_US - age_us, &shell->error) != 0)
+        host_session_wait(session, set, BEGIN_US - age_us, &shell->error) != 0)
         return shell->error.code;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        visit->node[i].answered = false;
-        if (host_node_set_has(set, i) && visit->node[i].there)
+        session->node[i].answered = false;
+        if (host_node_set_has(set, i) && session->node[i].there)
             host_node_set_add(&there, i);
     }
     return host_node_set_count(&there) == 0
                ? 0
-               : host_visit_ask(visit, &there, what, target,
-                                HOST_SHELL_ANSWER_US, &shell->error);
+               : host_session_ask(session, &there, what, target,
+                                  HOST_SHELL_ANSWER_US, &shell->error);
 }
 
 /* Why a node has not answered, and what to do next. */
@@ -67,8 +67,8 @@ static const char *reason_of(const struct host_shell *shell, unsigned node,
                              char text[HOST_SHELL_REASON]) {
     return shell->looking ? "no answer while another program has the cube; "
                             "look again in a moment"
-                          : host_visit_reason(&shell->visit, node, text,
-                                              HOST_SHELL_REASON);
+                          : host_session_reason(&shell->session, node, text,
+                                                HOST_SHELL_REASON);
 }
 
 static void tell_absent(struct host_shell *shell, unsigned node,
@@ -89,7 +89,7 @@ int host_shell_fail_absent(struct host_shell *shell,
     unsigned first = CUBE_HOST;
     char names[72], reason[HOST_SHELL_REASON];
     for (unsigned i = shell->machine.nodes; i-- > 0;) {
-        if (host_node_set_has(set, i) && !shell->visit.node[i].answered) {
+        if (host_node_set_has(set, i) && !shell->session.node[i].answered) {
             host_node_set_add(&absent, i);
             first = i;
         }
@@ -110,7 +110,7 @@ int host_shell_answers(struct host_shell *shell,
         if (!host_node_set_has(set, i))
             continue;
         json_t *object = json_pack("{si}", "node", (int)i);
-        if (shell->visit.node[i].answered)
+        if (shell->session.node[i].answered)
             tell(shell, i, &fold, object);
         else
             tell_absent(shell, i, &fold, object);
@@ -155,7 +155,7 @@ static int ping_node(struct host_shell *shell, unsigned node, unsigned times,
     for (unsigned i = 0; i < times; i++) {
         if (host_shell_ask(shell, &one, NODE_WHO, 0) != 0)
             return shell->error.code;
-        const struct host_visit_node *n = &shell->visit.node[node];
+        const struct host_session_node *n = &shell->session.node[node];
         p->sent++;
         if (!n->answered)
             return 0;
@@ -191,7 +191,7 @@ static void tell_pings(struct host_shell *shell, unsigned node,
         (void)json_object_update(object, times);
         json_decref(times);
     } else {
-        (void)host_visit_reason(&shell->visit, node, row, sizeof row);
+        (void)host_session_reason(&shell->session, node, row, sizeof row);
     }
     host_fold_add(fold, node, row);
     (void)json_array_append_new(list, object);
@@ -221,7 +221,7 @@ int host_shell_ping(struct host_shell *shell, unsigned count,
         }
     }
     for (unsigned i = 0; i < shell->machine.nodes; i++)
-        shell->visit.node[i].answered = host_node_set_has(&all_came, i);
+        shell->session.node[i].answered = host_node_set_has(&all_came, i);
     host_fold_print(&fold, "     LEAST      MEAN      MOST  ANSWERED", say_row,
                     shell);
     host_fold_free(&fold);
@@ -311,7 +311,7 @@ int host_shell_trace(struct host_shell *shell, unsigned count,
     if (memory == NULL)
         return host_fail_memory(&shell->error, "the routes");
     routes_init(&routes, memory, shell->machine.dimension);
-    routes_find(&routes, cube_wiring(shell->visit.cube));
+    routes_find(&routes, cube_wiring(shell->session.cube));
     json_t *list = json_array();
     host_shell_say(shell, "  0          node %u", a);
     int status = walk(shell, &routes, a, b, list);
@@ -327,7 +327,7 @@ int host_shell_trace(struct host_shell *shell, unsigned count,
     return status;
 }
 
-/* A look at a cube that another program has, instead of one's own visit. */
+/* A look at a cube that another program has, instead of one's own session. */
 
 /* How long a run that has just begun may take to have the cube's wires. */
 enum { HELD_US = 10000000, STEP_US = 50000 };
@@ -359,14 +359,14 @@ static int begin_look(struct host_shell *shell, const char *wire) {
         host_look_close(look);
         return shell->error.code;
     }
-    memset(&shell->visit, 0, sizeof shell->visit);
+    memset(&shell->session, 0, sizeof shell->session);
     shell->machine = (struct host_machine){.nodes = look->nodes,
                                            .dimension = look->dimension,
                                            .serial_baud = look->serial_baud,
                                            .now_us = now_us};
-    shell->visit.machine = &shell->machine;
-    shell->visit.node = calloc(look->nodes, sizeof shell->visit.node[0]);
-    if (shell->visit.node == NULL) {
+    shell->session.machine = &shell->machine;
+    shell->session.node = calloc(look->nodes, sizeof shell->session.node[0]);
+    if (shell->session.node == NULL) {
         host_look_close(look);
         return host_fail_memory(&shell->error, "the nodes' answers");
     }
@@ -375,8 +375,8 @@ static int begin_look(struct host_shell *shell, const char *wire) {
 }
 
 void host_shell_look_end(struct host_shell *shell) {
-    free(shell->visit.node);
-    memset(&shell->visit, 0, sizeof shell->visit);
+    free(shell->session.node);
+    memset(&shell->session, 0, sizeof shell->session);
     host_look_close(&shell->look);
     shell->looking = false;
 }
@@ -432,7 +432,7 @@ static int host_shell_look_ask(struct host_shell *shell,
                       &shell->error) != 0)
         return shell->error.code;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        struct host_visit_node *node = &shell->visit.node[i];
+        struct host_session_node *node = &shell->session.node[i];
         const struct host_look_node *seen = &shell->look.node[i];
         node->answered = node->there = seen->answered;
         node->answer = seen->answer;

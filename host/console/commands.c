@@ -362,14 +362,14 @@ static int await_starts(struct host_shell *shell,
     do {
         memset(late, 0, sizeof *late);
         for (unsigned i = 0; i < m->nodes; i++) {
-            const struct host_visit_node *n = &shell->visit.node[i];
+            const struct host_session_node *n = &shell->session.node[i];
             if (host_node_set_has(set, i) &&
                 !(n->there && n->starts != shell->starts[i]))
                 host_node_set_add(late, i);
         }
         if (host_node_set_count(late) == 0)
             break;
-        if (host_visit_round(&shell->visit, STEP_US, &shell->error) != 0)
+        if (host_session_round(&shell->session, STEP_US, &shell->error) != 0)
             return shell->error.code;
     } while (m->now_us(m->context) < end);
     return 0;
@@ -384,21 +384,21 @@ static void tell_reset(struct host_shell *shell, unsigned node,
 
 static int host_shell_reset(struct host_shell *shell, unsigned count,
                             const char *const *words) {
-    struct host_visit *visit = &shell->visit;
+    struct host_session *session = &shell->session;
     struct host_node_set set, there = {{0}}, left = {{0}}, late;
     (void)count;
     if (host_shell_set(shell, words[0], &set) != 0 ||
         host_shell_ask(shell, &set, NODE_WHO, 0) != 0)
         return shell->error.code;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        shell->starts[i] = visit->node[i].starts;
+        shell->starts[i] = session->node[i].starts;
         if (host_node_set_has(&set, i))
-            host_node_set_add(visit->node[i].answered ? &there : &left, i);
+            host_node_set_add(session->node[i].answered ? &there : &left, i);
     }
     if (pulse_lines(shell, &left) != 0 ||
         (host_node_set_count(&there) > 0 &&
-         host_visit_restart(visit, &there, NODE_RESTART_PLAIN, &shell->error) !=
-             0))
+         host_session_restart(session, &there, NODE_RESTART_PLAIN,
+                              &shell->error) != 0))
         return shell->error.code;
     struct host_node_set due = set;
     for (unsigned i = 0; i < sizeof due.bits; i++)
@@ -406,8 +406,8 @@ static int host_shell_reset(struct host_shell *shell, unsigned count,
     if (await_starts(shell, &due, &late) != 0)
         return shell->error.code;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        shell->starts[i] = visit->node[i].starts; /* asked for: no news */
-        visit->node[i].answered =
+        shell->starts[i] = session->node[i].starts; /* asked for: no news */
+        session->node[i].answered =
             host_node_set_has(&due, i) && !host_node_set_has(&late, i);
     }
     return host_shell_answers(shell, &set, NULL, tell_reset);
@@ -483,7 +483,7 @@ static int prepare_run(struct host_shell *shell) {
     host_node_set_all(&all, shell->machine.nodes);
     int status = host_shell_ask(shell, &all, NODE_WHO, 0);
     if (status == 0 && place->prepare != NULL)
-        status = place->prepare(place->context, &shell->visit, &shell->error);
+        status = place->prepare(place->context, &shell->session, &shell->error);
     host_shell_leave_cube(shell);
     return status;
 }

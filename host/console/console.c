@@ -276,7 +276,7 @@ static error_t nodes_parse(int key, char *value, struct argp_state *state) {
 static int wait_for_all(struct host_shell *shell, struct host_error *error) {
     struct host_node_set all;
     host_node_set_all(&all, shell->machine.nodes);
-    return host_visit_settle(&shell->visit, &all, SETTLE_US, error);
+    return host_session_settle(&shell->session, &all, SETTLE_US, error);
 }
 
 /* Beside another program it watches, and says beside whom. */

@@ -175,7 +175,7 @@ static void gather(struct host_shell *shell, struct host_drawing *drawing) {
     memset(drawing->wire, HOST_WIRE_UNKNOWN, sizeof drawing->wire);
     add_end(drawing, 0, drawing->dimension, &link);
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        const struct host_visit_node *n = &shell->visit.node[i];
+        const struct host_session_node *n = &shell->session.node[i];
         drawing->absent[i] = !n->answered;
         for (unsigned d = 0; n->answered && d < drawing->dimension &&
                              (d + 1) * sizeof link <= n->size;
@@ -229,7 +229,7 @@ static const char *host_shell_state(const struct node_link_state *link,
 /* "wrong wire: node 3 link 1" of an end of the wire that says so, or NULL. */
 static const char *said_by_end(const struct host_shell *shell, unsigned node,
                                unsigned d, char *text, size_t size) {
-    const struct host_visit_node *n = &shell->visit.node[node];
+    const struct host_session_node *n = &shell->session.node[node];
     struct node_link_state link;
     if (d == shell->machine.dimension) {
         link = host_shell_own_link(shell);
@@ -280,7 +280,7 @@ static int tell(struct host_shell *shell, const struct host_drawing *drawing) {
     else
         tell_matrix(shell, drawing);
     unsigned faults = tell_faults(shell, drawing, list);
-    bool crossed = cube_wiring_fault(shell->visit.cube, wrong);
+    bool crossed = cube_wiring_fault(shell->session.cube, wrong);
     if (crossed)
         host_shell_say(shell, "%s", wrong);
     if (faults > 0) {
@@ -348,7 +348,7 @@ static const char *host_shell_state(const struct node_link_state *link,
 
 static struct node_link_state
 host_shell_own_link(const struct host_shell *shell) {
-    const struct cube *cube = shell->visit.cube;
+    const struct cube *cube = shell->session.cube;
     const struct link_statistics *s = cube_link_statistics(cube, 0);
     const struct link_peer *peer = cube_link_peer(cube, 0);
     uint64_t bad = s->bad_header + s->bad_crc + s->bad_code;
@@ -372,7 +372,7 @@ host_shell_own_link(const struct host_shell *shell) {
 /* Remembers what was lost on the links of a node that has answered NODE_LINKS,
  * and notes what has been lost since it did before. */
 static void host_shell_note_lost(struct host_shell *shell, unsigned node) {
-    const struct host_visit_node *n = &shell->visit.node[node];
+    const struct host_session_node *n = &shell->session.node[node];
     struct node_link_state link;
     for (unsigned d = 0; !shell->looking && d < CUBE_LINKS_MAX &&
                          (d + 1) * sizeof link <= n->size;
@@ -429,7 +429,7 @@ static void tell_link(struct host_shell *shell, unsigned node, unsigned d,
 
 static void show_links_tell(struct host_shell *shell, unsigned node,
                             struct host_fold *fold, json_t *object) {
-    const struct host_visit_node *n = &shell->visit.node[node];
+    const struct host_session_node *n = &shell->session.node[node];
     struct node_link_state link;
     json_t *list = json_array();
     for (unsigned d = 0; d < CUBE_LINKS_MAX && (d + 1) * sizeof link <= n->size;

@@ -297,8 +297,8 @@ int host_shell_memory(struct host_shell *shell, unsigned count,
  * escaped. */
 static void tell_log(struct host_shell *shell, unsigned node,
                      struct host_fold *fold, json_t *object) {
-    const struct host_visit_node *n = &shell->visit.node[node];
-    char text[4 * HOST_VISIT_ANSWER_BYTES + 1];
+    const struct host_session_node *n = &shell->session.node[node];
+    char text[4 * HOST_SESSION_ANSWER_BYTES + 1];
     size_t used = 0;
     for (size_t i = 0; i < n->size; i++) {
         uint8_t c = n->answer[i];
@@ -347,7 +347,7 @@ static const char *hex(const uint8_t *bytes, size_t size, char *text) {
 static void tell_who(struct host_shell *shell, unsigned node,
                      struct host_fold *fold, json_t *object) {
     static const char *const kinds[] = {"?", "process", "program", "loader"};
-    const struct node_who *w = &shell->visit.node[node].who;
+    const struct node_who *w = &shell->session.node[node].who;
     const struct node_role *role = node_role_named(w->role);
     char board[NODE_BOARD_BYTES + 1], version[NODE_VERSION_BYTES + 1];
     char loader[NODE_VERSION_BYTES + 1];
@@ -369,8 +369,9 @@ static void tell_who(struct host_shell *shell, unsigned node,
         return;
     }
     bool looking = shell->looking; /* then links tells of wires */
-    unsigned links = looking ? 0 : host_visit_links(&shell->visit, node);
-    unsigned links_up = looking ? 0 : host_visit_links_up(&shell->visit, node);
+    unsigned links = looking ? 0 : host_session_links(&shell->session, node);
+    unsigned links_up =
+        looking ? 0 : host_session_links_up(&shell->session, node);
     snprintf(boot, sizeof boot, "%" PRIu32, w->boot);
     snprintf(wires, sizeof wires, "%u of %u", links_up, links);
     if (links_up == links)
@@ -411,7 +412,7 @@ static void tell_fault(void *context, unsigned node, unsigned link,
 
 static unsigned tell_faults(struct host_shell *shell) {
     struct faults faults = {shell, json_array()};
-    unsigned count = host_visit_faults(&shell->visit, tell_fault, &faults);
+    unsigned count = host_session_faults(&shell->session, tell_fault, &faults);
     if (shell->object != NULL)
         (void)json_object_set(shell->object, "wires", faults.list);
     json_decref(faults.list);
@@ -426,7 +427,7 @@ static const char *name_image(const struct host_shell *shell,
     char board[NODE_BOARD_BYTES + 1] = "", quoted[PATH_MAX];
     bool alike = true;
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        const struct node_who *w = &shell->visit.node[i].who;
+        const struct node_who *w = &shell->session.node[i].who;
         if (host_node_set_has(set, i)) {
             alike = alike &&
                     (board[0] == '\0' || strncmp(board, (const char *)w->board,
@@ -448,8 +449,8 @@ static void tell_next(struct host_shell *shell) {
     const char *where = host_where(&shell->machine);
     char names[72], image[PATH_MAX];
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        const struct node_who *w = &shell->visit.node[i].who;
-        if (!shell->visit.node[i].there || w->protocol != NODE_PROTOCOL)
+        const struct node_who *w = &shell->session.node[i].who;
+        if (!shell->session.node[i].there || w->protocol != NODE_PROTOCOL)
             continue;
         if (w->kind == NODE_KIND_LOADER) {
             host_node_set_add(w->boot == 0 ? &worn : &loaders, i);
@@ -493,9 +494,9 @@ int host_shell_nodes(struct host_shell *shell, unsigned count,
     struct host_node_set set;
     if (host_shell_set(shell, count == 0 ? NULL : words[0], &set) != 0)
         return shell->error.code;
-    if (!shell->looking &&
-        (host_shell_ask(shell, &set, NODE_WHO, 0) != 0 ||
-         host_visit_settle_wires(&shell->visit, WIRES_US, &shell->error) != 0))
+    if (!shell->looking && (host_shell_ask(shell, &set, NODE_WHO, 0) != 0 ||
+                            host_session_settle_wires(&shell->session, WIRES_US,
+                                                      &shell->error) != 0))
         return shell->error.code;
     int status = host_shell_ask_tell(
         shell, &set, NODE_WHO,

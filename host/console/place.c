@@ -240,10 +240,10 @@ static void write_host_wire(const struct host_console_place *p, FILE *out) {
     (void)fprintf(out, " }");
 }
 
-static const struct host_board *board_of(const struct host_visit *visit,
+static const struct host_board *board_of(const struct host_session *session,
                                          unsigned node) {
     char name[NODE_BOARD_BYTES + 1] = "";
-    memcpy(name, visit->node[node].who.board, NODE_BOARD_BYTES);
+    memcpy(name, session->node[node].who.board, NODE_BOARD_BYTES);
     const struct host_board *board = host_board_named(name);
     return board == NULL ? host_board_row(0) : board;
 }
@@ -251,17 +251,17 @@ static const struct host_board *board_of(const struct host_visit *visit,
 /* How nodes with a system are wired among themselves the host need not know,
  * but a cube file has a wire for each pair. */
 static void write_cube(const struct host_console_place *p,
-                       const struct host_visit *visit, FILE *out) {
-    const struct host_machine *m = visit->machine;
+                       const struct host_session *session, FILE *out) {
+    const struct host_machine *m = session->machine;
     char path[PATH_MAX];
     (void)fprintf(out, "dimension = %u;\nnodes = (", m->dimension);
     uint32_t memory = 0;
     for (unsigned i = 0; i < m->nodes; i++) {
-        const struct host_board *board = board_of(visit, i);
+        const struct host_board *board = board_of(session, i);
         (void)fprintf(out, "%s{ node = %u; board = \"%s\"; }",
                       i == 0 ? "" : ", ", i, board->name);
-        memory = board->bare == NULL && visit->node[i].who.memory > memory
-                     ? visit->node[i].who.memory
+        memory = board->bare == NULL && session->node[i].who.memory > memory
+                     ? session->node[i].who.memory
                      : memory;
     }
     (void)fprintf(out, ");\n");
@@ -276,8 +276,8 @@ static void write_cube(const struct host_console_place *p,
     for (unsigned i = 0; i < m->nodes; i++) {
         for (unsigned d = 0; d < m->dimension; d++) {
             unsigned to = i | 1u << d;
-            if (to != i && (board_of(visit, i)->bare == NULL ||
-                            board_of(visit, to)->bare == NULL)) {
+            if (to != i && (board_of(session, i)->bare == NULL ||
+                            board_of(session, to)->bare == NULL)) {
                 (void)fprintf(out,
                               ",\n    { node = %u; to = %u; unix = "
                               "\"%u-%u\"; }",
@@ -289,7 +289,7 @@ static void write_cube(const struct host_console_place *p,
 }
 
 /* Without a cube file, what was found stands for one. */
-static int prepare(void *context, const struct host_visit *visit,
+static int prepare(void *context, const struct host_session *session,
                    struct host_error *error) {
     struct host_console_place *p = context;
     if (make_folder(p, error) != 0 || p->options.cube != NULL)
@@ -298,7 +298,7 @@ static int prepare(void *context, const struct host_visit *visit,
     FILE *out = host_create_over(p->cube);
     bool good = out != NULL;
     if (good) {
-        write_cube(p, visit, out);
+        write_cube(p, session, out);
         good = ferror(out) == 0;
     }
     if ((out != NULL && fclose(out) != 0) || !good) {

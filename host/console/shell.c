@@ -199,7 +199,7 @@ void host_shell_note(struct host_shell *shell, const char *format, ...) {
 void host_shell_leave_cube(struct host_shell *shell) {
     if (!shell->open)
         return;
-    host_visit_close(&shell->visit);
+    host_session_close(&shell->session);
     shell->place->close(shell->place->context);
     free(shell->starts);
     free(shell->lost);
@@ -218,9 +218,10 @@ int host_shell_open(struct host_shell *shell, struct host_error *error) {
     shell->machine = host_watch_machine(&shell->watch);
     shell->starts = calloc(machine.nodes, sizeof shell->starts[0]);
     shell->lost = calloc(machine.nodes, CUBE_LINKS_MAX * sizeof shell->lost[0]);
-    int status = shell->starts == NULL || shell->lost == NULL
-                     ? host_fail_memory(error, "the console")
-                     : host_visit_open(&shell->visit, &shell->machine, error);
+    int status =
+        shell->starts == NULL || shell->lost == NULL
+            ? host_fail_memory(error, "the console")
+            : host_session_open(&shell->session, &shell->machine, error);
     if (status != 0) {
         free(shell->starts);
         free(shell->lost);
@@ -238,12 +239,12 @@ int host_shell_open(struct host_shell *shell, struct host_error *error) {
 /* Frames that came on the host's own wire and were none. */
 static uint64_t noise_of(const struct host_shell *shell) {
     const struct link_statistics *s =
-        cube_link_statistics(shell->visit.cube, 0);
+        cube_link_statistics(shell->session.cube, 0);
     return s->bad_header + s->bad_crc + s->bad_code + s->resynchronised;
 }
 
 static void note_wire(struct host_shell *shell, uint64_t now_us) {
-    enum link_state state = cube_link_state(shell->visit.cube, 0);
+    enum link_state state = cube_link_state(shell->session.cube, 0);
     const struct host_machine *m = &shell->machine;
     bool up = state == LINK_UP;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, 0);
@@ -285,7 +286,7 @@ static void note_events(struct host_shell *shell) {
     note_wire(shell, now_us);
     struct host_node_set again = {{0}};
     for (unsigned i = 0; i < shell->machine.nodes; i++) {
-        uint32_t starts = shell->visit.node[i].starts;
+        uint32_t starts = shell->session.node[i].starts;
         if (starts != shell->starts[i] && shell->starts[i] != 0)
             host_node_set_add(&again, i);
         shell->starts[i] = starts;
@@ -297,14 +298,14 @@ static void note_events(struct host_shell *shell) {
     }
 }
 
-/* The visit has ended by itself. */
+/* The session has ended by itself. */
 static void lose_cube(struct host_shell *shell,
                       const struct host_error *error) {
     bool cut = shell->watch.cut;
     shell->watch.cut = false;
     if (cut)
         return;
-    shell->in_use = shell->visit.in_use;
+    shell->in_use = shell->session.in_use;
     host_shell_note(shell, "%s", error->text);
     host_shell_leave_cube(shell);
 }
@@ -334,7 +335,7 @@ void host_shell_tend(struct host_shell *shell, uint64_t wait_us) {
     }
     if (!shell->open)
         return;
-    if (host_visit_round(&shell->visit, wait_us, &error) != 0) {
+    if (host_session_round(&shell->session, wait_us, &error) != 0) {
         lose_cube(shell, &error);
         return;
     }
@@ -365,7 +366,7 @@ static int do_command(struct host_shell *shell, unsigned count,
     int status = command->run(shell, count, words);
     if (shell->looking) {
         host_shell_look_end(shell);
-    } else if (shell->open && shell->visit.in_use && status != 0) {
+    } else if (shell->open && shell->session.in_use && status != 0) {
         host_shell_leave_cube(shell); /* who has it is found at the next */
         shell->in_use = true;
     }

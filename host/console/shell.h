@@ -1,8 +1,9 @@
 /* The console without its terminal: takes a person's lines, has them done by a
- * cube that it visits, gives lines back, or an object of JSON for each command.
- * Between two lines it has to be tended, for the cube's links wait for nobody.
+ * cube that it sessions, gives lines back, or an object of JSON for each
+ * command. Between two lines it has to be tended, for the cube's links wait for
+ * nobody.
  *
- * Memory: the visit's, 100 bytes a link, and what one answer takes; none of
+ * Memory: the session's, 100 bytes a link, and what one answer takes; none of
  * it grows with time. */
 #ifndef HOST_CONSOLE_SHELL_H
 #define HOST_CONSOLE_SHELL_H
@@ -11,7 +12,7 @@
 
 #include "host/service/machine.h"
 #include "host/watch/look.h"
-#include "host/cube/visit.h"
+#include "host/cube/session.h"
 
 /* A machine as it is, but that a person may cut its waits short, that what it
  * has to tell goes where the person reads, and that bytes which are no frame
@@ -47,7 +48,7 @@ struct host_shell_place {
      * NULL: there is none.  `prepare` sees the cube before.  `words`: those
      * behind "run".  behind: it does not have the terminal.  `look`: whether it
      * has ended, and then *status; lines that it has said go to `say`. */
-    int (*prepare)(void *context, const struct host_visit *visit,
+    int (*prepare)(void *context, const struct host_session *session,
                    struct host_error *error);
     int (*run)(void *context, int count, const char *const *words, bool behind,
                bool json, struct host_error *error);
@@ -94,11 +95,11 @@ struct host_shell {
     bool running; /* `run .. &` has it */
     bool in_use;  /* another program has it */
     bool looking; /* on, at what that lets see, for one command: `machine` and
-                     `visit` have the nodes and their answers alone */
+                     `session` have the nodes and their answers alone */
     struct host_look look;
     struct host_machine machine;
     struct host_watch watch;
-    struct host_visit visit;
+    struct host_session session;
     uint64_t opened_us, noted_us;
     /* What was told of it. */
     bool wire_up, wire_told;

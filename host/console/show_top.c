@@ -136,7 +136,7 @@ static int pause_for(struct host_shell *shell, uint64_t us) {
     }
     uint64_t end = m->now_us(m->context) + us;
     for (uint64_t now = end - us; now < end; now = m->now_us(m->context))
-        if (host_visit_round(&shell->visit, end - now, &shell->error) != 0)
+        if (host_session_round(&shell->session, end - now, &shell->error) != 0)
             return shell->error.code;
     return 0;
 }

@@ -71,7 +71,7 @@ static const char *state_of(const struct host_spread *spread, unsigned i) {
 
 static void tell_states(FILE *out, const struct host_spread *spread) {
     struct host_node_set told = {{0}};
-    unsigned nodes = spread->visit->machine->nodes;
+    unsigned nodes = spread->session->machine->nodes;
     for (unsigned i = 0; i < nodes; i++) {
         struct host_node_set set = {{0}};
         char name[LIST];
@@ -126,7 +126,7 @@ static const struct host_spread_node *node_of(const struct host_flash_show *s,
 void host_flash_show_begin(struct host_flash_show *show,
                            const struct host_spread *spread, bool quiet) {
     *show = (struct host_flash_show){.spread = spread, .quiet = quiet};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (host_node_set_has(&spread->options.nodes, i))
             show->node[show->wanted++] = (uint16_t)i;
     host_progress_begin(!quiet);
@@ -182,7 +182,7 @@ void host_flash_show_change(const struct host_flash_show *show, unsigned node) {
 static struct host_node_set alike(const struct host_flash_show *s,
                                   unsigned first) {
     struct host_node_set set = {{0}};
-    const struct host_visit_node *seen = s->spread->visit->node;
+    const struct host_session_node *seen = s->spread->session->node;
     for (unsigned k = 0; k < s->wanted; k++) {
         unsigned i = s->node[k];
         const struct host_spread_node *a = node_of(s, i),
@@ -246,7 +246,7 @@ void host_flash_show_result(const struct host_flash_show *show) {
 static void say_plan(const struct host_flash_show *s, unsigned i, bool one,
                      char line[FLASH_SHOW_LINE]) {
     const struct host_spread_node *n = node_of(s, i);
-    const struct node_who *who = &s->spread->visit->node[i].who;
+    const struct node_who *who = &s->spread->session->node[i].who;
     char image[FLASH_SHOW_LIST];
     name_image(s, image);
     if (n->phase == HOST_SPREAD_LEAVES) {
@@ -286,7 +286,7 @@ struct flash {
     bool quiet, dry_run, reset, force;
     struct host_image file;
     struct host_site site;
-    struct host_visit visit;
+    struct host_session session;
     struct host_node_set set;
     struct host_spread spread;
     struct host_flash_show show;
@@ -467,8 +467,9 @@ static int plan(struct flash *f) {
     for (unsigned i = 0; i < f->site.machine.nodes; i++) {
         if (host_node_set_has(&f->set, i) &&
             f->spread.node[i].phase == HOST_SPREAD_AWAITED) {
-            return host_fail(f->error, HOST_CUBE, "node %u: %s", i,
-                             host_visit_reason(&f->visit, i, why, sizeof why));
+            return host_fail(
+                f->error, HOST_CUBE, "node %u: %s", i,
+                host_session_reason(&f->session, i, why, sizeof why));
         }
     }
     return 0;
@@ -498,7 +499,7 @@ static int spread(struct flash *f) {
     return host_spread_result(&f->spread, f->error);
 }
 
-static int visit(struct flash *f) {
+static int session(struct flash *f) {
     const struct host_spread_options options = {.image = f->file.source.data,
                                                 .bytes = f->file.source.bytes,
                                                 .nodes = f->set,
@@ -510,15 +511,15 @@ static int visit(struct flash *f) {
                                                 .serial = draw_serial,
                                                 .changed = changed,
                                                 .say = say};
-    if (host_visit_open(&f->visit, &f->site.machine, f->error) != 0)
+    if (host_session_open(&f->session, &f->site.machine, f->error) != 0)
         return f->error->code;
-    int status = host_spread_open(&f->spread, &f->visit, &options, f->error);
+    int status = host_spread_open(&f->spread, &f->session, &options, f->error);
     if (status == 0) {
         host_flash_show_begin(&f->show, &f->spread, f->quiet || f->dry_run);
         status = spread(f);
         host_spread_close(&f->spread);
     }
-    host_visit_close(&f->visit);
+    host_session_close(&f->session);
     return status;
 }
 
@@ -533,7 +534,7 @@ int host_flash(int argc, char **argv, struct host_error *error) {
     int status = host_site_open(&f.site, &f.where, error);
     if (status == 0) {
         bool ready = choose_nodes(&f) == 0 && (!f.reset || reset(&f) == 0);
-        status = ready ? visit(&f) : error->code;
+        status = ready ? session(&f) : error->code;
         host_site_close(&f.site);
     }
     host_image_close(&f.file);

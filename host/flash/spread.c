@@ -15,7 +15,7 @@ enum {
 };
 
 static void look_at_clock(struct host_spread *spread) {
-    struct host_machine *machine = spread->visit->machine;
+    struct host_machine *machine = spread->session->machine;
     spread->now_us = machine->now_us(machine->context);
 }
 
@@ -28,41 +28,41 @@ static void take(void *context, const struct cube_message *message) {
     bool good = message->type == NODE_IMAGE_STATE &&
                 message->size >= sizeof state - sizeof state.map &&
                 message->size <= sizeof state &&
-                message->source < spread->visit->machine->nodes;
+                message->source < spread->session->machine->nodes;
     if (good) {
         memcpy(&state, message->data, message->size);
         spread_hear(spread, message->source, &state);
     }
 }
 
-int host_spread_open(struct host_spread *spread, struct host_visit *visit,
+int host_spread_open(struct host_spread *spread, struct host_session *session,
                      const struct host_spread_options *options,
                      struct host_error *error) {
-    *spread = (struct host_spread){.visit = visit,
+    *spread = (struct host_spread){.session = session,
                                    .options = *options,
-                                   .transfer = visit->machine->epoch,
-                                   .generation = visit->generation};
+                                   .transfer = session->machine->epoch,
+                                   .generation = session->generation};
     spread->blocks = (uint32_t)((options->bytes + LOADER_BLOCK_BYTES - 1) /
                                 LOADER_BLOCK_BYTES);
     assert(options->bytes >= LOADER_HEADER_BYTES &&
            spread->blocks <= LOADER_BLOCKS_MAX);
     (void)loader_image_unpack(&spread->image, options->image);
-    spread->node = calloc(visit->machine->nodes, sizeof *spread->node);
+    spread->node = calloc(session->machine->nodes, sizeof *spread->node);
     if (spread->node == NULL)
         return host_fail_memory(error, "what is known of the nodes");
     look_at_clock(spread);
     spread->began_us = spread->arrived_us = spread->now_us;
-    for (unsigned i = 0; i < visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < session->machine->nodes; i++) {
         spread->node[i].moved_us = spread->began_us;
         spread->node[i].blocks = spread->blocks;
     }
-    visit->take = take;
-    visit->context = spread;
+    session->take = take;
+    session->context = spread;
     return 0;
 }
 
 void host_spread_close(struct host_spread *spread) {
-    spread->visit->take = NULL;
+    spread->session->take = NULL;
     free(spread->node);
 }
 
@@ -71,7 +71,7 @@ void host_spread_close(struct host_spread *spread) {
 static bool has_looked(const struct host_spread *spread) {
     uint64_t now = spread->now_us;
     bool all = true;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         all = all && (!spread_wanted(spread, i) ||
                       spread->node[i].phase != HOST_SPREAD_AWAITED);
     }
@@ -83,7 +83,7 @@ static void spread_judge(struct host_spread *spread, unsigned i);
 
 static void judge_all(struct host_spread *spread) {
     look_at_clock(spread);
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (spread_wanted(spread, i))
             spread_judge(spread, i);
 }
@@ -92,7 +92,7 @@ int host_spread_look(struct host_spread *spread, struct host_error *error) {
     int status = 0;
     judge_all(spread);
     while (status == 0 && !has_looked(spread)) {
-        status = host_visit_round(spread->visit, LOOK_US, error);
+        status = host_session_round(spread->session, LOOK_US, error);
         judge_all(spread);
     }
     spread->looked = true;
@@ -111,8 +111,8 @@ static void say_who_is_awaited(struct host_spread *spread) {
     struct host_node_set set = {{0}};
     char nodes[HOST_SPREAD_TEXT + 8], why[HOST_SPREAD_TEXT],
         line[2 * HOST_SPREAD_TEXT + 80];
-    unsigned first = spread->visit->machine->nodes;
-    for (unsigned i = spread->visit->machine->nodes; i-- > 0;) {
+    unsigned first = spread->session->machine->nodes;
+    for (unsigned i = spread->session->machine->nodes; i-- > 0;) {
         struct host_spread_node *n = &spread->node[i];
         if (spread_wanted(spread, i) && n->phase == HOST_SPREAD_AWAITED &&
             !n->said && spread->now_us - n->moved_us >= GRACE_US) {
@@ -121,11 +121,11 @@ static void say_who_is_awaited(struct host_spread *spread) {
             first = i;
         }
     }
-    if (first == spread->visit->machine->nodes)
+    if (first == spread->session->machine->nodes)
         return;
     host_node_set_name(&set, nodes, sizeof nodes);
     const char *reason =
-        host_visit_reason(spread->visit, first, why, sizeof why);
+        host_session_reason(spread->session, first, why, sizeof why);
     snprintf(line, sizeof line, "%s: %.*s; waits for up to %llu s", nodes,
              (int)strcspn(reason, ";"), reason,
              (unsigned long long)(spread->options.patience_us / 1000000));
@@ -133,7 +133,7 @@ static void say_who_is_awaited(struct host_spread *spread) {
 }
 
 bool host_spread_over(const struct host_spread *spread) {
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (spread_wanted(spread, i) &&
             (!spread_ended(&spread->node[i]) || spread_goes_home(spread, i)))
             return false;
@@ -143,11 +143,11 @@ bool host_spread_over(const struct host_spread *spread) {
 /* With a generation goes what was on its way: it is said again, and nobody
  * waits for answers to it. */
 static void look_at_generation(struct host_spread *spread) {
-    if (spread->generation == spread->visit->generation)
+    if (spread->generation == spread->session->generation)
         return;
-    spread->generation = spread->visit->generation;
+    spread->generation = spread->session->generation;
     spread->ask_lost = true;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
         if (n->phase >= HOST_SPREAD_BEGINS && n->phase < HOST_SPREAD_STARTS)
             n->told_us = 0;
@@ -163,8 +163,8 @@ int host_spread_step(struct host_spread *spread, uint64_t wait_us,
     if (spread_orders(spread, error) != 0)
         return error->code;
     spread_blocks(spread);
-    int status = host_visit_round(spread->visit, wait_us, error);
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    int status = host_session_round(spread->session, wait_us, error);
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (spread_wanted(spread, i) && !spread_ended(&spread->node[i]))
             spread_expire(spread, i);
     say_who_is_awaited(spread);
@@ -177,14 +177,15 @@ static void spread_explain(struct host_spread *spread, unsigned i);
 static int ask_for_logs(struct host_spread *spread, struct host_error *error) {
     enum { LOG_US = 3000000 };
     struct host_node_set set = {{0}};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (spread->node[i].phase == HOST_SPREAD_FELL_BACK)
             host_node_set_add(&set, i);
     if (host_node_set_count(&set) == 0)
         return 0;
     int status =
-        host_visit_ask(spread->visit, &set, NODE_LOG, 0, LOG_US, error);
-    for (unsigned i = 0; status == 0 && i < spread->visit->machine->nodes; i++)
+        host_session_ask(spread->session, &set, NODE_LOG, 0, LOG_US, error);
+    for (unsigned i = 0; status == 0 && i < spread->session->machine->nodes;
+         i++)
         if (host_node_set_has(&set, i))
             spread_explain(spread, i);
     return status;
@@ -207,12 +208,12 @@ static bool has_failed(const struct host_spread *spread, unsigned i) {
 /* Those with which the same is wrong as with the first that is not `told`. */
 static unsigned gather(const struct host_spread *spread,
                        struct host_node_set *told, struct host_node_set *set) {
-    unsigned first = spread->visit->machine->nodes;
+    unsigned first = spread->session->machine->nodes;
     *set = (struct host_node_set){{0}};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         if (!has_failed(spread, i) || host_node_set_has(told, i))
             continue;
-        first = first == spread->visit->machine->nodes ? i : first;
+        first = first == spread->session->machine->nodes ? i : first;
         if (strcmp(spread->node[i].text, spread->node[first].text) == 0) {
             host_node_set_add(set, i);
             host_node_set_add(told, i);
@@ -224,7 +225,7 @@ static unsigned gather(const struct host_spread *spread,
 int host_spread_result(struct host_spread *spread, struct host_error *error) {
     struct host_node_set told = {{0}}, set;
     char nodes[HOST_SPREAD_TEXT + 8], line[2 * HOST_SPREAD_TEXT + 16] = "";
-    unsigned all = spread->visit->machine->nodes, i;
+    unsigned all = spread->session->machine->nodes, i;
     int code = 0;
     while ((i = gather(spread, &told, &set)) < all) {
         if (code != 0)
@@ -260,7 +261,7 @@ const char *host_spread_phase_text(enum host_spread_phase phase) {
 static const uint8_t nothing[NODE_DIGEST_BYTES];
 
 bool spread_in_loader(const struct host_spread *spread, unsigned i) {
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     return spread_wanted(spread, i) && seen->there &&
            seen->who.kind == NODE_KIND_LOADER &&
            !spread_ended(&spread->node[i]);
@@ -268,7 +269,7 @@ bool spread_in_loader(const struct host_spread *spread, unsigned i) {
 
 bool spread_goes_home(const struct host_spread *spread, unsigned i) {
     enum { TRIES = 3 };
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     const struct host_spread_node *n = &spread->node[i];
     return n->phase == HOST_SPREAD_REFUSED && n->left && seen->there &&
            seen->starts == n->start && n->homeward <= TRIES;
@@ -328,7 +329,7 @@ static void refuse(struct host_spread *spread, unsigned i,
 /* --- by who it is --------------------------------------------------------- */
 
 static void begin_anew(struct host_spread *spread, unsigned i) {
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     struct host_spread_node *n = &spread->node[i];
     n->start = seen->starts;
     n->starts++;
@@ -352,7 +353,7 @@ static bool pass_over(struct host_spread *spread, unsigned i) {
 }
 
 static void judge_program(struct host_spread *spread, unsigned i) {
-    const struct node_who *who = &spread->visit->node[i].who;
+    const struct node_who *who = &spread->session->node[i].who;
     struct host_spread_node *n = &spread->node[i];
     bool same =
         memcmp(who->digest, spread->image.digest, sizeof who->digest) == 0;
@@ -383,7 +384,7 @@ static void judge_loader(struct host_spread *spread, unsigned i) {
 }
 
 static void judge_kind(struct host_spread *spread, unsigned i) {
-    const struct node_who *who = &spread->visit->node[i].who;
+    const struct node_who *who = &spread->session->node[i].who;
     char board[NODE_BOARD_BYTES + 1] = "";
     memcpy(board, who->board, sizeof who->board);
     if (who->kind == NODE_KIND_PROCESS) {
@@ -406,7 +407,7 @@ static void judge_kind(struct host_spread *spread, unsigned i) {
  * wait on a slow wire behind those of others. */
 static bool is_absent(const struct host_spread *spread, unsigned i) {
     enum { BUSY_US = 15000000 };
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     struct host_spread_node *n = &spread->node[i];
     if (seen->heard)
         n->heard_us = spread->now_us;
@@ -420,9 +421,9 @@ static void judge_absent(struct host_spread *spread, unsigned i) {
         spread_set(spread, i, HOST_SPREAD_AWAITED);
 }
 
-/* By what the visit knows of it; by what its loader says. */
+/* By what the session knows of it; by what its loader says. */
 static void spread_judge(struct host_spread *spread, unsigned i) {
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     struct host_spread_node *n = &spread->node[i];
     if (spread_ended(n) || pass_over(spread, i))
         return;
@@ -512,7 +513,7 @@ static void spread_hear(struct host_spread *spread, unsigned i,
 /* Its lines, the last ones if they are too many, as one. */
 static void spread_explain(struct host_spread *spread, unsigned i) {
     enum { LOG_MAX = 120 };
-    const struct host_visit_node *seen = &spread->visit->node[i];
+    const struct host_session_node *seen = &spread->session->node[i];
     struct host_spread_node *n = &spread->node[i];
     char log[2 * LOG_MAX + 1] = "", what[HOST_SPREAD_TEXT];
     size_t size = seen->answered ? seen->size : 0, used = 0;
@@ -545,7 +546,7 @@ static void spread_expire(struct host_spread *spread, unsigned i) {
         return;
     switch (n->phase) {
     case HOST_SPREAD_AWAITED:
-        reason = host_visit_reason(spread->visit, i, text, sizeof text);
+        reason = host_session_reason(spread->session, i, text, sizeof text);
         break;
     case HOST_SPREAD_LEAVES:
         reason = "does not restart into its loader; turn the board off and on, "

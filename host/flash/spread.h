@@ -1,14 +1,15 @@
-/* An image on its way to boards, all at once, over a visit to their cube: those
- * that run another are told to wait in their loader, all are sent its blocks
- * along the cube's tree, each is asked what it lacks and sent that again, until
- * all have it verified; then they start it.  Nodes may be off, restart, lose
- * power or links meanwhile; what they have they keep, and are sent the rest.
+/* An image on its way to boards, all at once, over a session to their cube:
+ * those that run another are told to wait in their loader, all are sent its
+ * blocks along the cube's tree, each is asked what it lacks and sent that
+ * again, until all have it verified; then they start it.  Nodes may be off,
+ * restart, lose power or links meanwhile; what they have they keep, and are
+ * sent the rest.
  *
  * Memory: struct host_spread, and 800 bytes a node. */
 #ifndef HOST_SPREAD_H
 #define HOST_SPREAD_H
 
-#include "host/cube/visit.h"
+#include "host/cube/session.h"
 #include "node/loader/image.h"
 
 enum { HOST_SPREAD_TEXT = 320, HOST_SPREAD_STARTS_MAX = 12 };
@@ -64,7 +65,7 @@ struct host_spread_options {
 };
 
 struct host_spread {
-    struct host_visit *visit;
+    struct host_session *session;
     struct host_spread_options options;
     struct loader_image image;
     struct host_spread_node *node; /* [machine->nodes] */
@@ -80,8 +81,8 @@ struct host_spread {
     uint16_t dest[LOADER_BLOCKS_MAX]; /* of a pass; CUBE_HOST: nobody */
 };
 
-/* Takes over what the visit's `take` is given.  HOST_BROKEN: no memory. */
-int host_spread_open(struct host_spread *spread, struct host_visit *visit,
+/* Takes over what the session's `take` is given.  HOST_BROKEN: no memory. */
+int host_spread_open(struct host_spread *spread, struct host_session *session,
                      const struct host_spread_options *options,
                      struct host_error *error);
 

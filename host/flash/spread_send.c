@@ -16,7 +16,7 @@ enum {
 
 static bool send(struct host_spread *spread, uint16_t dest, uint8_t type,
                  const void *data, size_t size) {
-    return host_visit_send(spread->visit, dest, type, data, size);
+    return host_session_send(spread->session, dest, type, data, size);
 }
 
 static bool order(struct host_spread *spread, unsigned i,
@@ -37,10 +37,10 @@ static bool is_due(const struct host_spread *spread,
 static int restart_those_that_run(struct host_spread *spread,
                                   struct host_error *error) {
     struct host_node_set set = {{0}};
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
         bool runs =
-            spread->visit->node[i].there && spread->visit->node[i].heard;
+            spread->session->node[i].there && spread->session->node[i].heard;
         if (n->phase == HOST_SPREAD_LEAVES && runs && is_due(spread, n)) {
             host_node_set_add(&set, i);
             n->told_us = spread->now_us;
@@ -49,8 +49,8 @@ static int restart_those_that_run(struct host_spread *spread,
     }
     return host_node_set_count(&set) == 0
                ? 0
-               : host_visit_restart(spread->visit, &set, NODE_RESTART_STAY,
-                                    error);
+               : host_session_restart(spread->session, &set, NODE_RESTART_STAY,
+                                      error);
 }
 
 /* To all at once, unless it is for one alone. */
@@ -58,7 +58,7 @@ static void begin(struct host_spread *spread) {
     struct loader_begin_message message = {
         .transfer = spread->transfer, .bytes = (uint32_t)spread->options.bytes};
     unsigned count = 0, last = 0;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         if (spread_in_loader(spread, i) && n->begin_due &&
             n->phase < HOST_SPREAD_STARTS && is_due(spread, n)) {
@@ -71,7 +71,7 @@ static void begin(struct host_spread *spread) {
     if (count == 0 || !send(spread, count == 1 ? (uint16_t)last : CUBE_ALL,
                             NODE_IMAGE_BEGIN, &message, sizeof message))
         return;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if ((message.nodes[i / 8] >> i % 8 & 1) != 0)
             spread->node[i].told_us = spread->now_us;
     spread->ask_due = true;
@@ -91,7 +91,7 @@ static void name(struct host_spread *spread, unsigned i) {
     bool proved = n->phase >= HOST_SPREAD_TAKES &&
                   n->phase <= HOST_SPREAD_VERIFIED && has_answered(n);
     bool nameless =
-        memcmp(spread->visit->node[i].who.serial, nobody, sizeof nobody) == 0;
+        memcmp(spread->session->node[i].who.serial, nobody, sizeof nobody) == 0;
     if (proved && nameless && !n->named && options->serial != NULL &&
         options->serial(options->context, message.serial)) {
         n->named =
@@ -110,7 +110,7 @@ static bool is_asked(const struct host_spread *spread, unsigned i) {
  * carry, and are waited for a third of the time, by what they took the last
  * time. */
 static uint64_t ask_interval(const struct host_spread *spread, unsigned nodes) {
-    uint32_t baud = spread->visit->machine->serial_baud;
+    uint32_t baud = spread->session->machine->serial_baud;
     uint64_t took_us = spread->answered_us > spread->asked_us
                            ? spread->answered_us - spread->asked_us
                            : 0;
@@ -124,7 +124,7 @@ static uint64_t ask_interval(const struct host_spread *spread, unsigned nodes) {
 
 /* Within which an answer comes, if it does. */
 static uint64_t answer_time(const struct host_spread *spread) {
-    uint32_t baud = spread->visit->machine->serial_baud;
+    uint32_t baud = spread->session->machine->serial_baud;
     return ANSWER_US +
            (baud == 0 ? 0
                       : UINT64_C(10) * QUEUE_BYTES * SLOWER * 1000000 / baud);
@@ -136,7 +136,7 @@ static bool send_ask(struct host_spread *spread, unsigned count,
     if (!send(spread, count == 1 ? (uint16_t)last : CUBE_ALL, NODE_IMAGE_ASK,
               &message, sizeof message))
         return false;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         struct host_spread_node *n = &spread->node[i];
         if (is_asked(spread, i)) {
             n->silent += n->replies < n->asks;
@@ -151,7 +151,7 @@ static bool send_ask(struct host_spread *spread, unsigned count,
 
 static void ask(struct host_spread *spread) {
     unsigned count = 0, silent = 0, last = 0;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         if (is_asked(spread, i)) {
             count++;
             silent += spread->node[i].asks > spread->node[i].replies;
@@ -181,7 +181,7 @@ static bool is_waited_for(const struct host_spread *spread, unsigned i) {
 
 /* A pass begins once all who will be in it have said what they lack. */
 static bool may_plan(const struct host_spread *spread) {
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++)
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++)
         if (is_waited_for(spread, i))
             return false;
     return !spread->ask_due;
@@ -190,7 +190,7 @@ static bool may_plan(const struct host_spread *spread) {
 /* Whether there is, or may come, a node of which it is not known what it lacks.
  */
 static bool is_any_unknown(const struct host_spread *spread) {
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         bool known = n->phase > HOST_SPREAD_TAKES ||
                      (n->phase == HOST_SPREAD_TAKES && has_answered(n));
@@ -205,7 +205,7 @@ static void plan(struct host_spread *spread) {
     bool unknown = is_any_unknown(spread);
     for (uint32_t b = 0; b < spread->blocks; b++)
         dest[b] = CUBE_HOST;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         if (!spread_in_loader(spread, i) || n->phase != HOST_SPREAD_TAKES ||
             !has_answered(n))
@@ -269,7 +269,7 @@ static void verify(struct host_spread *spread, unsigned i) {
  * others away for a while. */
 static bool may_boot(const struct host_spread *spread) {
     uint64_t now = spread->now_us;
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         const struct host_spread_node *n = &spread->node[i];
         bool off = n->phase == HOST_SPREAD_AWAITED &&
                    (!n->left || now - n->moved_us >= LEAVE_US);
@@ -302,7 +302,7 @@ static bool boot(struct host_spread *spread, unsigned i) {
 
 /* The farthest ones first: their way leads over the others. */
 static void boot_all(struct host_spread *spread) {
-    struct host_machine *machine = spread->visit->machine;
+    struct host_machine *machine = spread->session->machine;
     if (!may_boot(spread))
         return;
     for (unsigned far = machine->dimension + 1; far-- > 0;) {
@@ -316,7 +316,7 @@ int spread_orders(struct host_spread *spread, struct host_error *error) {
     if (restart_those_that_run(spread, error) != 0)
         return error->code;
     begin(spread);
-    for (unsigned i = 0; i < spread->visit->machine->nodes; i++) {
+    for (unsigned i = 0; i < spread->session->machine->nodes; i++) {
         if (spread_in_loader(spread, i)) {
             name(spread, i);
             verify(spread, i);

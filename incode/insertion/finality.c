@@ -480,22 +480,22 @@ enum incode_look_result incode_look_go(struct incode_look *look) {
                       ~UINT64_C(0) >> (INCODE_LOOK_CELLS - look->count));
 }
 
-/* --- handover ------------------------------------------------------------- */
+/* --- fallback ------------------------------------------------------------- */
 
 enum {
     CELLS = 256,          /* a step */
-    HANDOVER_AT_ONCE = 16 /* points or cells between two yields */
+    FALLBACK_AT_ONCE = 16 /* points or cells between two yields */
 };
 
 /* A vertex's `cell`, which is not needed any more. */
-enum { NOT_REACHED = 0, HANDOVER_REACHED = 1 };
+enum { NOT_REACHED = 0, FALLBACK_REACHED = 1 };
 
-static void handover_yield_at(const struct incode_handover *h, uint32_t i) {
-    if (i % HANDOVER_AT_ONCE == 0)
-        incode_maker_yield(h->n->maker, HANDOVER_AT_ONCE / 4);
+static void fallback_yield_at(const struct incode_fallback *h, uint32_t i) {
+    if (i % FALLBACK_AT_ONCE == 0)
+        incode_maker_yield(h->n->maker, FALLBACK_AT_ONCE / 4);
 }
 
-void incode_handover_begin(struct incode_handover *h,
+void incode_fallback_begin(struct incode_fallback *h,
                            struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     memset(h, 0, sizeof *h);
@@ -504,14 +504,14 @@ void incode_handover_begin(struct incode_handover *h,
     h->vertex = 1;
     h->brick = n->own_first;
     for (uint32_t v = 0; v < x->points; v++) {
-        handover_yield_at(h, v);
+        fallback_yield_at(h, v);
         if (incode_complex_is_vertex(x, v))
             x->point[v].cell = NOT_REACHED;
     }
 }
 
 /* Sends what waits; false: there is no room for it. */
-static bool send(struct incode_handover *h) {
+static bool send(struct incode_fallback *h) {
     const struct incode_front_outside *outside = &h->n->outside;
     if (h->count > 0 && !outside->spill(outside->context, h->faces, h->count))
         return false;
@@ -521,7 +521,7 @@ static bool send(struct incode_handover *h) {
 
 /* The open face opposite vertex k of a cell, seen so that the cell is on its
  * unknown side. */
-static void open_face(struct incode_handover *h, struct incode_front *front,
+static void open_face(struct incode_fallback *h, struct incode_front *front,
                       const struct incode_cell *c, unsigned k) {
     static const uint8_t BEFORE[4][3] = {
         {3, 2, 1}, {2, 3, 0}, {1, 0, 3}, {0, 1, 2}};
@@ -531,7 +531,7 @@ static void open_face(struct incode_handover *h, struct incode_front *front,
     unsigned turn;
     for (unsigned i = 0; i < 3; i++) {
         uint16_t v = c->v[BEFORE[k][i]];
-        point[v].cell = HANDOVER_REACHED;
+        point[v].cell = FALLBACK_REACHED;
         f[i] = point[v].id;
         p[i] = point[v].p;
     }
@@ -541,12 +541,12 @@ static void open_face(struct incode_handover *h, struct incode_front *front,
         (struct incode_face){{f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]}};
 }
 
-static enum incode_insertion_step send_faces(struct incode_handover *h,
+static enum incode_insertion_step send_faces(struct incode_fallback *h,
                                              struct incode_front *front) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
         const struct incode_cell *c = incode_complex_cell(x, h->cell);
-        handover_yield_at(h, h->cell);
+        fallback_yield_at(h, h->cell);
         if (incode_cell_is_free(c))
             continue;
         if (h->count + 4 > INCODE_BRICK_POINTS && !send(h))
@@ -559,12 +559,12 @@ static enum incode_insertion_step send_faces(struct incode_handover *h,
 }
 
 /* The points of own bricks to come that a released tetrahedron has. */
-static enum incode_insertion_step send_ahead(struct incode_handover *h) {
+static enum incode_insertion_step send_ahead(struct incode_fallback *h) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->vertex < x->points; i++, h->vertex++) {
         const struct incode_complex_point *v = &x->point[h->vertex];
         uint32_t brick = v->id / INCODE_BRICK_POINTS;
-        if (v->cell != HANDOVER_REACHED || brick < h->n->from ||
+        if (v->cell != FALLBACK_REACHED || brick < h->n->from ||
             brick >= h->n->own_last)
             continue;
         if (h->count == INCODE_BRICK_POINTS && !send(h))
@@ -577,7 +577,7 @@ static enum incode_insertion_step send_ahead(struct incode_handover *h) {
 
 /* The points of a brick that a released tetrahedron has: those that have no
  * cell any more, or an open face. */
-static enum incode_insertion_step send_reached(struct incode_handover *h) {
+static enum incode_insertion_step send_reached(struct incode_fallback *h) {
     const struct incode_complex *x = &h->n->complex;
     uint32_t brick = h->brick;
     uint32_t points = incode_maker_count(h->n->maker, brick);
@@ -587,7 +587,7 @@ static enum incode_insertion_step send_reached(struct incode_handover *h) {
         return INCODE_INSERTION_WAITING;
     uint64_t reached = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - points);
     for (uint32_t v = 1; v < x->points; v++) {
-        handover_yield_at(h, v);
+        fallback_yield_at(h, v);
         if (x->point[v].cell == NOT_REACHED &&
             x->point[v].id / INCODE_BRICK_POINTS == brick)
             reached &= ~(UINT64_C(1) << x->point[v].id % INCODE_BRICK_POINTS);
@@ -600,7 +600,7 @@ static enum incode_insertion_step send_reached(struct incode_handover *h) {
     return INCODE_INSERTION_WORKED;
 }
 
-enum incode_insertion_step incode_handover_step(struct incode_handover *h,
+enum incode_insertion_step incode_fallback_step(struct incode_fallback *h,
                                                 struct incode_front *front) {
     const struct incode_insertion *n = h->n;
     if (h->cell < n->complex.cells)

@@ -346,7 +346,7 @@ static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
  * the front begins with nothing in memory and has each brick's brought back in
  * its turn. */
 
-struct incode_handover {
+struct incode_fallback {
     struct incode_insertion *n;
     uint32_t cell;   /* at work: facets of cells first, */
     uint32_t vertex; /* then vertices ahead of their turn, */
@@ -355,12 +355,12 @@ struct incode_handover {
     uint32_t count;
 };
 
-void incode_handover_begin(struct incode_handover *h,
+void incode_fallback_begin(struct incode_fallback *h,
                            struct incode_insertion *n);
 
 /* front: idle, with the rule and the bricks of the job, which is its next one.
  * INCODE_INSERTION_FINISHED: all has gone out. */
-enum incode_insertion_step incode_handover_step(struct incode_handover *h,
+enum incode_insertion_step incode_fallback_step(struct incode_fallback *h,
                                                 struct incode_front *front);
 
 #endif

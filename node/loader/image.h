@@ -90,7 +90,7 @@ enum {
  * here already: a board that it is for, and that does not have it, makes a slot
  * ready, or goes on with one in which parts of the same image are. */
 struct loader_begin_message {
-    uint32_t transfer; /* of this visit of the host: any number but 0 */
+    uint32_t transfer; /* of this session of the host: any number but 0 */
     uint32_t bytes;    /* of the image, its header included */
     uint8_t nodes[CUBE_NODES_MAX / 8]; /* who is meant: node i in bit i % 8 of
                                           byte i / 8 */

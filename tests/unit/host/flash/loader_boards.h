@@ -1,6 +1,6 @@
 /* Boards with the real loader and the real node program in virtual time, over
  * serial wires and chips that take the time of serial NOR flash, and the real
- * visit that brings them an image.
+ * session that brings them an image.
  *
  * Work: a pass over the boards each 100 us that pass. */
 #ifndef TESTS_LOADER_BOARDS_H
@@ -50,7 +50,7 @@ struct board {
 static struct board *board;
 static struct host_sim_cube wires;
 static struct host_machine machine;
-static struct host_visit visit;
+static struct host_session session;
 static struct host_spread spread;
 static struct host_error error;
 static uint64_t now_us, chance;
@@ -279,11 +279,11 @@ static void open_world(unsigned dimension, uint64_t seed) {
     assert_non_null(board);
     for (unsigned i = 0; i < nodes; i++)
         make_board(i);
-    assert_int_equal(host_visit_open(&visit, &machine, &error), 0);
+    assert_int_equal(host_session_open(&session, &machine, &error), 0);
 }
 
 static void close_world(void) {
-    host_visit_close(&visit);
+    host_session_close(&session);
     for (unsigned i = 0; i < machine.nodes; i++)
         free(board[i].as.arena);
     free(board);
@@ -302,7 +302,7 @@ static double flash(const struct made *made) {
     struct host_spread_options how = {
         .image = made->all, .bytes = made->bytes, .patience_us = 60000000};
     host_node_set_all(&how.nodes, machine.nodes);
-    assert_int_equal(host_spread_open(&spread, &visit, &how, &error), 0);
+    assert_int_equal(host_spread_open(&spread, &session, &how, &error), 0);
     assert_int_equal(host_spread_look(&spread, &error), 0);
     uint64_t from_us = now_us, whole_us = 0;
     while (!host_spread_over(&spread)) {

@@ -1,4 +1,4 @@
-/* A visit that is played: boards with a loader, in a time of their own, that
+/* A session that is played: boards with a loader, in a time of their own, that
  * are off, restart, lose messages, refuse and fall back. */
 #ifndef TESTS_PLAYED_BOARDS_H
 #define TESTS_PLAYED_BOARDS_H
@@ -48,8 +48,8 @@ struct board {
 };
 
 static struct board board[NODES];
-static struct host_visit visit;
-static struct host_visit_node seen[NODES];
+static struct host_session session;
+static struct host_session_node seen[NODES];
 static struct host_machine machine;
 static uint64_t now_us, off_until_us[NODES];
 static unsigned loss;          /* of 100 blocks */
@@ -129,7 +129,7 @@ static void answer(unsigned i) {
                                          .size = sizeof state,
                                          .type = NODE_IMAGE_STATE,
                                          .data = (const uint8_t *)&state};
-    visit.take(visit.context, &message);
+    session.take(session.context, &message);
 }
 
 static void begin(struct board *b, unsigned i, const uint8_t *data) {
@@ -200,21 +200,22 @@ static void deliver(unsigned i, uint8_t type, const uint8_t *data,
         obey(b, i, data);
     } else if (type == NODE_IMAGE_ASK && i == 1 && asks_lost > 0) {
         asks_lost--;
-        visit.generation++;
+        session.generation++;
     } else if (type == NODE_IMAGE_ASK) {
         answer(i);
     }
 }
 
-/* --- the visit ------------------------------------------------------------ */
+/* --- the session ------------------------------------------------------------
+ */
 
 static uint64_t tell_time(void *unused) {
     (void)unused;
     return now_us;
 }
 
-bool host_visit_send(struct host_visit *unused, uint16_t dest, uint8_t type,
-                     const void *data, size_t size) {
+bool host_session_send(struct host_session *unused, uint16_t dest, uint8_t type,
+                       const void *data, size_t size) {
     (void)unused;
     assert_true(size <= CUBE_PAYLOAD_MAX);
     if (queued == QUEUE)
@@ -227,8 +228,8 @@ bool host_visit_send(struct host_visit *unused, uint16_t dest, uint8_t type,
     return true;
 }
 
-int host_visit_round(struct host_visit *unused, uint64_t wait_us,
-                     struct host_error *error) {
+int host_session_round(struct host_session *unused, uint64_t wait_us,
+                       struct host_error *error) {
     (void)unused;
     now_us += queued > 0 ? A_MESSAGE_US : wait_us;
     if (lost)
@@ -254,9 +255,9 @@ int host_visit_round(struct host_visit *unused, uint64_t wait_us,
     return 0;
 }
 
-int host_visit_restart(struct host_visit *unused,
-                       const struct host_node_set *set, enum node_restart what,
-                       struct host_error *error) {
+int host_session_restart(struct host_session *unused,
+                         const struct host_node_set *set,
+                         enum node_restart what, struct host_error *error) {
     (void)unused;
     (void)error;
     assert_int_equal(what, NODE_RESTART_STAY);
@@ -271,9 +272,10 @@ int host_visit_restart(struct host_visit *unused,
     return 0;
 }
 
-int host_visit_ask(struct host_visit *unused, const struct host_node_set *set,
-                   enum node_question what, unsigned target, uint64_t wait_us,
-                   struct host_error *error) {
+int host_session_ask(struct host_session *unused,
+                     const struct host_node_set *set, enum node_question what,
+                     unsigned target, uint64_t wait_us,
+                     struct host_error *error) {
     static char log[] = "started 3 times\nlast fault: watchdog\n";
     (void)unused;
     (void)target;
@@ -290,8 +292,8 @@ int host_visit_ask(struct host_visit *unused, const struct host_node_set *set,
     return 0;
 }
 
-const char *host_visit_reason(const struct host_visit *unused, unsigned node,
-                              char *text, size_t size) {
+const char *host_session_reason(const struct host_session *unused,
+                                unsigned node, char *text, size_t size) {
     (void)unused;
     (void)node;
     snprintf(text, size, "is not heard; turn it on");

@@ -13,8 +13,8 @@
 enum { NODES = 8, TEXT = 4000 };
 
 static struct host_machine machine = {.nodes = NODES, .dimension = 3};
-static struct host_visit_node seen[NODES];
-static struct host_visit visit = {.machine = &machine, .node = seen};
+static struct host_session_node seen[NODES];
+static struct host_session session = {.machine = &machine, .node = seen};
 static struct host_spread_node node[NODES];
 static struct host_spread spread;
 static struct host_flash_show show;
@@ -25,7 +25,7 @@ static int prepare(void **unused) {
     memset(seen, 0, sizeof seen);
     memset(node, 0, sizeof node);
     spread = (struct host_spread){
-        .visit = &visit,
+        .session = &session,
         .node = node,
         .image = {.number = 3, .board = "mps2-an500", .version = "1.2"}};
     host_node_set_all(&spread.options.nodes, NODES);

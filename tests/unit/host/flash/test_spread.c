@@ -1,4 +1,4 @@
-/* An image on its way to boards, over a visit that is played: boards with
+/* An image on its way to boards, over a session that is played: boards with
  * a loader, in a time of their own, that are off, restart, lose messages,
  * refuse and fall back. */
 #include "played_boards.h"
@@ -37,7 +37,7 @@ static int prepare(void **unused) {
                                     .epoch = 77,
                                     .serial_baud = 921600,
                                     .now_us = tell_time};
-    visit = (struct host_visit){.machine = &machine, .node = seen};
+    session = (struct host_session){.machine = &machine, .node = seen};
     memset(seen, 0, sizeof seen);
     memset(off_until_us, 0, sizeof off_until_us);
     error = (struct host_error){0};
@@ -67,7 +67,7 @@ static int run(void) {
     for (unsigned i = 0; i < NODES; i++)
         if (board[i].on && !seen[i].there)
             come_up(i);
-    assert_int_equal(host_spread_open(&spread, &visit, &options, &error), 0);
+    assert_int_equal(host_spread_open(&spread, &session, &options, &error), 0);
     int status = host_spread_look(&spread, &error);
     for (unsigned step = 0; status == 0 && !host_spread_over(&spread); step++) {
         assert_true(step < 100000);
@@ -344,7 +344,7 @@ TEST_WITH(a_look_changes_nothing, prepare, NULL) {
     for (unsigned i = 0; i < NODES; i++)
         if (board[i].on)
             come_up(i);
-    assert_int_equal(host_spread_open(&spread, &visit, &options, &error), 0);
+    assert_int_equal(host_spread_open(&spread, &session, &options, &error), 0);
     assert_int_equal(host_spread_look(&spread, &error), 0);
     is_in(0, HOST_SPREAD_LEAVES);
     is_in(1, HOST_SPREAD_HAS);

@@ -1,4 +1,4 @@
-/* Images on their way to boards in virtual time: the real visit, the real
+/* Images on their way to boards in virtual time: the real session, the real
  * loader, the real node program, over serial wires and chips that take the time
  * of serial NOR flash.  Power and wires go by seed. */
 #include "loader_boards.h"
@@ -87,7 +87,7 @@ static void hear(void *unused, const struct cube_message *message) {
 
 static void stay_for(uint64_t us) {
     for (uint64_t end_us = now_us + us; now_us < end_us;)
-        assert_int_equal(host_visit_round(&visit, 10000, &error), 0);
+        assert_int_equal(host_session_round(&session, 10000, &error), 0);
 }
 
 static bool is_named(const struct board *b, const uint8_t *serial) {
@@ -105,25 +105,26 @@ TEST(a_name_counts_within_a_transfer_alone) {
     struct host_node_set all;
     open_world(2, 4);
     host_node_set_all(&all, 4);
-    assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
+    assert_int_equal(host_session_wait(&session, &all, 5000000, &error), 0);
     begin.nodes[0] = 1 << 2;
     for (unsigned i = 0; i < 4; i++) {
         name.transfer = i % 2 == 0 ? 0 : begin.transfer;
         if (i == 2) { /* with a signature that is false */
             forged.signature[0] ^= 1;
             loader_image_pack(&forged, begin.header);
-            assert_true(host_visit_send(&visit, 2, NODE_IMAGE_BEGIN, &begin,
-                                        sizeof begin));
+            assert_true(host_session_send(&session, 2, NODE_IMAGE_BEGIN, &begin,
+                                          sizeof begin));
         }
         assert_true(
-            host_visit_send(&visit, 2, NODE_IMAGE_DO, &name, sizeof name));
+            host_session_send(&session, 2, NODE_IMAGE_DO, &name, sizeof name));
         stay_for(300000);
         assert_false(is_named(&board[2], name.serial));
     }
     memcpy(begin.header, old.all, sizeof begin.header);
     assert_true(
-        host_visit_send(&visit, 2, NODE_IMAGE_BEGIN, &begin, sizeof begin));
-    assert_true(host_visit_send(&visit, 2, NODE_IMAGE_DO, &name, sizeof name));
+        host_session_send(&session, 2, NODE_IMAGE_BEGIN, &begin, sizeof begin));
+    assert_true(
+        host_session_send(&session, 2, NODE_IMAGE_DO, &name, sizeof name));
     stay_for(300000);
     assert_true(is_named(&board[2], name.serial));
     close_world();
@@ -134,33 +135,34 @@ TEST(a_loader_answers_as_a_node) {
     struct host_node_set all;
     open_world(2, 4);
     host_node_set_all(&all, 4);
-    assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
+    assert_int_equal(host_session_wait(&session, &all, 5000000, &error), 0);
     for (unsigned i = 0; i < 4; i++) {
-        const struct node_who *who = &visit.node[i].who;
-        assert_true(visit.node[i].there);
+        const struct node_who *who = &session.node[i].who;
+        assert_true(session.node[i].there);
         assert_int_equal(who->kind, NODE_KIND_LOADER);
         assert_int_equal(who->boot, 1);
         assert_int_equal(who->digest[0] | who->serial[0], 0);
     }
-    visit.take = hear;
+    session.take = hear;
     told[0] = '\0';
-    assert_true(host_visit_send(&visit, 3, NODE_SETUP, &setup, sizeof setup));
+    assert_true(
+        host_session_send(&session, 3, NODE_SETUP, &setup, sizeof setup));
     stay_for(300000);
     assert_non_null(strstr(told, "no program is running"));
     for (enum node_question q = NODE_WHO; q <= NODE_PROBE; q++) {
-        assert_int_equal(host_visit_ask(&visit, &all, q, 1, 3000000, &error),
-                         0);
+        assert_int_equal(
+            host_session_ask(&session, &all, q, 1, 3000000, &error), 0);
         for (unsigned i = 0; i < 4; i++)
-            assert_true(visit.node[i].answered);
+            assert_true(session.node[i].answered);
     }
     assert_int_equal(
-        host_visit_restart(&visit, &all, NODE_RESTART_STAY, &error), 0);
+        host_session_restart(&session, &all, NODE_RESTART_STAY, &error), 0);
     stay_for(2000000);
     for (unsigned i = 0; i < 4; i++) {
         assert_int_equal(board[i].boot, 2);
         assert_non_null(board[i].loader);
     }
-    assert_true(host_visit_send(&visit, CUBE_ALL, NODE_STOP, NULL, 0));
+    assert_true(host_session_send(&session, CUBE_ALL, NODE_STOP, NULL, 0));
     stay_for(2000000);
     for (unsigned i = 0; i < 4; i++)
         assert_int_equal(board[i].boot, 3);
@@ -176,24 +178,25 @@ TEST(a_board_with_a_worn_flash_waits_and_says_so) {
     host_node_set_add(&worn, 1);
     (void)flash(&old);
     board[1].chip.worn_out = true;
-    unsigned starts = visit.node[1].starts;
+    unsigned starts = session.node[1].starts;
     assert_int_equal(
-        host_visit_restart(&visit, &all, NODE_RESTART_PLAIN, &error), 0);
+        host_session_restart(&session, &all, NODE_RESTART_PLAIN, &error), 0);
     stay_for(10000000);
-    assert_int_equal(host_visit_wait(&visit, &all, 5000000, &error), 0);
+    assert_int_equal(host_session_wait(&session, &all, 5000000, &error), 0);
     assert_null(board[1].node);
     assert_non_null(board[1].loader);
-    assert_int_equal(visit.node[1].starts, starts + 1);
-    assert_int_equal(visit.node[1].who.kind, NODE_KIND_LOADER);
-    assert_int_equal(visit.node[1].who.boot, 0);
+    assert_int_equal(session.node[1].starts, starts + 1);
+    assert_int_equal(session.node[1].who.kind, NODE_KIND_LOADER);
+    assert_int_equal(session.node[1].who.boot, 0);
     for (unsigned i = 0; i < 4; i++)
         assert_true(i == 1 || board[i].node != NULL);
     assert_int_equal(
-        host_visit_ask(&visit, &worn, NODE_LOG, 0, 3000000, &error), 0);
-    assert_non_null(strstr((const char *)visit.node[1].answer, "is worn"));
-    visit.take = hear;
+        host_session_ask(&session, &worn, NODE_LOG, 0, 3000000, &error), 0);
+    assert_non_null(strstr((const char *)session.node[1].answer, "is worn"));
+    session.take = hear;
     told[0] = '\0';
-    assert_true(host_visit_send(&visit, 1, NODE_SETUP, &setup, sizeof setup));
+    assert_true(
+        host_session_send(&session, 1, NODE_SETUP, &setup, sizeof setup));
     stay_for(300000);
     assert_non_null(strstr(told, "it is worn"));
     close_world();

@@ -1,10 +1,10 @@
-#include "visit.h"
+#include "session.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "host/service/parts.h"
-#include "visit_wiring.h"
+#include "session_wiring.h"
 #include "host/service/watchers.h"
 
 enum {
@@ -25,12 +25,12 @@ enum {
     OUTDONE_MAX = 64
 };
 
-static struct host_visit_node *node_of(struct host_visit *v, unsigned i) {
+static struct host_session_node *node_of(struct host_session *v, unsigned i) {
     return &v->node[i];
 }
 
 /* In which all nodes are pinged once. */
-static uint64_t ping_round_us(const struct host_visit *v) {
+static uint64_t ping_round_us(const struct host_session *v) {
     const struct host_machine *m = v->machine;
     uint64_t one = PING_A_NODE_US;
     if (m->serial_baud != 0) {
@@ -46,42 +46,42 @@ static uint64_t ping_round_us(const struct host_visit *v) {
 }
 
 /* The longest of late. */
-static void note_rtt(struct host_visit *v, uint64_t us) {
+static void note_rtt(struct host_session *v, uint64_t us) {
     uint64_t late = v->pong_rtt_us - v->pong_rtt_us / v->machine->nodes / 2;
     v->pong_rtt_us = us > late ? us : late;
 }
 
-int host_visit_open(struct host_visit *visit, struct host_machine *machine,
-                    struct host_error *error) {
-    struct host_visit *v = visit;
+int host_session_open(struct host_session *session,
+                      struct host_machine *machine, struct host_error *error) {
+    struct host_session *v = session;
     unsigned nodes = machine->nodes;
     memset(v, 0, sizeof *v);
     v->machine = machine;
     v->node = calloc(nodes, sizeof *v->node);
-    v->answers = calloc(nodes, HOST_VISIT_ANSWER_BYTES);
+    v->answers = calloc(nodes, HOST_SESSION_ANSWER_BYTES);
     v->dead = calloc(nodes, sizeof *v->dead);
     if (v->node == NULL || v->answers == NULL || v->dead == NULL) {
-        host_visit_close(v);
+        host_session_close(v);
         return host_fail_memory(error, "the nodes' answers");
     }
     for (unsigned i = 0; i < nodes; i++)
-        v->node[i].answer = v->answers + (size_t)i * HOST_VISIT_ANSWER_BYTES;
+        v->node[i].answer = v->answers + (size_t)i * HOST_SESSION_ANSWER_BYTES;
     v->cube = host_cube_make(machine, 0, &v->cube_memory, error);
     if (v->cube == NULL) {
-        host_visit_close(v);
+        host_session_close(v);
         return error->code;
     }
     v->now_us = machine->now_us(machine->context);
     v->opened_us = v->wire_us = v->now_us;
-    host_visit_wiring_renew(v);
+    host_session_wiring_renew(v);
     return 0;
 }
 
 /* --- what nodes say ------------------------------------------------------- */
 
 /* A start that was not known. */
-static void begin_start(struct host_visit *v, unsigned i, uint32_t start) {
-    struct host_visit_node *node = node_of(v, i);
+static void begin_start(struct host_session *v, unsigned i, uint32_t start) {
+    struct host_session_node *node = node_of(v, i);
     node->starts++;
     node->start = start;
     node->there = false;
@@ -92,16 +92,16 @@ static void begin_start(struct host_visit *v, unsigned i, uint32_t start) {
 }
 
 /* What is known of a link, both ends know. */
-static void note_links(struct host_visit *v, unsigned i, uint32_t seen) {
+static void note_links(struct host_session *v, unsigned i, uint32_t seen) {
     node_of(v, i)->links |= seen;
     for (unsigned d = 0; d < v->machine->dimension; d++)
         node_of(v, i ^ 1u << d)->links |= seen & (uint32_t)1 << d;
 }
 
-static void take_pong(struct host_visit *v,
+static void take_pong(struct host_session *v,
                       const struct cube_message *message) {
     struct node_pong_message pong;
-    struct host_visit_node *node = node_of(v, message->source);
+    struct host_session_node *node = node_of(v, message->source);
     if (message->size != sizeof pong)
         return;
     memcpy(&pong, message->data, sizeof pong);
@@ -124,9 +124,9 @@ static void take_pong(struct host_visit *v,
 }
 
 /* Of another version of the program the first field alone is known. */
-static void take_who(struct host_visit *v, unsigned i, const uint8_t *data,
+static void take_who(struct host_session *v, unsigned i, const uint8_t *data,
                      size_t size) {
-    struct host_visit_node *node = node_of(v, i);
+    struct host_session_node *node = node_of(v, i);
     struct node_who who;
     memset(&who, 0, sizeof who);
     if (size < sizeof who.protocol)
@@ -144,9 +144,9 @@ static void take_who(struct host_visit *v, unsigned i, const uint8_t *data,
     node->who_due = false;
 }
 
-static void take_answer(struct host_visit *v,
+static void take_answer(struct host_session *v,
                         const struct cube_message *message) {
-    struct host_visit_node *node = node_of(v, message->source);
+    struct host_session_node *node = node_of(v, message->source);
     struct node_answer_head head;
     if (message->size < sizeof head)
         return;
@@ -169,11 +169,11 @@ static void take_answer(struct host_visit *v,
     host_node_set_remove(&v->wanted, message->source);
 }
 
-static void take_message(struct host_visit *v,
+static void take_message(struct host_session *v,
                          const struct cube_message *message) {
     if (message->source >= v->machine->nodes)
         return;
-    struct host_visit_node *node = node_of(v, message->source);
+    struct host_session_node *node = node_of(v, message->source);
     node->heard_us = v->now_us;
     node->heard = true;
     if (message->type == NODE_PONG)
@@ -194,14 +194,14 @@ static bool is_due(bool now, bool still, uint64_t asked_us, uint64_t again_us,
 }
 
 /* Not while the answer may be on its way. */
-static uint64_t again_us(const struct host_visit *v, uint64_t us) {
+static uint64_t again_us(const struct host_session *v, uint64_t us) {
     uint64_t late = 2 * v->pong_rtt_us;
     late = late < WHO_AGAIN_US_MAX ? late : WHO_AGAIN_US_MAX;
     return us < late ? late : us;
 }
 
-static void find_due(struct host_visit *v, unsigned i) {
-    struct host_visit_node *node = node_of(v, i);
+static void find_due(struct host_session *v, unsigned i) {
+    struct host_session_node *node = node_of(v, i);
     bool asked = host_node_set_has(&v->wanted, i);
     node->who_due = is_due(node->who_due, !node->there, node->who_us,
                            again_us(v, node->who_again_us), v->now_us);
@@ -211,24 +211,24 @@ static void find_due(struct host_visit *v, unsigned i) {
                             PING_AGAIN * ping_round_us(v), v->now_us);
 }
 
-static bool write_question(struct host_visit *v, unsigned i, uint32_t tag,
+static bool write_question(struct host_session *v, unsigned i, uint32_t tag,
                            uint32_t what, uint32_t target) {
     struct node_question_message question = {tag, what, target};
     return cube_write(v->cube, (uint16_t)i, NODE_QUESTION, &question,
                       sizeof question) == 0;
 }
 
-static bool write_ping(struct host_visit *v, unsigned i) {
+static bool write_ping(struct host_session *v, unsigned i) {
     struct node_ping_message ping = {0};
     return cube_write(v->cube, (uint16_t)i, NODE_PING, &ping, sizeof ping) == 0;
 }
 
 /* Sends what is due to a node; how much. */
-static unsigned serve(struct host_visit *v, unsigned i) {
-    struct host_visit_node *node = node_of(v, i);
+static unsigned serve(struct host_session *v, unsigned i) {
+    struct host_session_node *node = node_of(v, i);
     unsigned sent = 0;
     if (node->who_due &&
-        write_question(v, i, HOST_VISIT_WHO_TAG, NODE_WHO, 0)) {
+        write_question(v, i, HOST_SESSION_WHO_TAG, NODE_WHO, 0)) {
         node->who_due = false;
         node->who_us = v->now_us;
         node->who_again_us = node->who_again_us == 0 ? ASK_AGAIN_US
@@ -258,7 +258,7 @@ static unsigned serve(struct host_visit *v, unsigned i) {
     return sent;
 }
 
-static unsigned serve_all(struct host_visit *v) {
+static unsigned serve_all(struct host_session *v) {
     unsigned sent = 0, nodes = v->machine->nodes;
     for (unsigned k = 0; k < nodes; k++) {
         unsigned i = (v->turn + k) % nodes;
@@ -272,11 +272,11 @@ static unsigned serve_all(struct host_visit *v) {
 }
 
 /* Each node once a round, one after the other. */
-static void ping_in_turn(struct host_visit *v) {
+static void ping_in_turn(struct host_session *v) {
     uint64_t every = ping_round_us(v) / v->machine->nodes;
     unsigned most = v->machine->nodes;
     for (; most > 0 && v->now_us - v->ping_us >= every; most--) {
-        struct host_visit_node *node = node_of(v, v->ping_turn);
+        struct host_session_node *node = node_of(v, v->ping_turn);
         node->ping_due = node->ping_due || !node->pinged;
         v->ping_turn = (v->ping_turn + 1) % v->machine->nodes;
         v->ping_us += every;
@@ -287,7 +287,8 @@ static void ping_in_turn(struct host_visit *v) {
 
 /* --- rounds --------------------------------------------------------------- */
 
-static int check_outdone(const struct host_visit *v, struct host_error *error) {
+static int check_outdone(const struct host_session *v,
+                         struct host_error *error) {
     return cube_statistics(v->cube)->outdone <= OUTDONE_MAX
                ? 0
                : host_fail(error, HOST_CUBE,
@@ -299,9 +300,9 @@ static int check_outdone(const struct host_visit *v, struct host_error *error) {
 }
 
 /* Whether another host has the cube, which may have died just before. */
-static int check_use(struct host_visit *v, struct host_error *error) {
+static int check_use(struct host_session *v, struct host_error *error) {
     enum host_in_use_state use = host_in_use_look(
-        &v->use, v->machine, cube_link_peer(v->cube, host_visit_wire(v)),
+        &v->use, v->machine, cube_link_peer(v->cube, host_session_wire(v)),
         v->now_us);
     v->in_use = use != HOST_FREE;
     if (use == HOST_STAYS) {
@@ -311,7 +312,7 @@ static int check_use(struct host_visit *v, struct host_error *error) {
     return 0;
 }
 
-static int check(struct host_visit *v, struct host_error *error) {
+static int check(struct host_session *v, struct host_error *error) {
     if (v->now_us - v->check_us < CHECK_EVERY_US)
         return 0;
     v->check_us = v->now_us;
@@ -320,16 +321,16 @@ static int check(struct host_visit *v, struct host_error *error) {
         return error->code;
     uint64_t heard_us = 2 * ping_round_us(v);
     for (unsigned i = 0; i < v->machine->nodes; i++) {
-        struct host_visit_node *node = node_of(v, i);
+        struct host_session_node *node = node_of(v, i);
         node->heard =
             node->heard_us != 0 && v->now_us - node->heard_us <= heard_us;
     }
     ping_in_turn(v);
-    host_visit_wiring_look(v);
+    host_session_wiring_look(v);
     return 0;
 }
 
-static void look_out(struct host_visit *v) {
+static void look_out(struct host_session *v) {
     static const struct host_watchers_progress none;
     host_watching_look(&v->watching, v->machine, v->now_us, &none);
     for (unsigned i = 0; v->watching.asked && i < v->machine->nodes; i++)
@@ -337,15 +338,15 @@ static void look_out(struct host_visit *v) {
             host_watching_leave_out(&v->watching, i);
 }
 
-int host_visit_round(struct host_visit *visit, uint64_t wait_us,
-                     struct host_error *error) {
-    struct host_visit *v = visit;
+int host_session_round(struct host_session *session, uint64_t wait_us,
+                       struct host_error *error) {
+    struct host_session *v = session;
     const struct host_machine *m = v->machine;
     struct cube_message message;
     v->now_us = m->now_us(m->context);
     unsigned moved = (unsigned)cube_poll(v->cube, v->now_us);
     if (cube_wiring(v->cube)->generation != v->generation)
-        host_visit_wiring_begin(v); /* nodes knew a later one */
+        host_session_wiring_begin(v); /* nodes knew a later one */
     while (cube_read(v->cube, &message)) {
         take_message(v, &message);
         cube_release(v->cube);
@@ -363,32 +364,32 @@ int host_visit_round(struct host_visit *visit, uint64_t wait_us,
     return 0;
 }
 
-bool host_visit_send(struct host_visit *visit, uint16_t dest, uint8_t type,
-                     const void *data, size_t size) {
-    return cube_write(visit->cube, dest, type, data, size) == 0;
+bool host_session_send(struct host_session *session, uint16_t dest,
+                       uint8_t type, const void *data, size_t size) {
+    return cube_write(session->cube, dest, type, data, size) == 0;
 }
 
-int host_visit_restart(struct host_visit *visit,
-                       const struct host_node_set *set, enum node_restart what,
-                       struct host_error *error) {
-    struct host_visit *v = visit;
+int host_session_restart(struct host_session *session,
+                         const struct host_node_set *set,
+                         enum node_restart what, struct host_error *error) {
+    struct host_session *v = session;
     struct node_restart_message restart = {(uint32_t)what};
     uint64_t begun_us = v->now_us;
     unsigned i = 0;
     while (i < v->machine->nodes && v->now_us - begun_us < RESTART_US)
         if (!host_node_set_has(set, i) ||
-            host_visit_send(v, (uint16_t)i, NODE_RESTART, &restart,
-                            sizeof restart))
+            host_session_send(v, (uint16_t)i, NODE_RESTART, &restart,
+                              sizeof restart))
             i++;
-        else if (host_visit_round(v, CHECK_EVERY_US, error) != 0)
+        else if (host_session_round(v, CHECK_EVERY_US, error) != 0)
             return error->code;
-    return host_visit_round(v, 0, error); /* it is on its way */
+    return host_session_round(v, 0, error); /* it is on its way */
 }
 
 /* --- leaving -------------------------------------------------------------- */
 
 /* The host's wires at whose end somebody is. */
-static uint32_t links_up(const struct host_visit *v) {
+static uint32_t links_up(const struct host_session *v) {
     uint32_t up = 0;
     for (unsigned d = 0; d < cube_links(v->cube); d++)
         up |= (uint32_t)(cube_link_state(v->cube, d) == LINK_UP) << d;
@@ -396,7 +397,7 @@ static uint32_t links_up(const struct host_visit *v) {
 }
 
 /* Whether one of those has not heard the farewell. */
-static bool parting(const struct host_visit *v, uint32_t links) {
+static bool parting(const struct host_session *v, uint32_t links) {
     for (unsigned d = 0; d < cube_links(v->cube); d++)
         if ((links >> d & 1) != 0 &&
             cube_link_state(v->cube, d) == LINK_CLOSING)
@@ -406,11 +407,11 @@ static bool parting(const struct host_visit *v, uint32_t links) {
 
 /* What waits for nodes that take nothing would hold up the farewell: it is
  * dropped. */
-static void part(struct host_visit *v) {
+static void part(struct host_session *v) {
     const struct host_machine *m = v->machine;
     struct cube_message message;
     uint32_t up = links_up(v);
-    host_visit_wiring_renew(v);
+    host_session_wiring_renew(v);
     uint64_t end_us = m->now_us(m->context) + FAREWELL_US;
     cube_close(v->cube, end_us);
     while ((v->now_us = m->now_us(m->context)) < end_us && parting(v, up)) {
@@ -426,8 +427,8 @@ static void part(struct host_visit *v) {
     }
 }
 
-void host_visit_close(struct host_visit *visit) {
-    struct host_visit *v = visit;
+void host_session_close(struct host_session *session) {
+    struct host_session *v = session;
     if (v->cube != NULL)
         part(v);
     free(v->cube_memory);
@@ -437,7 +438,7 @@ void host_visit_close(struct host_visit *visit) {
     memset(v, 0, sizeof *v);
 }
 
-/* What waits until a visit knows something, round by round. */
+/* What waits until a session knows something, round by round. */
 
 enum {
     SETTLED_US = 2000000, /* of a generation, in which who can be reached
@@ -447,19 +448,19 @@ enum {
 };
 
 /* Rounds until `done`, at most so long. */
-static int until(struct host_visit *v, uint64_t wait_us,
-                 bool (*done)(const struct host_visit *v,
+static int until(struct host_session *v, uint64_t wait_us,
+                 bool (*done)(const struct host_session *v,
                               const struct host_node_set *set),
                  const struct host_node_set *set, struct host_error *error) {
     uint64_t begun_us = v->machine->now_us(v->machine->context);
     v->now_us = begun_us;
     while (!done(v, set) && v->now_us - begun_us < wait_us)
-        if (host_visit_round(v, wait_us - (v->now_us - begun_us), error) != 0)
+        if (host_session_round(v, wait_us - (v->now_us - begun_us), error) != 0)
             return error->code;
     return 0;
 }
 
-static bool all_there(const struct host_visit *v,
+static bool all_there(const struct host_session *v,
                       const struct host_node_set *set) {
     for (unsigned i = 0; i < v->machine->nodes; i++)
         if (host_node_set_has(set, i) && !v->node[i].there)
@@ -467,22 +468,24 @@ static bool all_there(const struct host_visit *v,
     return true;
 }
 
-int host_visit_wait(struct host_visit *visit, const struct host_node_set *set,
-                    uint64_t wait_us, struct host_error *error) {
+int host_session_wait(struct host_session *session,
+                      const struct host_node_set *set, uint64_t wait_us,
+                      struct host_error *error) {
     bool was;
     int status;
     do { /* a round fails within 9 s where the other host stays */
-        was = visit->in_use;
-        status = until(visit, wait_us, all_there, set, error);
-    } while (status == 0 && (was || visit->in_use) && !all_there(visit, set));
+        was = session->in_use;
+        status = until(session, wait_us, all_there, set, error);
+    } while (status == 0 && (was || session->in_use) &&
+             !all_there(session, set));
     return status;
 }
 
 /* A wire that was found dead may be one on the way round which others come. */
-static bool all_settled(const struct host_visit *v,
+static bool all_settled(const struct host_session *v,
                         const struct host_node_set *set) {
     bool late = v->now_us - v->began_us >= SETTLED_US;
-    enum link_state wire = cube_link_state(v->cube, host_visit_wire(v));
+    enum link_state wire = cube_link_state(v->cube, host_session_wire(v));
     if (wire != LINK_UP && !v->in_use && v->now_us - v->opened_us >= NOBODY_US)
         return true;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
@@ -494,29 +497,30 @@ static bool all_settled(const struct host_visit *v,
     return true;
 }
 
-int host_visit_settle(struct host_visit *visit, const struct host_node_set *set,
-                      uint64_t wait_us, struct host_error *error) {
-    return until(visit, wait_us, all_settled, set, error);
+int host_session_settle(struct host_session *session,
+                        const struct host_node_set *set, uint64_t wait_us,
+                        struct host_error *error) {
+    return until(session, wait_us, all_settled, set, error);
 }
 
-static bool wires_settled(const struct host_visit *v,
+static bool wires_settled(const struct host_session *v,
                           const struct host_node_set *set) {
     (void)set;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
-        const struct host_visit_node *node = &v->node[i];
+        const struct host_session_node *node = &v->node[i];
         if (node->there && node->heard && node->pong_us == 0)
             return false; /* it has not said */
     }
-    return host_visit_faults_are_old(v, WIRES_US) ||
-           host_visit_faults(v, NULL, NULL) == 0;
+    return host_session_faults_are_old(v, WIRES_US) ||
+           host_session_faults(v, NULL, NULL) == 0;
 }
 
-int host_visit_settle_wires(struct host_visit *visit, uint64_t wait_us,
-                            struct host_error *error) {
-    return until(visit, wait_us, wires_settled, NULL, error);
+int host_session_settle_wires(struct host_session *session, uint64_t wait_us,
+                              struct host_error *error) {
+    return until(session, wait_us, wires_settled, NULL, error);
 }
 
-static bool all_answered(const struct host_visit *v,
+static bool all_answered(const struct host_session *v,
                          const struct host_node_set *set) {
     for (unsigned i = 0; i < v->machine->nodes; i++)
         if (host_node_set_has(set, i) && !v->node[i].answered &&
@@ -525,17 +529,18 @@ static bool all_answered(const struct host_visit *v,
     return true;
 }
 
-int host_visit_ask(struct host_visit *visit, const struct host_node_set *set,
-                   enum node_question what, unsigned target, uint64_t wait_us,
-                   struct host_error *error) {
-    struct host_visit *v = visit;
+int host_session_ask(struct host_session *session,
+                     const struct host_node_set *set, enum node_question what,
+                     unsigned target, uint64_t wait_us,
+                     struct host_error *error) {
+    struct host_session *v = session;
     v->tag =
-        v->tag + 1 == HOST_WATCHERS_TAG ? HOST_VISIT_WHO_TAG + 1 : v->tag + 1;
+        v->tag + 1 == HOST_WATCHERS_TAG ? HOST_SESSION_WHO_TAG + 1 : v->tag + 1;
     v->what = what;
     v->target = target;
     v->wanted = *set;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
-        struct host_visit_node *node = &v->node[i];
+        struct host_session_node *node = &v->node[i];
         node->answered = false;
         node->size = 0;
         node->question_due = host_node_set_has(set, i);

@@ -1,5 +1,5 @@
-/* A cube in virtual time that a host visits: worlds of any size, and what
- * befalls them between two rounds of the visit. */
+/* A cube in virtual time that a host sessions: worlds of any size, and what
+ * befalls them between two rounds of the session. */
 #ifndef TESTS_VISIT_WORLD_H
 #define TESTS_VISIT_WORLD_H
 
@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "host/sim/sim_world.h"
-#include "host/cube/visit.h"
+#include "host/cube/session.h"
 #include "tests/unit/test.h"
 
 enum { MEMORY = 640 * 1024, S = 1000000 };
@@ -15,7 +15,7 @@ enum { MEMORY = 640 * 1024, S = 1000000 };
 static struct {
     struct host_world world;
     struct host_machine machine;
-    struct host_visit visit;
+    struct host_session session;
     struct host_error error;
     uint64_t random;
 } place;
@@ -64,11 +64,11 @@ static inline void good(int status) {
 /* Comes to the cube as another start of the host. */
 static inline void come(void) {
     place.machine = host_world_machine(&place.world);
-    good(host_visit_open(&place.visit, &place.machine, &place.error));
+    good(host_session_open(&place.session, &place.machine, &place.error));
 }
 
 static inline void close_place(void) {
-    host_visit_close(&place.visit);
+    host_session_close(&place.session);
     assert_null(host_world_damage(&place.world));
     host_world_close(&place.world);
 }
@@ -95,12 +95,12 @@ static inline struct host_node_set only(unsigned node) {
 static inline unsigned there(const struct host_node_set *set) {
     unsigned count = 0;
     for (unsigned i = 0; i < place.world.nodes; i++)
-        count += host_node_set_has(set, i) && place.visit.node[i].there;
+        count += host_node_set_has(set, i) && place.session.node[i].there;
     return count;
 }
 
 static inline void wait_for(struct host_node_set set, uint64_t us) {
-    good(host_visit_wait(&place.visit, &set, us, &place.error));
+    good(host_session_wait(&place.session, &set, us, &place.error));
     if (there(&set) != host_node_set_count(&set)) {
         fail_msg("%u of %u are there after %llu ms", there(&set),
                  host_node_set_count(&set), (unsigned long long)us / 1000);
@@ -110,17 +110,18 @@ static inline void wait_for(struct host_node_set set, uint64_t us) {
 static inline void stay(uint64_t us) {
     uint64_t end_us = place.world.now_us + us;
     while (place.world.now_us < end_us) {
-        good(host_visit_round(&place.visit, end_us - place.world.now_us,
-                              &place.error));
+        good(host_session_round(&place.session, end_us - place.world.now_us,
+                                &place.error));
     }
 }
 
 /* Asks all of them, of whom every one has to answer. */
 static inline void ask(struct host_node_set set, enum node_question what,
                        unsigned target, uint64_t us) {
-    good(host_visit_ask(&place.visit, &set, what, target, us, &place.error));
+    good(
+        host_session_ask(&place.session, &set, what, target, us, &place.error));
     for (unsigned i = 0; i < place.world.nodes; i++)
-        if (host_node_set_has(&set, i) && !place.visit.node[i].answered)
+        if (host_node_set_has(&set, i) && !place.session.node[i].answered)
             fail_msg("node %u has not answered question %u", i, (unsigned)what);
 }
 

@@ -1,7 +1,7 @@
 /* Visits to cubes where wires lose and damage frames, break and are mended,
  * where nodes restart and lose power, and hosts come and go, by seed.  When it
  * is over, all nodes are there and answer. */
-#include "visit_world.h"
+#include "session_world.h"
 
 enum { BLOWS = 12, SEEDS = 10, LARGE = 2 };
 
@@ -37,27 +37,27 @@ static void strike(unsigned blow, const struct place *as) {
         host_world_crash(&place.world, node, draw(50000), !as->bare);
         break;
     case 3:
-        good(host_visit_restart(&place.visit, &set, NODE_RESTART_PLAIN,
-                                &place.error));
+        good(host_session_restart(&place.session, &set, NODE_RESTART_PLAIN,
+                                  &place.error));
         break;
     case 4:
         host_world_pause(&place.world, node, draw(5) * (uint64_t)S);
         break;
     default:
-        host_visit_close(&place.visit);
+        host_session_close(&place.session);
         come();
     }
 }
 
-static void visit_in_a_storm(const struct place *as) {
+static void session_in_a_storm(const struct place *as) {
     memset(pulled, 0, sizeof pulled);
     open_place(as);
     come();
     struct host_node_set set = all();
     for (unsigned blow = 0; blow < BLOWS; blow++) {
         strike(blow, as);
-        good(host_visit_ask(&place.visit, &set, NODE_LINKS, 0,
-                            draw(4) * (uint64_t)S, &place.error));
+        good(host_session_ask(&place.session, &set, NODE_LINKS, 0,
+                              draw(4) * (uint64_t)S, &place.error));
         mend(place.world.now_us);
     }
     stay(20 * S);
@@ -66,7 +66,7 @@ static void visit_in_a_storm(const struct place *as) {
     stay(20 * S);
     wait_for(all(), 20 * S);
     ask(all(), NODE_TOP, 0, 4 * S);
-    host_visit_close(&place.visit);
+    host_session_close(&place.session);
     come();
     wait_for(all(), 20 * S);
     close_place();
@@ -78,7 +78,7 @@ static void storms(unsigned dimension, unsigned seeds, bool bare) {
         as.dead_us = !bare && seed % 2 == 0 ? 3 * S : 0;
         as.faults.chance[SIM_LOSS] = seed % 3 == 0 ? 0.02 : 0;
         as.faults.chance[SIM_FLIP] = seed % 3 == 1 ? 1e-6 : 0;
-        visit_in_a_storm(&as);
+        session_in_a_storm(&as);
     }
 }
 

@@ -1,16 +1,16 @@
-#include "visit_wiring.h"
+#include "session_wiring.h"
 
 #include <stdio.h>
 #include <string.h>
 
-#include "visit.h"
+#include "session.h"
 #include "transport/routes.h"
 
 #define NO_ANSWER "no answer"
 
 /* A neighbour that has met somebody with another key where the node should be;
  * -1: none has. */
-static int refused_by(const struct host_visit *v, unsigned node) {
+static int refused_by(const struct host_session *v, unsigned node) {
     for (unsigned d = 0; d < v->machine->dimension; d++)
         if ((v->node[node ^ 1u << d].refused >> d & 1) != 0)
             return (int)(node ^ 1u << d);
@@ -18,7 +18,7 @@ static int refused_by(const struct host_visit *v, unsigned node) {
 }
 
 /* A wrong wire that should lead to the node, or does. */
-static const struct cube_wrong *wrong_at(const struct host_visit *v,
+static const struct cube_wrong *wrong_at(const struct host_session *v,
                                          unsigned node) {
     for (unsigned i = 0; i < v->wrong_count; i++) {
         const struct cube_wrong *w = &v->wrong[i];
@@ -31,7 +31,7 @@ static const struct cube_wrong *wrong_at(const struct host_visit *v,
     return NULL;
 }
 
-static void describe_wrong(const struct host_visit *v,
+static void describe_wrong(const struct host_session *v,
                            const struct cube_wrong *wrong, char *text,
                            size_t size) {
     char fault[CUBE_FAULT_BYTES];
@@ -47,7 +47,7 @@ static void describe_wrong(const struct host_visit *v,
 
 /* The nearest node on the way from the gateway that is not there: what is
  * behind it cannot be heard. */
-static unsigned first_missing(const struct host_visit *v, unsigned node) {
+static unsigned first_missing(const struct host_session *v, unsigned node) {
     unsigned at = cube_wiring(v->cube)->gateway, away = at ^ node;
     for (unsigned d = 0; away >> d != 0; d++) {
         if (!v->node[at].there)
@@ -57,9 +57,9 @@ static unsigned first_missing(const struct host_visit *v, unsigned node) {
     return node;
 }
 
-const char *host_visit_reason(const struct host_visit *visit, unsigned node,
-                              char *text, size_t size) {
-    const struct host_visit *v = visit;
+const char *host_session_reason(const struct host_session *session,
+                                unsigned node, char *text, size_t size) {
+    const struct host_session *v = session;
     const struct host_machine *m = v->machine;
     const char *doubt = m->doubt == NULL ? NULL : m->doubt(m->context, node);
     const char *start =
@@ -114,28 +114,31 @@ static bool has_host_port(const struct host_machine *m, unsigned node) {
                : node == 0 || (m->spare_node != 0 && node == m->spare_node);
 }
 
-unsigned host_visit_links(const struct host_visit *visit, unsigned node) {
-    return visit->machine->dimension +
-           (has_host_port(visit->machine, node) ? 1 : 0);
+unsigned host_session_links(const struct host_session *session, unsigned node) {
+    return session->machine->dimension +
+           (has_host_port(session->machine, node) ? 1 : 0);
 }
 
-unsigned host_visit_links_up(const struct host_visit *visit, unsigned node) {
-    const struct host_visit_node *n = &visit->node[node];
+unsigned host_session_links_up(const struct host_session *session,
+                               unsigned node) {
+    const struct host_session_node *n = &session->node[node];
     return (unsigned)__builtin_popcount(n->seen & ~n->silent);
 }
 
 /* What an end that is there says of a link: it never was up, or is silent. */
-static bool is_down(const struct host_visit *v, unsigned node, unsigned link) {
-    const struct host_visit_node *n = &v->node[node];
+static bool is_down(const struct host_session *v, unsigned node,
+                    unsigned link) {
+    const struct host_session_node *n = &v->node[node];
     return n->pong_us != 0 && ((n->seen & ~n->silent) >> link & 1) == 0;
 }
 
 /* Why a wire between two nodes that are there does not work; false: it does, or
  * is told of as wrong. */
-static bool describe_wire(const struct host_visit *v, unsigned node,
+static bool describe_wire(const struct host_session *v, unsigned node,
                           unsigned link, char *text, size_t size) {
     unsigned other = node ^ 1u << link;
-    const struct host_visit_node *one = &v->node[node], *two = &v->node[other];
+    const struct host_session_node *one = &v->node[node],
+                                   *two = &v->node[other];
     if (!is_down(v, node, link) && !is_down(v, other, link))
         return false;
     for (unsigned i = 0; i < v->wrong_count; i++) {
@@ -157,16 +160,17 @@ static bool describe_wire(const struct host_visit *v, unsigned node,
 
 /* Whether what the node has said of its wires is as late as that; who is silent
  * will say no more. */
-static bool is_old(const struct host_visit *v, unsigned node, uint64_t age_us) {
-    const struct host_visit_node *n = &v->node[node];
+static bool is_old(const struct host_session *v, unsigned node,
+                   uint64_t age_us) {
+    const struct host_session_node *n = &v->node[node];
     uint64_t since_us = n->born_us > v->opened_us ? n->born_us : v->opened_us;
     return !n->heard ||
            (n->pong_us >= since_us && n->pong_us - since_us >= age_us);
 }
 
-bool host_visit_faults_are_old(const struct host_visit *visit,
-                               uint64_t age_us) {
-    const struct host_visit *v = visit;
+bool host_session_faults_are_old(const struct host_session *session,
+                                 uint64_t age_us) {
+    const struct host_session *v = session;
     if (v->now_us - v->opened_us < age_us)
         return false; /* wrong wires are told of by others */
     for (unsigned i = 0; i < v->machine->nodes; i++) {
@@ -181,11 +185,11 @@ bool host_visit_faults_are_old(const struct host_visit *visit,
     return true;
 }
 
-unsigned host_visit_faults(const struct host_visit *visit,
-                           void (*tell)(void *context, unsigned node,
-                                        unsigned link, const char *text),
-                           void *context) {
-    const struct host_visit *v = visit;
+unsigned host_session_faults(const struct host_session *session,
+                             void (*tell)(void *context, unsigned node,
+                                          unsigned link, const char *text),
+                             void *context) {
+    const struct host_session *v = session;
     char text[240];
     for (unsigned i = 0; i < v->wrong_count && tell != NULL; i++) {
         describe_wrong(v, &v->wrong[i], text, sizeof text);
@@ -206,7 +210,8 @@ unsigned host_visit_faults(const struct host_visit *visit,
     return count;
 }
 
-/* --- visit wiring --------------------------------------------------------- */
+/* --- session wiring ---------------------------------------------------------
+ */
 
 enum {
     NEWS_US = 300000,    /* after the last: more may come at once */
@@ -224,17 +229,17 @@ static uint32_t bit_of(unsigned link) {
     return (uint32_t)1 << link;
 }
 
-unsigned host_visit_wire(const struct host_visit *visit) {
-    uint16_t gateway = cube_wiring(visit->cube)->gateway;
-    return gateway != 0 && gateway == visit->machine->spare_node ? 1 : 0;
+unsigned host_session_wire(const struct host_session *session) {
+    uint16_t gateway = cube_wiring(session->cube)->gateway;
+    return gateway != 0 && gateway == session->machine->spare_node ? 1 : 0;
 }
 
-void host_visit_wiring_begin(struct host_visit *visit) {
-    struct host_visit *v = visit;
+void host_session_wiring_begin(struct host_session *session) {
+    struct host_session *v = session;
     v->generation = cube_wiring(v->cube)->generation;
     v->began_us = v->evidence_us = v->now_us;
     for (unsigned i = 0; i < v->machine->nodes; i++) {
-        struct host_visit_node *node = &v->node[i];
+        struct host_session_node *node = &v->node[i];
         node->who_due = !node->there;
         node->who_again_us = 0;
         node->ping_due = true;
@@ -246,7 +251,7 @@ void host_visit_wiring_begin(struct host_visit *visit) {
 
 /* --- what is dead --------------------------------------------------------- */
 
-static void add(struct host_visit *v, uint32_t *dead, unsigned node,
+static void add(struct host_session *v, uint32_t *dead, unsigned node,
                 unsigned link) {
     if (node < v->machine->nodes && link < v->machine->dimension) {
         dead[node] |= bit_of(link);
@@ -255,7 +260,7 @@ static void add(struct host_visit *v, uint32_t *dead, unsigned node,
 }
 
 /* What nodes have found since this generation began. */
-static void add_found(struct host_visit *v, uint32_t *dead) {
+static void add_found(struct host_session *v, uint32_t *dead) {
     const struct cube_wiring *w = cube_wiring(v->cube);
     for (unsigned i = w->settled; i < w->dead_count; i++)
         if (w->dead[i].dimension != CUBE_WHOLE_NODE)
@@ -265,9 +270,9 @@ static void add_found(struct host_visit *v, uint32_t *dead) {
 }
 
 /* What nodes call silent for long enough. */
-static void add_silent(struct host_visit *v, uint32_t *dead) {
+static void add_silent(struct host_session *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
-        const struct host_visit_node *node = &v->node[i];
+        const struct host_session_node *node = &v->node[i];
         for (unsigned d = 0; d < v->machine->dimension; d++)
             if ((node->silent & bit_of(d)) != 0 &&
                 v->now_us - node->silent_us >= SILENT_US)
@@ -276,14 +281,15 @@ static void add_silent(struct host_visit *v, uint32_t *dead) {
 }
 
 /* What an end of a link says of it: 1 alive, -1 not, 0 nothing yet. */
-static int says(const struct host_visit *v, unsigned node, unsigned link) {
-    const struct host_visit_node *n = &v->node[node];
+static int says(const struct host_session *v, unsigned node, unsigned link) {
+    const struct host_session_node *n = &v->node[node];
     if (n->pong_us == 0 || n->pong_us - v->began_us < ALIVE_US)
         return 0;
     return (n->seen & ~n->silent & bit_of(link)) != 0 ? 1 : -1;
 }
 
-static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link) {
+static bool is_wrong(const struct host_session *v, unsigned node,
+                     unsigned link) {
     for (unsigned i = 0; i < v->wrong_count; i++)
         if (v->wrong[i].node == node && v->wrong[i].link == link)
             return true;
@@ -292,7 +298,7 @@ static bool is_wrong(const struct host_visit *v, unsigned node, unsigned link) {
 
 /* Whether a link that was dead is still: nobody says that it is alive, or an
  * end says that it is not. */
-static bool stays_dead(const struct host_visit *v, unsigned node,
+static bool stays_dead(const struct host_session *v, unsigned node,
                        unsigned link) {
     unsigned other = node ^ 1u << link;
     int one = says(v, node, link), two = says(v, other, link);
@@ -301,7 +307,7 @@ static bool stays_dead(const struct host_visit *v, unsigned node,
 }
 
 /* By all that is known now. */
-static void find_dead(struct host_visit *v, uint32_t *dead) {
+static void find_dead(struct host_session *v, uint32_t *dead) {
     for (unsigned i = 0; i < v->machine->nodes; i++) {
         dead[i] = 0;
         for (unsigned d = 0; d < v->machine->dimension; d++)
@@ -317,7 +323,7 @@ static void find_dead(struct host_visit *v, uint32_t *dead) {
 /* A node of which nothing is heard, and two or more links of which are dead, is
  * so as a whole, where nobody knows of a link to it that is not: the wiring has
  * room for few. */
-static bool is_whole(const struct host_visit *v, const uint32_t *dead,
+static bool is_whole(const struct host_session *v, const uint32_t *dead,
                      unsigned node) {
     bool whole = v->node[node].pong_us == 0 &&
                  node != cube_wiring(v->cube)->gateway &&
@@ -330,7 +336,7 @@ static bool is_whole(const struct host_visit *v, const uint32_t *dead,
 }
 
 /* All links of such nodes: what is said of one brings it back. */
-static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole) {
+static void add_whole(struct host_session *v, uint32_t *dead, bool *whole) {
     for (unsigned i = 0; i < v->machine->nodes; i++)
         whole[i] = is_whole(v, dead, i);
     for (unsigned i = 0; i < v->machine->nodes; i++)
@@ -338,7 +344,7 @@ static void add_whole(struct host_visit *v, uint32_t *dead, bool *whole) {
             add(v, dead, i, d);
 }
 
-static void settle(struct host_visit *v, uint32_t *dead,
+static void settle(struct host_session *v, uint32_t *dead,
                    struct cube_wiring *next) {
     unsigned dimension = v->machine->dimension;
     bool whole[HOST_NODES_MAX];
@@ -362,8 +368,8 @@ static void settle(struct host_visit *v, uint32_t *dead,
 }
 
 /* The gateway's wire is down, and the other one works. */
-static uint16_t choose_gateway(struct host_visit *v) {
-    unsigned wire = host_visit_wire(v);
+static uint16_t choose_gateway(struct host_session *v) {
+    unsigned wire = host_session_wire(v);
     uint16_t gateway = cube_wiring(v->cube)->gateway;
     enum link_state state = cube_link_state(v->cube, wire);
     if (v->machine->spare_node == 0 || state == LINK_UP) {
@@ -376,10 +382,10 @@ static uint16_t choose_gateway(struct host_visit *v) {
                                                       : 0;
 }
 
-static void begin(struct host_visit *v, uint32_t *dead, uint16_t gateway) {
+static void begin(struct host_session *v, uint32_t *dead, uint16_t gateway) {
     struct cube_wiring next = *cube_wiring(v->cube);
     next.gateway = gateway;
-    next.absent_s = HOST_VISIT_ABSENT_S;
+    next.absent_s = HOST_SESSION_ABSENT_S;
     settle(v, dead, &next);
     v->pause_us = v->now_us - v->renewed_us > REST_US ? PAUSE_US
                   : v->pause_us < PAUSE_US_MAX / 2    ? 2 * v->pause_us
@@ -387,18 +393,18 @@ static void begin(struct host_visit *v, uint32_t *dead, uint16_t gateway) {
     v->renewed_us = v->wire_us = v->now_us;
     memcpy(v->dead, dead, v->machine->nodes * sizeof *v->dead);
     cube_renew(v->cube, &next);
-    host_visit_wiring_begin(v);
+    host_session_wiring_begin(v);
 }
 
-void host_visit_wiring_renew(struct host_visit *visit) {
+void host_session_wiring_renew(struct host_session *session) {
     uint32_t dead[HOST_NODES_MAX];
-    find_dead(visit, dead);
-    begin(visit, dead, choose_gateway(visit));
+    find_dead(session, dead);
+    begin(session, dead, choose_gateway(session));
 }
 
 /* The wiring keeps its wrong wires for as long as a generation lasts, and a new
  * one has none for a moment. */
-static void look_for_wrong(struct host_visit *v) {
+static void look_for_wrong(struct host_session *v) {
     const struct cube_wiring *w = cube_wiring(v->cube);
     if (w->wrong_count > 0 || v->now_us - v->began_us > NEWS_US) {
         memcpy(v->wrong, w->wrong, w->wrong_count * sizeof w->wrong[0]);
@@ -406,8 +412,8 @@ static void look_for_wrong(struct host_visit *v) {
     }
 }
 
-void host_visit_wiring_look(struct host_visit *visit) {
-    struct host_visit *v = visit;
+void host_session_wiring_look(struct host_session *session) {
+    struct host_session *v = session;
     uint32_t dead[HOST_NODES_MAX];
     uint16_t gateway = choose_gateway(v);
     look_for_wrong(v);
