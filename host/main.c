@@ -26,7 +26,7 @@
 #include "host/run/arguments.h"
 #include "host/run/launch.h"
 #include "host/run/emulate.h"
-#include "host/run/settle.h"
+#include "host/run/choose.h"
 #include "host/run/run.h"
 #include "host/sim/sim.h"
 #include "incode/predicates/predicates.h"

@@ -17,7 +17,7 @@
 #include "host/formats/read.h"
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
-#include "settle.h"
+#include "choose.h"
 #include "report.h"
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
@@ -177,7 +177,7 @@ static int order_points(const struct host_run_options *options,
         result->duplicates = order->duplicates;
         result->negative_zeros = order->negative_zeros;
         result->pages = order->tree.pages;
-        (void)host_settle_ordered(options, order, result);
+        (void)host_choose_ordered(options, order, result);
         status = host_memory_check(options, result->strategy, result->nodes,
                                    order->bricks, order->cells, error);
     }
@@ -319,7 +319,7 @@ int host_triangulate(const struct host_run_options *options,
                      struct host_run_result *result, struct host_error *error) {
     static const uint32_t no_cells[3] = {0, 0, 0};
     struct host_order order;
-    host_settle(options, points->count, result);
+    host_choose(options, points->count, result);
     if (check_strategy(options, result, error) != 0 ||
         host_memory_check(options, result->strategy, result->nodes, 1, no_cells,
                           error) != 0)

@@ -162,7 +162,7 @@ int host_detector_pong(struct host_service *service,
     node->owing = pong.owing;
     node->refused = pong.refused;
     node->silent = pong.silent;
-    host_doubts_heard(s, message->source, anew && first);
+    host_suspects_heard(s, message->source, anew && first);
     host_missing_links_heard(s, message->source, pong.links);
     node->pinged = false;
     /* What would have been asked again, is answered. */
@@ -358,7 +358,7 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     ping_in_turn(s, now_us);
     elapsed = elapsed < ELAPSED_US_MAX ? elapsed : ELAPSED_US_MAX;
     listen(s, now_us, elapsed);
-    host_doubts_check(s, elapsed);
+    host_suspects_check(s, elapsed);
     host_idle_check(s, elapsed);
     host_missing_links_look(s, elapsed);
     if (check_wire(s, now_us, error) != 0)
@@ -366,7 +366,8 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     return host_bring_up_check(s, now_us, elapsed, error);
 }
 
-/* --- doubts --------------------------------------------------------------- */
+/* --- suspects ---------------------------------------------------------------
+ */
 
 enum {
     DOUBT_US = 1300000,
@@ -500,7 +501,7 @@ static void look_at_links(struct host_service *s, unsigned i,
             doubt_wire(s, i, d);
 }
 
-void host_doubts_check(struct host_service *service, uint64_t elapsed_us) {
+void host_suspects_check(struct host_service *service, uint64_t elapsed_us) {
     struct host_service *s = service;
     unsigned others;
     look_at_wire(s, elapsed_us);
@@ -519,7 +520,8 @@ void host_doubts_check(struct host_service *service, uint64_t elapsed_us) {
     }
 }
 
-void host_doubts_heard(struct host_service *service, unsigned node, bool anew) {
+void host_suspects_heard(struct host_service *service, unsigned node,
+                         bool anew) {
     struct host_service *s = service;
     struct host_node *n = &s->node[node];
     n->wires_doubted &= n->silent;

@@ -199,7 +199,7 @@ uint64_t host_paging_memory(uint64_t memory, uint64_t frames, uint64_t pages);
  * answer for the length of the service's patience, in the last part of which it
  * is pinged alone, in the next generation: the machine ends it, if it can start
  * it again, and it is given up otherwise.  One that answers and does nothing:
- * idle_nodes.h.  What the user is told meanwhile: doubts.h. */
+ * idle_nodes.h.  What the user is told meanwhile: suspects.h. */
 
 /* A generation begins: who is living by the wiring, and all are pinged. */
 void host_detector_begin(struct host_service *service, uint64_t now_us);
@@ -247,10 +247,11 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
  * node reports a silent neighbour after it: a node that stands still also holds
  * up messages for others. */
 
-void host_doubts_check(struct host_service *service, uint64_t elapsed_us);
+void host_suspects_check(struct host_service *service, uint64_t elapsed_us);
 
 /* The node has answered; anew: it is another start than before. */
-void host_doubts_heard(struct host_service *service, unsigned node, bool anew);
+void host_suspects_heard(struct host_service *service, unsigned node,
+                         bool anew);
 
 /* Nodes that answer and do nothing.  Part of service.h.
  *

@@ -71,9 +71,9 @@ struct host_node {
     bool cut_off;           /* no live wire leads to it */
     uint32_t silent;        /* links by which it hears nothing */
     uint64_t silence_us;    /* silent_us at the last check */
-    uint64_t slow_us;       /* its longest silence of late: doubts.h */
+    uint64_t slow_us;       /* its longest silence of late: suspects.h */
     uint64_t starved_us;    /* it waited for a processor: bring_up.h */
-    bool doubted;           /* the user was told so: doubts.h; */
+    bool doubted;           /* the user was told so: suspects.h; */
     uint32_t wires_doubted; /* and of these links, */
     uint64_t wires_us;      /* after so long */
     uint64_t pinged_us, ping_again_us;

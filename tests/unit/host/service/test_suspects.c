@@ -82,7 +82,7 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
         for (unsigned i = 0; i < NODES; i++) {
             if (node[i].silent_us >= after_us[i]) {
                 node[i].silent_us = 0;
-                host_doubts_heard(&service, i, false);
+                host_suspects_heard(&service, i, false);
             }
             node[i].silent_us += STEP_US;
             for (unsigned d = 0; d < DIMENSION; d++) {
@@ -93,7 +93,7 @@ static void pass(uint64_t until_us, const uint64_t after_us[NODES]) {
                                     : other->silent & ~bit;
             }
         }
-        host_doubts_check(&service, STEP_US);
+        host_suspects_check(&service, STEP_US);
     }
 }
 

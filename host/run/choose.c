@@ -1,4 +1,4 @@
-#include "settle.h"
+#include "choose.h"
 
 #include <math.h>
 #include <string.h>
@@ -170,7 +170,7 @@ static void choose(const struct host_task *task,
     host_strategy_why(task, result->why);
 }
 
-void host_settle(const struct host_run_options *options, uint64_t points,
+void host_choose(const struct host_run_options *options, uint64_t points,
                  struct host_run_result *result) {
     result->strategy = options->strategy;
     result->partition = options->partition;
@@ -236,7 +236,7 @@ static bool is_room(const struct host_order *order, uint64_t memory) {
            host_order_open(order) <= cells;
 }
 
-bool host_settle_ordered(const struct host_run_options *options,
+bool host_choose_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result) {
     const struct host_strategy *before = result->strategy;

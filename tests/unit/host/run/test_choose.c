@@ -1,7 +1,7 @@
 /* What `auto` makes of points that fill a volume, and of points that do not. */
 
 #include "host/mesh/gen.h"
-#include "host/run/settle.h"
+#include "host/run/choose.h"
 #include "tests/unit/test.h"
 
 enum { POINTS = 5000, NODES = 2 };
@@ -18,14 +18,14 @@ static bool settle(struct host_run_options *options, const char *kind,
     assert_int_equal(host_gen(kind, POINTS, 1, &points, &error), 0);
     result = (struct host_run_result){0};
     options->processors = NODES; /* whatever this machine has */
-    host_settle(options, points.count, &result);
+    host_choose(options, points.count, &result);
     result.nodes = NODES;
     assert_int_equal(host_order_make(&order, kind, points.xyz, points.count,
                                      host_strategy_partition(
                                          result.strategy, options->partition),
                                      NODES, false, &error),
                      0);
-    bool again = host_settle_ordered(options, &order, &result);
+    bool again = host_choose_ordered(options, &order, &result);
     *regions = order.regions;
     assert_int_equal(order.region[0].first, 0);
     assert_int_equal(order.region[order.regions - 1].last, order.bricks);

@@ -1,34 +1,32 @@
-/* What a run's options leave open: how many nodes, by which strategy, and
- * whether they may insert points.  `auto` is settled twice: before the points
+/* Chooses what a run's options leave open: the number of nodes, the strategy,
+ * and whether nodes may insert points.  `auto` chooses twice: before the points
  * are ordered, as if they filled a volume evenly, for the order is cut into
- * regions; and once more when their bricks tell whether they do.
+ * regions; and again when a sample of their bricks shows whether they do.
  *
- * Memory: 1 MB, while it works.  Work: a look at a thousand bricks; where they
- * do not, and the triangulation does not fit a node, 2,500 insertions
+ * Memory: 1 MB, while it works.  Work: a thousand bricks; if they fill no
+ * volume evenly, and the triangulation does not fit a node, 2,500 insertions
  * (host/mesh/order.h). */
-#ifndef HOST_SETTLE_H
-#define HOST_SETTLE_H
+#ifndef HOST_CHOOSE_H
+#define HOST_CHOOSE_H
 
 #include "run.h"
 
-/* The memory that a run's nodes need, and what is said where they have less.
- */
-
-/* 0, or HOST_USAGE: the options give less, and what can be done. */
+/* The memory that a run's nodes need: 0, or HOST_USAGE if the options give
+ * less; the error says what can be done. */
 int host_memory_check(const struct host_run_options *options,
                       const struct host_strategy *strategy, unsigned nodes,
                       uint32_t bricks, const uint32_t cells[3],
                       struct host_error *error);
 
 /* Fills in the result's strategy, nodes and what else is as in the options. */
-void host_settle(const struct host_run_options *options, uint64_t points,
+void host_choose(const struct host_run_options *options, uint64_t points,
                  struct host_run_result *result);
 
-/* Settles the way to build, and `auto` again, by the order, which has a region
- * for each node; true where it has another strategy now.  The regions are
- * joined if that wants one alone; and then it gets one node alone, if nobody
- * has said how many. */
-bool host_settle_ordered(const struct host_run_options *options,
+/* Chooses how nodes build, and lets `auto` choose again, by the order, which
+ * has a region for each node.  True if the strategy is another one now.  If
+ * that strategy works on one region, the regions are joined; then it gets one
+ * node, unless the options give their number. */
+bool host_choose_ordered(const struct host_run_options *options,
                          struct host_order *order,
                          struct host_run_result *result);
 
