@@ -177,10 +177,10 @@ static void note(struct incode_borrower *b, uint32_t i, const uint32_t f[4]) {
 
 /* ---- steps ---- */
 
-static enum incode_outcome go_on(struct incode_borrower *b,
-                                 struct incode_maker *maker) {
-    enum incode_outcome r = INCODE_ANSWERED;
-    while (r == INCODE_ANSWERED && maker->walker.left > 0 &&
+static enum incode_step go_on(struct incode_borrower *b,
+                              struct incode_maker *maker) {
+    enum incode_step r = INCODE_FINISHED;
+    while (r == INCODE_FINISHED && maker->walker.left > 0 &&
            maker->fault == NULL && !b->done) {
         if (b->found.count == INCODE_LOAN_FACES || b->open == 0 || b->full) {
             b->done = true;
@@ -198,7 +198,7 @@ static enum incode_outcome go_on(struct incode_borrower *b,
         uint64_t looked = maker->counts.candidates - before;
         incode_walker_spend(&maker->walker,
                             1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
-        if (r == INCODE_ANSWERED)
+        if (r == INCODE_FINISHED)
             note(b, i, a.f);
     }
     return r;
@@ -218,14 +218,14 @@ enum incode_step incode_borrower_step(struct incode_borrower *b,
         b->waits && incode_maker_waiting(maker, UINT32_C(1) << SEARCH) != 0;
     maker->walker.left = units > 0 ? units : 1;
     units = maker->walker.left;
-    enum incode_outcome r = waits ? INCODE_WAIT : go_on(b, maker);
-    b->waits = r == INCODE_WAIT;
+    enum incode_step r = waits ? INCODE_WAITING : go_on(b, maker);
+    b->waits = r == INCODE_WAITING;
     t->spent += 1 + (units - maker->walker.left);
     if (incode_triangulator_fault(t) != NULL)
         return INCODE_BROKEN;
     if (b->done)
         return INCODE_FINISHED;
-    if (r != INCODE_WAIT)
+    if (r != INCODE_WAITING)
         return INCODE_WORKED;
     return released || incode_pager_release(&maker->pager, true)
                ? INCODE_WORKED

@@ -260,27 +260,26 @@ static inline struct corners corners_of(const struct incode_answer *a) {
 
 /* One face of the star: that under search goes first, then the last one opened.
  */
-static enum incode_outcome advance(struct incode_triangulator *t,
-                                   unsigned task) {
+static enum incode_step advance(struct incode_triangulator *t, unsigned task) {
     struct incode_answer a;
     struct incode_star_face face;
-    enum incode_outcome r;
+    enum incode_step r;
     if (incode_maker_is_searching(&t->maker, task)) {
         r = incode_maker_resume(&t->maker, task, &a);
-        if (r != INCODE_ANSWERED ||
+        if (r != INCODE_FINISHED ||
             !incode_star_find(&t->front, a.f[1], a.f[2]))
-            return r == INCODE_MORE ? INCODE_ANSWERED : r;
+            return r == INCODE_WORKED ? INCODE_FINISHED : r;
     } else {
         if (!incode_star_take(&t->front, &face))
-            return INCODE_ANSWERED;
+            return INCODE_FINISHED;
         r = incode_maker_apex(&t->maker, task, face.b, face.c, face.hint, &a);
-        if (r != INCODE_ANSWERED) {
+        if (r != INCODE_FINISHED) {
             incode_star_put(&t->front, &face);
-            return r == INCODE_MORE ? INCODE_ANSWERED : r;
+            return r == INCODE_WORKED ? INCODE_FINISHED : r;
         }
     }
     incode_star_build(&t->front, a.f, corners_of(&a).p, a.near);
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 #ifdef INCODE_PLANT_TWICE /* a fault that the simulation has to find */
@@ -299,14 +298,14 @@ static void spend_candidates(struct incode_triangulator *t, uint64_t before) {
 }
 
 /* Closes the star of a vertex as far as it goes. */
-static enum incode_outcome close_star(struct incode_triangulator *t,
-                                      unsigned task) {
+static enum incode_step close_star(struct incode_triangulator *t,
+                                   unsigned task) {
     struct incode_front *front = &t->front;
     uint32_t v = incode_front_vertex(front, task);
     if (!incode_star_open(front, v))
-        return INCODE_ANSWERED;
-    enum incode_outcome r = incode_maker_centre(&t->maker, task, v);
-    while (r == INCODE_ANSWERED && !incode_star_is_closed(front)) {
+        return INCODE_FINISHED;
+    enum incode_step r = incode_maker_centre(&t->maker, task, v);
+    while (r == INCODE_FINISHED && !incode_star_is_closed(front)) {
         if (incode_star_is_enough(front)) {
             r = INCODE_AGAIN;
             break;
@@ -314,10 +313,10 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
         uint64_t before = t->maker.counts.candidates;
         r = advance(t, task);
         spend_candidates(t, before);
-        if (r == INCODE_ANSWERED && incode_star_is_full(front))
+        if (r == INCODE_FINISHED && incode_star_is_full(front))
             r = INCODE_AGAIN; /* the list will find it crowded */
-        if (r == INCODE_ANSWERED && t->maker.walker.left == 0)
-            r = incode_maker_is_searching(&t->maker, task) ? INCODE_MORE
+        if (r == INCODE_FINISHED && t->maker.walker.left == 0)
+            r = incode_maker_is_searching(&t->maker, task) ? INCODE_WORKED
                                                            : INCODE_AGAIN;
     }
 #ifdef INCODE_PLANT_TWICE
@@ -329,28 +328,28 @@ static enum incode_outcome close_star(struct incode_triangulator *t,
 
 /* The paper's InCoDe, face by face: any open face of the vertex.  It stays open
  * until its answer comes, as another search may close it meanwhile. */
-static enum incode_outcome pursue_face(struct incode_triangulator *t,
-                                       unsigned task) {
+static enum incode_step pursue_face(struct incode_triangulator *t,
+                                    unsigned task) {
     struct incode_answer a;
     uint32_t f[3];
     if (!incode_maker_is_searching(&t->maker, task) &&
         !incode_front_face(&t->front, incode_front_vertex(&t->front, task), f))
-        return INCODE_ANSWERED;
-    enum incode_outcome r = incode_maker_face(&t->maker, task, f, &a);
-    if (r == INCODE_ANSWERED)
+        return INCODE_FINISHED;
+    enum incode_step r = incode_maker_face(&t->maker, task, f, &a);
+    if (r == INCODE_FINISHED)
         (void)incode_front_use(&t->front, a.f, corners_of(&a).p);
     return r;
 }
 
-static enum incode_outcome build_first(struct incode_triangulator *t,
-                                       unsigned task) {
+static enum incode_step build_first(struct incode_triangulator *t,
+                                    unsigned task) {
     struct incode_answer a;
     uint32_t v = incode_front_vertex(&t->front, task);
     /* Other stars go on while a seed waits for a page. */
     if (incode_front_is_reached(&t->front, v))
-        return INCODE_ANSWERED;
-    enum incode_outcome r = incode_maker_first(&t->maker, task, v, &a);
-    if (r == INCODE_ANSWERED && t->maker.fault == NULL)
+        return INCODE_FINISHED;
+    enum incode_step r = incode_maker_first(&t->maker, task, v, &a);
+    if (r == INCODE_FINISHED && t->maker.fault == NULL)
         incode_front_seed(&t->front, a.f, corners_of(&a).p);
     return r;
 }
@@ -358,7 +357,7 @@ static enum incode_outcome build_first(struct incode_triangulator *t,
 /* ---- steps ---- */
 
 static enum incode_step run(struct incode_triangulator *t, unsigned task) {
-    enum incode_outcome r;
+    enum incode_step r;
     incode_front_run(&t->front, t->maker.walker.left);
     if (incode_front_is_seed(&t->front, task))
         r = build_first(t, task);
@@ -366,13 +365,13 @@ static enum incode_step run(struct incode_triangulator *t, unsigned task) {
         r = close_star(t, task);
     else
         r = pursue_face(t, task);
-    if (r != INCODE_WAIT && r != INCODE_MORE) {
+    if (r != INCODE_WAITING && r != INCODE_WORKED) {
         incode_front_done(&t->front, task);
         return INCODE_WORKED;
     }
-    incode_front_suspend(&t->front, task, r == INCODE_WAIT,
+    incode_front_suspend(&t->front, task, r == INCODE_WAITING,
                          incode_maker_has_advanced(&t->maker, task));
-    if (r == INCODE_MORE)
+    if (r == INCODE_WORKED)
         return INCODE_WORKED;
     /* Without credit for its page the task can only be tried again. */
     return incode_maker_waiting(&t->maker, UINT32_C(1) << task) != 0
@@ -425,10 +424,10 @@ static enum incode_step close_stars(struct incode_triangulator *t) {
 
 static enum incode_step insert_points(struct incode_triangulator *t) {
     switch (incode_insertion_step(&t->insertion)) {
-    case INCODE_INSERTION_FINISHED:
+    case INCODE_FINISHED:
         t->phase = INCODE_PHASE_IDLE;
         return INCODE_FINISHED;
-    case INCODE_INSERTION_FULL: /* and so it will be for the next job */
+    case INCODE_FULL: /* and so it will be for the next job */
         t->build = INCODE_BUILD_FACES;
         t->phase = INCODE_PHASE_CHOOSE;
         if (t->insertion.emitted) {
@@ -437,9 +436,9 @@ static enum incode_step insert_points(struct incode_triangulator *t) {
             t->phase = INCODE_PHASE_HANDOVER;
         }
         return INCODE_WORKED;
-    case INCODE_INSERTION_WAITING:
+    case INCODE_WAITING:
         return INCODE_WAITING;
-    case INCODE_INSERTION_WORKED:
+    case INCODE_WORKED:
     default:
         return INCODE_WORKED;
     }
@@ -447,10 +446,9 @@ static enum incode_step insert_points(struct incode_triangulator *t) {
 
 /* What is open goes out, and comes back brick by brick. */
 static enum incode_step hand_over(struct incode_triangulator *t) {
-    enum incode_insertion_step r =
-        incode_fallback_step(&t->fallback, &t->front);
-    if (r != INCODE_INSERTION_FINISHED)
-        return r == INCODE_INSERTION_WAITING ? INCODE_WAITING : INCODE_WORKED;
+    enum incode_step r = incode_fallback_step(&t->fallback, &t->front);
+    if (r != INCODE_FINISHED)
+        return r == INCODE_WAITING ? INCODE_WAITING : INCODE_WORKED;
     if (!incode_arena_turn(t, false))
         return INCODE_WAITING;
     incode_front_take_over(&t->front, &t->job, t->committed);

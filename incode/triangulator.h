@@ -73,14 +73,6 @@ struct incode_setup {
     uint32_t reserved2; /* 0 */
 };
 
-enum incode_step {
-    INCODE_WORKED,   /* call again */
-    INCODE_WAITING,  /* nothing to do until a page or a spilled list arrives,
-                        or until emit or spill has room */
-    INCODE_FINISHED, /* the job is done, every brick committed */
-    INCODE_BROKEN    /* an invariant failed: see `fault` */
-};
-
 /* How the triangulator reaches the world.  All calls return at once. */
 struct incode_outside {
     struct incode_page_source pages;   /* what its maker asks for */

@@ -253,15 +253,6 @@ static int run(const struct host_points *points, const char *strategy,
     return status;
 }
 
-static double paper_sequential_busiest(const struct host_run_result *r) {
-    uint64_t most = 0;
-    for (unsigned i = 0; i < r->nodes; i++) {
-        uint64_t us = r->node[i].statistics.busy_us;
-        most = us > most ? us : most;
-    }
-    return 1e-6 * (double)most;
-}
-
 /* --- Table 1 -------------------------------------------------------------- */
 
 /* Rows of points become vertex numbers, as the nodes count them. */
@@ -400,7 +391,7 @@ static int hold(struct host_paper_bench *bench,
                                       .nodes = nodes};
     for (int i = 0; i < 3 && xyz != NULL && error->code == 0; i++) {
         if (run(xyz, "spatial", nodes, INCODE_KD, NULL, &r, error) == 0) {
-            busy = fmin(busy, paper_sequential_busiest(&r));
+            busy = fmin(busy, busiest(&r));
             wall = fmin(wall, r.t_max_s);
         }
     }

@@ -575,8 +575,8 @@ static void walked(struct incode_maker *m, struct incode_search *search,
     }
 }
 
-enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
-                                       uint32_t v, struct incode_answer *a) {
+enum incode_step incode_maker_first(struct incode_maker *m, unsigned slot,
+                                    uint32_t v, struct incode_answer *a) {
     struct incode_search *search = &m->search[slot];
     struct incode_first *s = &search->first;
     struct incode_query *q = &search->query;
@@ -584,7 +584,7 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
     unsigned looks = 0;
     search->advanced = false;
     if (!incode_fetch_point(m, v, p, &search->page))
-        return INCODE_WAIT;
+        return INCODE_WAITING;
     const struct incode_frame *frame =
         incode_pager_get(&m->pager, v / INCODE_BRICK_POINTS);
     if (search->stage != INCODE_SEARCH_FIRST)
@@ -593,15 +593,15 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
         if (s->stage == INCODE_FIRST_NEAREST ||
             s->stage == INCODE_FIRST_CIRCLE) {
             q->yields = true;
-            enum incode_walk r =
+            enum incode_step r =
                 incode_walk(&m->walker, q, incode_visit_points, NULL);
-            if (r == INCODE_WALK_WAIT)
+            if (r == INCODE_WAITING)
                 return incode_search_suspend(search);
             walked(m, search, frame, p);
             continue;
         }
-        enum incode_outcome r = incode_search_run(m, search);
-        if (r != INCODE_ANSWERED)
+        enum incode_step r = incode_search_run(m, search);
+        if (r != INCODE_FINISHED)
             return r;
         if (looked(m, search))
             settle(m, search, p, a);
@@ -610,8 +610,8 @@ enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
         if (search->stage == INCODE_SEARCH_FIRST && ++looks == LOOKS) {
             search->page = INCODE_NONE;
             search->advanced = true;
-            return INCODE_MORE;
+            return INCODE_WORKED;
         }
     }
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }

@@ -73,7 +73,7 @@ static bool split(struct incode_maker *m, struct look *look,
     for (uint32_t i = 0; i < look->pages; i++) {
         uint32_t at = look->index[look->bricks + i];
         if (incode_horizon_split(&m->horizon, &m->walker, at, &look->cap,
-                                 missing) != INCODE_HORIZON_MADE)
+                                 missing) != INCODE_FINISHED)
             return false;
         set_done(look, at);
     }

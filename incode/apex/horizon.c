@@ -241,33 +241,33 @@ static bool add_rest(struct incode_horizon *h, const struct view *view,
     return true;
 }
 
-static enum incode_horizon_made add_page(struct making *m, uint32_t level,
-                                         uint32_t index) {
+static enum incode_step add_page(struct making *m, uint32_t level,
+                                 uint32_t index) {
     const struct incode_tree *tree = m->walker->tree;
     uint32_t page = tree->base[level] + index, first = index * INCODE_FANOUT;
     const struct incode_frame *f = incode_pager_get(m->walker->pager, page);
     struct view view;
     m->missing = page;
     if (f == NULL)
-        return INCODE_HORIZON_WAIT;
+        return INCODE_WAITING;
     incode_walker_yield(m->walker, PAGE_UNITS);
     set_view(&view, m->h, f);
     uint32_t all = children_of(tree, level, index);
     uint32_t near = all & near_children(m, &view);
     if (!add_rest(m->h, &view, page, level, all & ~near))
-        return INCODE_HORIZON_FULL;
+        return INCODE_FULL;
     for (; near != 0; near &= near - 1) {
         unsigned child = (unsigned)__builtin_ctz(near);
-        enum incode_horizon_made r = INCODE_HORIZON_MADE;
+        enum incode_step r = INCODE_FINISHED;
         incode_walker_yield(m->walker, BOX_UNITS);
         if (level > 1)
             r = add_page(m, level - 1, first + child);
         else if (!add_brick(m->h, &view, child, first + child))
-            r = INCODE_HORIZON_FULL;
-        if (r != INCODE_HORIZON_MADE)
+            r = INCODE_FULL;
+        if (r != INCODE_FINISHED)
             return r;
     }
-    return INCODE_HORIZON_MADE;
+    return INCODE_FINISHED;
 }
 
 static void set_empty(struct incode_horizon *h) {
@@ -278,11 +278,10 @@ static void set_empty(struct incode_horizon *h) {
     }
 }
 
-enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
-                                             struct incode_walker *walker,
-                                             uint32_t brick, const double lo[3],
-                                             const double hi[3],
-                                             uint32_t *missing) {
+enum incode_step incode_horizon_make(struct incode_horizon *h,
+                                     struct incode_walker *walker,
+                                     uint32_t brick, const double lo[3],
+                                     const double hi[3], uint32_t *missing) {
     struct making m = {.h = h, .walker = walker};
     double extent = 0;
     set_empty(h);
@@ -303,12 +302,12 @@ enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
         m.hi[d] = above_number((hi[d] - h->origin[d]) * h->scale);
     }
     h->centre = brick;
-    enum incode_horizon_made r = add_page(&m, walker->tree->levels - 1, 0);
+    enum incode_step r = add_page(&m, walker->tree->levels - 1, 0);
     *missing = m.missing;
     h->near = h->count;
-    if (r != INCODE_HORIZON_MADE)
+    if (r != INCODE_FINISHED)
         set_empty(h);
-    if (r == INCODE_HORIZON_WAIT)
+    if (r == INCODE_WAITING)
         h->centre = INCODE_NONE;
     return r;
 }
@@ -488,17 +487,18 @@ static bool last_is_reached(const struct incode_horizon *h,
     return !(lifted_outside(h, cap, last - lane, weight) >> lane & 1);
 }
 
-enum incode_horizon_made
-incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
-                     uint32_t index, const struct incode_horizon_cap *cap,
-                     uint32_t *missing) {
+enum incode_step incode_horizon_split(struct incode_horizon *h,
+                                      struct incode_walker *walker,
+                                      uint32_t index,
+                                      const struct incode_horizon_cap *cap,
+                                      uint32_t *missing) {
     const struct incode_tree *tree = walker->tree;
     uint32_t page = h->page[index], level = h->level[index];
     const struct incode_frame *f = incode_pager_get(walker->pager, page);
     struct view view;
     *missing = page;
     if (f == NULL)
-        return INCODE_HORIZON_WAIT;
+        return INCODE_WAITING;
     incode_walker_yield(walker, PAGE_UNITS);
     set_view(&view, h, f);
     uint32_t first = (page - tree->base[level]) * INCODE_FANOUT;
@@ -506,7 +506,7 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
     for (; in != 0; in &= in - 1) {
         unsigned child = (unsigned)__builtin_ctz(in);
         if (h->count == h->boxes)
-            return INCODE_HORIZON_FULL;
+            return INCODE_FULL;
         uint32_t at = tree->base[level - 1] + first + child;
         incode_walker_yield(walker, BOX_UNITS);
         uint32_t i = add_box(h, &view, child, at, level - 1);
@@ -520,12 +520,12 @@ incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
             h->left[i] = children_of(tree, level - 1, first + child);
         h->left[index] &= ~(UINT32_C(1) << child);
     }
-    return INCODE_HORIZON_MADE;
+    return INCODE_FINISHED;
 }
 
 /* ---- by a box ---- */
 
-enum incode_walk incode_horizon_box(const struct incode_horizon *h,
+enum incode_step incode_horizon_box(const struct incode_horizon *h,
                                     struct incode_walker *walker,
                                     struct incode_query *q, incode_visit *visit,
                                     void *context) {
@@ -552,13 +552,13 @@ enum incode_walk incode_horizon_box(const struct incode_horizon *h,
             if (h->level[at] != 0)
                 continue;
             if (q->pages_max != 0 && q->pages++ == q->pages_max)
-                return INCODE_WALK_STOP;
-            enum incode_walk r =
+                return INCODE_WORKED;
+            enum incode_step r =
                 incode_walk_brick(walker, q, h->page[at], visit, context);
-            if (r != INCODE_WALK_DONE)
+            if (r != INCODE_FINISHED)
                 return r;
         }
         i = i + INCODE_VF_LANES < h->near ? i + INCODE_VF_LANES : 0;
     }
-    return INCODE_WALK_DONE;
+    return INCODE_FINISHED;
 }

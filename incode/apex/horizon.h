@@ -87,19 +87,12 @@ struct incode_horizon_cap {
     float g[3], level, slack;
 };
 
-enum incode_horizon_made {
-    INCODE_HORIZON_MADE,
-    INCODE_HORIZON_WAIT, /* for page *missing */
-    INCODE_HORIZON_FULL  /* too many bricks: the horizon is empty */
-};
-
 /* Makes the horizon of a brick; bricks that meet the box lo..hi are listed one
  * by one. */
-enum incode_horizon_made incode_horizon_make(struct incode_horizon *h,
-                                             struct incode_walker *walker,
-                                             uint32_t brick, const double lo[3],
-                                             const double hi[3],
-                                             uint32_t *missing);
+enum incode_step incode_horizon_make(struct incode_horizon *h,
+                                     struct incode_walker *walker,
+                                     uint32_t brick, const double lo[3],
+                                     const double hi[3], uint32_t *missing);
 
 /* The cap of the sphere det |r|^2 = m . r beyond the plane n . r = 0, with r =
  * (x - pv) scale; det >= 0, of a half-space 0.  False: it is out of the range
@@ -123,12 +116,13 @@ uint32_t incode_horizon_reached(
     uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING]);
 
 /* Looks into a box page: gives boxes of their own to those of its children that
- * the cap reaches.  INCODE_HORIZON_WAIT: the page is missing;
- * INCODE_HORIZON_FULL: there is no room for them. */
-enum incode_horizon_made
-incode_horizon_split(struct incode_horizon *h, struct incode_walker *walker,
-                     uint32_t index, const struct incode_horizon_cap *cap,
-                     uint32_t *missing);
+ * the cap reaches.  INCODE_WAITING: the page is missing;
+ * INCODE_FULL: there is no room for them. */
+enum incode_step incode_horizon_split(struct incode_horizon *h,
+                                      struct incode_walker *walker,
+                                      uint32_t index,
+                                      const struct incode_horizon_cap *cap,
+                                      uint32_t *missing);
 
 /* Copies the points of a brick, which is in the frame; the oldest copy gives
  * way. */
@@ -142,8 +136,8 @@ uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
                                const struct incode_horizon_cap *cap);
 
 /* Visits the leaves of listed bricks that meet the box of a query, which lies
- * in the horizon's.  INCODE_WALK_WAIT: query.missing is not there. */
-enum incode_walk incode_horizon_box(const struct incode_horizon *h,
+ * in the horizon's.  INCODE_WAITING: query.missing is not there. */
+enum incode_step incode_horizon_box(const struct incode_horizon *h,
                                     struct incode_walker *walker,
                                     struct incode_query *q, incode_visit *visit,
                                     void *context);

@@ -213,16 +213,16 @@ incode_local_around(struct incode_local_points *local,
         q->lo[d] = local->around_lo[d] = lo[d] - radius;
         q->hi[d] = local->around_hi[d] = hi[d] + radius;
     }
-    enum incode_walk r =
+    enum incode_step r =
         incode_horizon_holds(horizon, q->lo, q->hi)
             ? incode_horizon_box(horizon, walker, q, copy_leaves, local)
             : incode_walk(walker, q, copy_leaves, local);
     local->count = local->around;
     local->per_unit = 0;
-    if (r == INCODE_WALK_WAIT)
+    if (r == INCODE_WAITING)
         return INCODE_LOCAL_WAIT;
     local->leaf = leaf;
-    if (r == INCODE_WALK_DONE)
+    if (r == INCODE_FINISHED)
         return INCODE_LOCAL_READY;
     /* Not the whole box: what was copied serves, but certifies nothing. */
     for (int d = 0; d < 3; d++) {

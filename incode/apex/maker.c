@@ -179,7 +179,7 @@ static bool prefetch(struct incode_maker *m, uint32_t brick, uint32_t more,
     }
     /* No more than a share of the frames: it would push out what is at work. */
     uint32_t left = m->pager.frame_count / 8;
-    return incode_walk(&m->walker, &q, count_brick, &left) != INCODE_WALK_WAIT;
+    return incode_walk(&m->walker, &q, count_brick, &left) != INCODE_WAITING;
 }
 
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,

@@ -40,13 +40,6 @@ struct incode_points {
     uint64_t shuffle_seed; /* 0: pages are ready as they arrive */
 };
 
-enum incode_outcome {
-    INCODE_ANSWERED,
-    INCODE_WAIT,  /* search.page is missing */
-    INCODE_AGAIN, /* unfinished, begin anew at the vertex without waiting */
-    INCODE_MORE   /* unfinished, go on without waiting */
-};
-
 enum incode_search_stage {
     INCODE_SEARCH_NONE,
     INCODE_SEARCH_POINTS, /* among points beyond those at hand */
@@ -176,16 +169,15 @@ struct incode_answer {
 
 /* Answers faces[*done] to faces[count - 1] (v[0], v[1], v[2]: the side where
  * orient3d is positive is unknown), one after another, in search `slot`.
- * INCODE_ANSWERED: all are answered; INCODE_WAIT, INCODE_MORE: call again with
- * the same arguments, when page search[slot].page is there or at once.  Faces
- * with the same first vertex, one after another, share its local points.  Faces
- * are of the triangulation: of others, what empty spheres rule out may be the
- * apex. */
-enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
-                                        const uint32_t (*faces)[3],
-                                        uint32_t count,
-                                        struct incode_answer *answers,
-                                        uint32_t *done);
+ * INCODE_FINISHED: all are answered; INCODE_WAITING, INCODE_WORKED: call again
+ * with the same arguments, when page search[slot].page is there or at once.
+ * Faces with the same first vertex, one after another, share its local points.
+ * Faces are of the triangulation: of others, what empty spheres rule out may be
+ * the apex. */
+enum incode_step incode_maker_apexes(struct incode_maker *m, unsigned slot,
+                                     const uint32_t (*faces)[3], uint32_t count,
+                                     struct incode_answer *answers,
+                                     uint32_t *done);
 
 /* Ends whatever search `slot` was doing. */
 void incode_maker_forget(struct incode_maker *m, unsigned slot);
@@ -203,34 +195,34 @@ static inline bool incode_maker_has_advanced(const struct incode_maker *m,
 }
 
 /* Index `kd`, step by step.  First, brings the points around a vertex to hand:
- * INCODE_ANSWERED or INCODE_WAIT. */
-enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned slot,
-                                        uint32_t v);
+ * INCODE_FINISHED or INCODE_WAITING. */
+enum incode_step incode_maker_centre(struct incode_maker *m, unsigned slot,
+                                     uint32_t v);
 
 /* Then the apex of (v, b, c), with near[0] and near[1] where b and c are among
- * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_ANSWERED: *a is
- * the answer; INCODE_MORE: go on by incode_maker_resume; INCODE_WAIT,
+ * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_FINISHED: *a is
+ * the answer; INCODE_WORKED: go on by incode_maker_resume; INCODE_WAITING,
  * INCODE_AGAIN: nothing is begun. */
-enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
-                                      uint32_t b, uint32_t c, uint16_t near[2],
-                                      struct incode_answer *a);
+enum incode_step incode_maker_apex(struct incode_maker *m, unsigned slot,
+                                   uint32_t b, uint32_t c, uint16_t near[2],
+                                   struct incode_answer *a);
 
 /* Goes on with the search of an apex, after incode_maker_centre at the same
- * vertex.  INCODE_ANSWERED: *a is the answer; INCODE_MORE: what was learned is
- * no answer yet, ask for the face again by incode_maker_apex. */
-enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
-                                        struct incode_answer *a);
+ * vertex.  INCODE_FINISHED: *a is the answer; INCODE_WORKED: what was learned
+ * is no answer yet, ask for the face again by incode_maker_apex. */
+enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
+                                     struct incode_answer *a);
 
 /* Indexes `naive` and `grid`: begins the search of the apex of f, or goes on
  * with that under way, whatever f is. */
-enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
-                                      const uint32_t f[3],
-                                      struct incode_answer *a);
+enum incode_step incode_maker_face(struct incode_maker *m, unsigned slot,
+                                   const uint32_t f[3],
+                                   struct incode_answer *a);
 
-/* A first tetrahedron at v (MakeFirstTetra): INCODE_ANSWERED, with m->fault set
- * where there is none, INCODE_WAIT, or INCODE_MORE: ask again. */
-enum incode_outcome incode_maker_first(struct incode_maker *m, unsigned slot,
-                                       uint32_t v, struct incode_answer *a);
+/* A first tetrahedron at v (MakeFirstTetra): INCODE_FINISHED, with m->fault set
+ * where there is none, INCODE_WAITING, or INCODE_WORKED: ask again. */
+enum incode_step incode_maker_first(struct incode_maker *m, unsigned slot,
+                                    uint32_t v, struct incode_answer *a);
 
 /* ---- pages ---- */
 

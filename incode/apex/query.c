@@ -371,7 +371,7 @@ static inline unsigned next_child(const struct incode_query *q, uint32_t left) {
 }
 
 /* A page is missing: its next siblings will be, too, so ask for some now. */
-static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
+static enum incode_step wait_for(struct walk *w, uint32_t base, uint32_t first,
                                  uint32_t left, unsigned child) {
     w->q->missing = base + first + child;
     for (int i = 0; i < ASK_AHEAD && left != 0; i++) {
@@ -379,7 +379,7 @@ static enum incode_walk wait_for(struct walk *w, uint32_t base, uint32_t first,
         left &= ~(UINT32_C(1) << next);
         (void)incode_pager_get(w->walker->pager, base + first + next);
     }
-    return INCODE_WALK_WAIT;
+    return INCODE_WAITING;
 }
 
 /* The leaves of a brick that a question concerns.  Boxes are made for those
@@ -395,7 +395,7 @@ passing_leaves(const struct incode_query *q, const struct incode_frame *frame) {
     return passing(q, &boxes, leaves);
 }
 
-static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
+static enum incode_step visit_brick(struct walk *w, uint32_t brick,
                                     const struct incode_frame *frame) {
     uint32_t leaves = passing_leaves(w->q, frame);
     incode_walker_spend(w->walker, 1);
@@ -403,8 +403,8 @@ static enum incode_walk visit_brick(struct walk *w, uint32_t brick,
     w->visited = true;
     if (leaves != 0 &&
         !w->visit(w->walker, w->q, frame, brick, leaves, w->context))
-        return INCODE_WALK_STOP;
-    return INCODE_WALK_DONE;
+        return INCODE_WORKED;
+    return INCODE_FINISHED;
 }
 
 /* Bricks up to and with those below page `index` of `level`, in the walk's
@@ -469,7 +469,7 @@ passing_children(const struct incode_query *q, const struct incode_boxes *page,
     return passing(q, &boxes, count);
 }
 
-static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
+static enum incode_step descend(struct walk *w, uint32_t level, uint32_t index,
                                 const struct incode_frame *frame) {
     const struct incode_tree *tree = w->walker->tree;
     uint32_t first = index * INCODE_FANOUT;
@@ -492,27 +492,27 @@ static enum incode_walk descend(struct walk *w, uint32_t level, uint32_t index,
         uint32_t page = tree->base[level - 1] + first + child;
         if (w->q->yields && w->visited && w->walker->left == 0) {
             w->q->missing = INCODE_NONE;
-            return INCODE_WALK_WAIT;
+            return INCODE_WAITING;
         }
         if (w->q->pages_max != 0 && w->q->pages++ == w->q->pages_max)
-            return INCODE_WALK_STOP;
+            return INCODE_WORKED;
         const struct incode_frame *f = incode_pager_get(w->walker->pager, page);
         if (f == NULL && w->q->ahead && level == 1 &&
             incode_pager_loading(w->walker->pager, page))
             continue;
         if (f == NULL)
             return wait_for(w, tree->base[level - 1], first, left, child);
-        enum incode_walk r = level == 1
+        enum incode_step r = level == 1
                                  ? visit_brick(w, first + child, f)
                                  : descend(w, level - 1, first + child, f);
-        if (r != INCODE_WALK_DONE)
+        if (r != INCODE_FINISHED)
             return r;
         w->q->cursor = to;
     }
-    return INCODE_WALK_DONE;
+    return INCODE_FINISHED;
 }
 
-enum incode_walk incode_walk(struct incode_walker *walker,
+enum incode_step incode_walk(struct incode_walker *walker,
                              struct incode_query *q, incode_visit *visit,
                              void *context) {
     struct walk w = {walker, q, visit, context, false};
@@ -521,16 +521,16 @@ enum incode_walk incode_walk(struct incode_walker *walker,
         incode_pager_get(walker->pager, walker->tree->base[top]);
     if (root == NULL) {
         q->missing = walker->tree->base[top];
-        return INCODE_WALK_WAIT;
+        return INCODE_WAITING;
     }
     return descend(&w, top, 0, root);
 }
 
-enum incode_walk incode_walk_brick(struct incode_walker *walker,
+enum incode_step incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
                                    incode_visit *visit, void *context) {
     struct walk w = {walker, q, visit, context, false};
     const struct incode_frame *f = incode_pager_get(walker->pager, brick);
     q->missing = brick;
-    return f == NULL ? INCODE_WALK_WAIT : visit_brick(&w, brick, f);
+    return f == NULL ? INCODE_WAITING : visit_brick(&w, brick, f);
 }

@@ -23,8 +23,6 @@ enum incode_question {
                                 the search of a first face, approximate */
 };
 
-enum incode_walk { INCODE_WALK_DONE, INCODE_WALK_WAIT, INCODE_WALK_STOP };
-
 struct incode_query {
     enum incode_question question;
     bool boxed;           /* only what meets [lo, hi] */
@@ -103,12 +101,12 @@ typedef bool incode_visit(struct incode_walker *walker, struct incode_query *q,
                           const struct incode_frame *frame, uint32_t brick,
                           uint32_t leaves, void *context);
 
-enum incode_walk incode_walk(struct incode_walker *walker,
+enum incode_step incode_walk(struct incode_walker *walker,
                              struct incode_query *q, incode_visit *visit,
                              void *context);
 
 /* The same for one brick. */
-enum incode_walk incode_walk_brick(struct incode_walker *walker,
+enum incode_step incode_walk_brick(struct incode_walker *walker,
                                    struct incode_query *q, uint32_t brick,
                                    incode_visit *visit, void *context);
 
@@ -184,8 +182,8 @@ void incode_cell_search_begin(struct incode_cell_search *c,
                               const struct incode_grid *grid,
                               const struct incode_query *q);
 
-/* INCODE_WALK_DONE: q->best is the apex, or INCODE_NONE at a hull facet. */
-enum incode_walk incode_cell_search_run(struct incode_cell_search *c,
+/* INCODE_FINISHED: q->best is the apex, or INCODE_NONE at a hull facet. */
+enum incode_step incode_cell_search_run(struct incode_cell_search *c,
                                         const struct incode_grid *grid,
                                         struct incode_walker *walker,
                                         struct incode_query *q);

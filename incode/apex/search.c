@@ -150,35 +150,35 @@ void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
         incode_empty_spheres_add(&m->empty, p, q->scale);
 }
 
-enum incode_outcome incode_search_suspend(struct incode_search *s) {
+enum incode_step incode_search_suspend(struct incode_search *s) {
     s->page = s->query.missing;
     s->advanced = s->page == INCODE_NONE;
-    return s->advanced ? INCODE_MORE : INCODE_WAIT;
+    return s->advanced ? INCODE_WORKED : INCODE_WAITING;
 }
 
-enum incode_outcome incode_search_run(struct incode_maker *m,
-                                      struct incode_search *s) {
+enum incode_step incode_search_run(struct incode_maker *m,
+                                   struct incode_search *s) {
     struct incode_query *q = &s->query;
     for (;;) {
         uint64_t before = m->counts.candidates;
         q->yields = true;
-        enum incode_walk r =
+        enum incode_step r =
             incode_walk(&m->walker, q, incode_visit_points, NULL);
         s->looked += m->counts.candidates - before;
-        if (r == INCODE_WALK_WAIT)
+        if (r == INCODE_WAITING)
             return incode_search_suspend(s);
         if (q->question == INCODE_QUERY_HALF_SPACE) {
             m->half_spaces[m->half_space_next] = q->half_space;
             m->half_space_next = (m->half_space_next + 1) % INCODE_HALF_SPACES;
             if (m->half_space_count < INCODE_HALF_SPACES)
                 m->half_space_count++;
-            return INCODE_ANSWERED;
+            return INCODE_FINISHED;
         }
         if (s->final) {
             incode_count_candidates(m, s->looked);
             if (q->best == INCODE_NONE)
                 incode_hull_learn(m, q);
-            return INCODE_ANSWERED;
+            return INCODE_FINISHED;
         }
         if (q->best != INCODE_NONE || !q->boxed) {
             incode_maker_yield(m, INCODE_LESSEN_UNITS);
@@ -351,7 +351,7 @@ static uint32_t work_of(const struct incode_walker *walker) {
 }
 
 /* The rest of the piece at work. */
-static enum incode_walk finish_piece(struct incode_cell_search *c,
+static enum incode_step finish_piece(struct incode_cell_search *c,
                                      const struct incode_grid *g,
                                      struct incode_walker *walker,
                                      struct incode_query *q, uint32_t *work) {
@@ -364,13 +364,13 @@ static enum incode_walk finish_piece(struct incode_cell_search *c,
         c->list += batch.count;
         if (!all) {
             ask_ahead(c, g);
-            return INCODE_WALK_WAIT;
+            return INCODE_WAITING;
         }
         *work += batch.count;
         if (*work >= work_of(walker))
-            return INCODE_WALK_STOP;
+            return INCODE_WORKED;
     }
-    return INCODE_WALK_DONE;
+    return INCODE_FINISHED;
 }
 
 /* ---- shells ---- */
@@ -393,8 +393,8 @@ static bool is_within(struct range range, uint32_t i) {
 }
 
 /* Takes the next piece of the row, from c->x on, as far as the question
- * concerns it; INCODE_WALK_STOP: none is left. */
-static enum incode_walk next_piece(struct incode_cell_search *c,
+ * concerns it; INCODE_WORKED: none is left. */
+static enum incode_step next_piece(struct incode_cell_search *c,
                                    const struct incode_grid *g,
                                    const struct incode_walker *walker,
                                    struct incode_query *q, struct shell *s) {
@@ -420,7 +420,7 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
             uint32_t from, to;
             if (!incode_cells_word(g, base, row + c->x, &from, &q->missing) ||
                 !incode_cells_word(g, base, row + last + 1, &to, &q->missing))
-                return INCODE_WALK_WAIT;
+                return INCODE_WAITING;
             if (to - from > INCODE_CELL_SEARCH_PIECE && last > c->x) {
                 last = c->x + (last - c->x) / 2;
                 continue;
@@ -431,9 +431,9 @@ static enum incode_walk next_piece(struct incode_cell_search *c,
         }
         c->x = last + 1;
         if (c->list < c->end)
-            return INCODE_WALK_DONE;
+            return INCODE_FINISHED;
     }
-    return INCODE_WALK_STOP;
+    return INCODE_WORKED;
 }
 
 /* Whether the question concerns layer or row i (d: 2 or 1) of the shell; eight
@@ -464,48 +464,48 @@ static bool passes(const struct incode_grid *g,
     return (tested->mask & 1) != 0;
 }
 
-static enum incode_walk run_row(struct incode_cell_search *c,
+static enum incode_step run_row(struct incode_cell_search *c,
                                 const struct incode_grid *g,
                                 struct incode_walker *walker,
                                 struct incode_query *q, struct shell *s) {
     if (c->x == s->outer[0].first &&
         !passes(g, walker, q, s, &s->rows, 1, c->y))
-        return INCODE_WALK_DONE;
+        return INCODE_FINISHED;
     set_range(&s->box, g, 1, (struct range){c->y, c->y});
     for (;;) {
-        enum incode_walk r = next_piece(c, g, walker, q, s);
-        if (r == INCODE_WALK_STOP)
-            return INCODE_WALK_DONE;
-        if (r == INCODE_WALK_DONE)
+        enum incode_step r = next_piece(c, g, walker, q, s);
+        if (r == INCODE_WORKED)
+            return INCODE_FINISHED;
+        if (r == INCODE_FINISHED)
             r = finish_piece(c, g, walker, q, &s->work);
-        if (r != INCODE_WALK_DONE)
+        if (r != INCODE_FINISHED)
             return r;
     }
 }
 
 /* One layer of cells from row c->y on. */
-static enum incode_walk run_layer(struct incode_cell_search *c,
+static enum incode_step run_layer(struct incode_cell_search *c,
                                   const struct incode_grid *g,
                                   struct incode_walker *walker,
                                   struct incode_query *q, struct shell *s) {
     if (c->y == s->outer[1].first && c->x == s->outer[0].first &&
         !passes(g, walker, q, s, &s->layers, 2, c->z))
-        return INCODE_WALK_DONE;
+        return INCODE_FINISHED;
     set_range(&s->box, g, 2, (struct range){c->z, c->z});
     s->rows.end = 0;
     for (; c->y <= s->outer[1].last; c->y++) {
         incode_walker_yield(walker, 1);
-        enum incode_walk r = run_row(c, g, walker, q, s);
-        if (r == INCODE_WALK_DONE && s->work >= work_of(walker))
-            r = INCODE_WALK_STOP;
-        if (r != INCODE_WALK_DONE)
+        enum incode_step r = run_row(c, g, walker, q, s);
+        if (r == INCODE_FINISHED && s->work >= work_of(walker))
+            r = INCODE_WORKED;
+        if (r != INCODE_FINISHED)
             return r;
         c->x = s->outer[0].first;
     }
-    return INCODE_WALK_DONE;
+    return INCODE_FINISHED;
 }
 
-static enum incode_walk run_shell(struct incode_cell_search *c,
+static enum incode_step run_shell(struct incode_cell_search *c,
                                   const struct incode_grid *g,
                                   struct incode_walker *walker,
                                   struct incode_query *q) {
@@ -517,11 +517,11 @@ static enum incode_walk run_shell(struct incode_cell_search *c,
         s.lo[d] = incode_cells_lowest(g, d, s.outer[d].first);
         s.hi[d] = incode_cells_highest(g, d, s.outer[d].last);
     }
-    enum incode_walk r = finish_piece(c, g, walker, q, &s.work);
-    for (; r == INCODE_WALK_DONE && c->z <= s.outer[2].last; c->z++) {
+    enum incode_step r = finish_piece(c, g, walker, q, &s.work);
+    for (; r == INCODE_FINISHED && c->z <= s.outer[2].last; c->z++) {
         incode_walker_yield(walker, 1);
         r = run_layer(c, g, walker, q, &s);
-        if (r != INCODE_WALK_DONE)
+        if (r != INCODE_FINISHED)
             break;
         c->y = s.outer[1].first;
         c->x = s.outer[0].first;
@@ -551,19 +551,19 @@ void incode_cell_search_begin(struct incode_cell_search *c,
     start_shell(c, grid);
 }
 
-enum incode_walk incode_cell_search_run(struct incode_cell_search *c,
+enum incode_step incode_cell_search_run(struct incode_cell_search *c,
                                         const struct incode_grid *grid,
                                         struct incode_walker *walker,
                                         struct incode_query *q) {
-    enum incode_walk r = run_shell(c, grid, walker, q);
-    if (r != INCODE_WALK_DONE || !more_beyond(c, grid, q))
+    enum incode_step r = run_shell(c, grid, walker, q);
+    if (r != INCODE_FINISHED || !more_beyond(c, grid, q))
         return r;
     INCODE_ASSERT(c->reach < UINT32_C(1) << 30);
     c->any_done = true;
     c->done = c->reach;
     c->reach *= 2;
     start_shell(c, grid);
-    return INCODE_WALK_STOP;
+    return INCODE_WORKED;
 }
 
 /* --- cap ------------------------------------------------------------------ */

@@ -13,15 +13,15 @@ void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const uint32_t f[3], const double pv[3],
                          const double pb[3], const double pc[3], double radius);
 
-/* Goes on with it: INCODE_ANSWERED with query.best (INCODE_NONE: a hull facet),
- * or INCODE_WAIT for query.missing, or INCODE_MORE: the walker has no units
- * left.
+/* Goes on with it: INCODE_FINISHED with query.best (INCODE_NONE: a hull facet),
+ * or INCODE_WAITING for query.missing, or INCODE_WORKED: the walker has no
+ * units left.
  */
-enum incode_outcome incode_search_run(struct incode_maker *m,
-                                      struct incode_search *s);
+enum incode_step incode_search_run(struct incode_maker *m,
+                                   struct incode_search *s);
 
-/* Notes what a walk waits for: INCODE_WAIT or INCODE_MORE, as above. */
-enum incode_outcome incode_search_suspend(struct incode_search *s);
+/* Notes what a walk waits for: INCODE_WAITING or INCODE_WORKED, as above. */
+enum incode_step incode_search_suspend(struct incode_search *s);
 
 /* The next box of a search for a first candidate. */
 void incode_search_box(struct incode_maker *m, struct incode_search *s);

@@ -298,9 +298,9 @@ static void learn_spread(struct incode_maker *m, uint32_t points) {
 }
 
 /* Brings the points around the leaf of a vertex to hand. */
-static enum incode_outcome copy_around_leaf(struct incode_maker *m,
-                                            struct incode_search *s, uint32_t v,
-                                            const struct incode_frame *f) {
+static enum incode_step copy_around_leaf(struct incode_maker *m,
+                                         struct incode_search *s, uint32_t v,
+                                         const struct incode_frame *f) {
     struct incode_local_points *local = &m->local;
     uint32_t leaf = v % INCODE_BRICK_POINTS / INCODE_LEAF_POINTS;
     alignas(64) double leaf_lo[3][INCODE_BRICK_LEAVES],
@@ -319,9 +319,9 @@ static enum incode_outcome copy_around_leaf(struct incode_maker *m,
                                 v / INCODE_LEAF_POINTS, lo, hi, radius);
         s->page = local->query.missing;
         if (r == INCODE_LOCAL_WAIT)
-            return INCODE_WAIT;
+            return INCODE_WAITING;
         if (r == INCODE_LOCAL_READY || tries == COPY_TRIES)
-            return INCODE_ANSWERED;
+            return INCODE_FINISHED;
         radius *= 0.75;
         m->spread *= 0.9;
     }
@@ -331,9 +331,9 @@ enum { HORIZON_TRIES = 12 };
 
 /* Lists the bricks around that of a vertex: more of them where there are few,
  * none where there are too many whatever the box. */
-static enum incode_outcome list_bricks(struct incode_maker *m,
-                                       struct incode_search *s, uint32_t brick,
-                                       const struct incode_frame *f) {
+static enum incode_step list_bricks(struct incode_maker *m,
+                                    struct incode_search *s, uint32_t brick,
+                                    const struct incode_frame *f) {
     struct incode_horizon *h = &m->horizon;
     double lo[3], hi[3];
     bool full = false;
@@ -347,14 +347,14 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
             around_hi[d] = hi[d] + radius;
             all = all && around_lo[d] <= m->lo[d] && around_hi[d] >= m->hi[d];
         }
-        enum incode_horizon_made r = incode_horizon_make(
+        enum incode_step r = incode_horizon_make(
             h, &m->walker, brick, around_lo, around_hi, &s->page);
-        if (r == INCODE_HORIZON_WAIT)
-            return INCODE_WAIT;
-        if (r == INCODE_HORIZON_MADE &&
+        if (r == INCODE_WAITING)
+            return INCODE_WAITING;
+        if (r == INCODE_FINISHED &&
             (full || all || h->count >= incode_horizon_near(h) / 3))
             break;
-        full = full || r == INCODE_HORIZON_FULL;
+        full = full || r == INCODE_FULL;
         m->reach *= full ? 0.75 : 1.25;
         m->reach = m->reach < 0x1p-10  ? 0x1p-10
                    : m->reach > 0x1p10 ? 0x1p10
@@ -366,35 +366,35 @@ static enum incode_outcome list_bricks(struct incode_maker *m,
         if (h->box_hi[d] >= m->hi[d])
             h->box_hi[d] = __builtin_inf();
     }
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
-enum incode_outcome incode_maker_centre(struct incode_maker *m, unsigned search,
-                                        uint32_t v) {
+enum incode_step incode_maker_centre(struct incode_maker *m, unsigned search,
+                                     uint32_t v) {
     struct incode_search *s = &m->search[search];
     struct incode_local_points *local = &m->local;
     uint32_t brick = v / INCODE_BRICK_POINTS, slot = v % INCODE_BRICK_POINTS;
     const struct incode_frame *f = incode_pager_get(&m->pager, brick);
     s->page = brick;
     if (f == NULL)
-        return INCODE_WAIT;
+        return INCODE_WAITING;
     if (slot >= f->count) {
         m->fault = INCODE_NO_VERTEX;
-        return INCODE_WAIT;
+        return INCODE_WAITING;
     }
     if (m->horizon.centre != brick &&
-        list_bricks(m, s, brick, f) == INCODE_WAIT)
-        return INCODE_WAIT;
+        list_bricks(m, s, brick, f) == INCODE_WAITING)
+        return INCODE_WAITING;
     if (local->leaf != v / INCODE_LEAF_POINTS &&
-        copy_around_leaf(m, s, v, f) == INCODE_WAIT)
-        return INCODE_WAIT;
+        copy_around_leaf(m, s, v, f) == INCODE_WAITING)
+        return INCODE_WAITING;
     const double p[3] = {f->page.brick.x[slot], f->page.brick.y[slot],
                          f->page.brick.z[slot]};
     bool again = local->vertex == v; /* after a wait: nothing new to learn */
     incode_local_centre(local, v, p, local->radius, m->lo, m->hi);
     if (!again)
         learn_spread(m, local->near);
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* --- copies --------------------------------------------------------------- */

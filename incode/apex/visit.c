@@ -348,21 +348,21 @@ bool incode_visit_points(struct incode_walker *walker, struct incode_query *q,
 
 /* Index of vertex `id` among the local points, fetched and appended if it is
  * far; INCODE_AGAIN: the room for far vertices is used up. */
-static enum incode_outcome resolve(struct incode_maker *m, uint32_t id,
-                                   uint16_t *index, uint32_t *page) {
+static enum incode_step resolve(struct incode_maker *m, uint32_t id,
+                                uint16_t *index, uint32_t *page) {
     if (*index != INCODE_LOCAL_NONE)
-        return INCODE_ANSWERED;
+        return INCODE_FINISHED;
     uint32_t i = incode_local_find(&m->local, id);
     if (i == INCODE_LOCAL_NONE) {
         double p[3];
         if (!incode_fetch_point(m, id, p, page))
-            return INCODE_WAIT;
+            return INCODE_WAITING;
         i = incode_local_append(&m->local, id, p);
         if (i == INCODE_LOCAL_NONE)
             return INCODE_AGAIN;
     }
     *index = (uint16_t)i;
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* The answer at three local points. */
@@ -387,42 +387,42 @@ static void set_hull(struct incode_answer *a, uint32_t v, uint32_t b,
     memcpy(a->f, f, sizeof a->f);
 }
 
-enum incode_outcome incode_maker_apex(struct incode_maker *m, unsigned slot,
-                                      uint32_t b, uint32_t c, uint16_t near[2],
-                                      struct incode_answer *a) {
+enum incode_step incode_maker_apex(struct incode_maker *m, unsigned slot,
+                                   uint32_t b, uint32_t c, uint16_t near[2],
+                                   struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
     uint32_t apex;
-    enum incode_outcome r = resolve(m, b, &near[0], &s->page);
-    if (r == INCODE_ANSWERED)
+    enum incode_step r = resolve(m, b, &near[0], &s->page);
+    if (r == INCODE_FINISHED)
         r = resolve(m, c, &near[1], &s->page);
-    if (r != INCODE_ANSWERED)
+    if (r != INCODE_FINISHED)
         return r;
     m->counts.calls++;
     switch (incode_apex_near(m, near[0], near[1], &apex, s)) {
     case INCODE_NEAR_FOUND:
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
-        return INCODE_ANSWERED;
+        return INCODE_FINISHED;
     case INCODE_NEAR_HULL:
         set_hull(a, m->local.vertex, b, c);
-        return INCODE_ANSWERED;
+        return INCODE_FINISHED;
     case INCODE_NEAR_SEARCH:
     default:
         m->counts.tree_searches++;
         s->stage = INCODE_SEARCH_POINTS;
-        return INCODE_MORE;
+        return INCODE_WORKED;
     }
 }
 
-enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
-                                        struct incode_answer *a) {
+enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
+                                     struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
     const struct incode_query *q = &s->query;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
     uint32_t apex = INCODE_LOCAL_NONE;
     s->advanced = false;
     if (s->stage == INCODE_SEARCH_POINTS) {
-        enum incode_outcome r = incode_search_run(m, s);
-        if (r != INCODE_ANSWERED)
+        enum incode_step r = incode_search_run(m, s);
+        if (r != INCODE_FINISHED)
             return r;
         s->stage = INCODE_SEARCH_FOUND;
     }
@@ -430,21 +430,21 @@ enum incode_outcome incode_maker_resume(struct incode_maker *m, unsigned slot,
         apex = incode_local_find(&m->local, q->best);
         if (apex == INCODE_LOCAL_NONE)
             apex = incode_local_append(&m->local, q->best, q->best_p);
-        enum incode_outcome r = resolve(m, q->b, &near[0], &s->page);
-        if (r == INCODE_ANSWERED)
+        enum incode_step r = resolve(m, q->b, &near[0], &s->page);
+        if (r == INCODE_FINISHED)
             r = resolve(m, q->c, &near[1], &s->page);
-        if (r != INCODE_ANSWERED || apex == INCODE_LOCAL_NONE)
-            return r != INCODE_ANSWERED ? r : INCODE_AGAIN;
+        if (r != INCODE_FINISHED || apex == INCODE_LOCAL_NONE)
+            return r != INCODE_FINISHED ? r : INCODE_AGAIN;
     }
     s->stage = INCODE_SEARCH_NONE;
     if (q->question == INCODE_QUERY_HALF_SPACE)
-        return INCODE_MORE; /* the face is tried again with it */
+        return INCODE_WORKED; /* the face is tried again with it */
     incode_search_learn(m, q, s->looked);
     if (q->best != INCODE_NONE)
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
     else
         set_hull(a, q->v, q->b, q->c);
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* ---- faces as they come ---- */
@@ -454,19 +454,19 @@ static bool is_at_hand(const struct incode_maker *m, uint32_t v) {
            m->horizon.centre == v / INCODE_BRICK_POINTS;
 }
 
-static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,
-                                       const uint32_t f[3],
-                                       struct incode_answer *a) {
-    enum incode_outcome r = is_at_hand(m, f[0]) ? INCODE_MORE : INCODE_AGAIN;
+static enum incode_step answer_near(struct incode_maker *m, unsigned slot,
+                                    const uint32_t f[3],
+                                    struct incode_answer *a) {
+    enum incode_step r = is_at_hand(m, f[0]) ? INCODE_WORKED : INCODE_AGAIN;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
-    for (bool begun = false; r == INCODE_AGAIN || r == INCODE_MORE;
+    for (bool begun = false; r == INCODE_AGAIN || r == INCODE_WORKED;
          begun = true) {
-        if (begun && r == INCODE_MORE && m->walker.left == 0)
-            return INCODE_MORE;
+        if (begun && r == INCODE_WORKED && m->walker.left == 0)
+            return INCODE_WORKED;
         if (r == INCODE_AGAIN) {
             near[0] = near[1] = INCODE_LOCAL_NONE;
             r = incode_maker_centre(m, slot, f[0]);
-            if (r != INCODE_ANSWERED)
+            if (r != INCODE_FINISHED)
                 return r;
         }
         r = m->search[slot].stage == INCODE_SEARCH_NONE
@@ -476,22 +476,21 @@ static enum incode_outcome answer_near(struct incode_maker *m, unsigned slot,
     return r;
 }
 
-enum incode_outcome incode_maker_apexes(struct incode_maker *m, unsigned slot,
-                                        const uint32_t (*faces)[3],
-                                        uint32_t count,
-                                        struct incode_answer *answers,
-                                        uint32_t *done) {
+enum incode_step incode_maker_apexes(struct incode_maker *m, unsigned slot,
+                                     const uint32_t (*faces)[3], uint32_t count,
+                                     struct incode_answer *answers,
+                                     uint32_t *done) {
     while (*done < count) {
         const uint32_t *f = faces[*done];
         struct incode_answer *a = &answers[*done];
-        enum incode_outcome r = m->index == INCODE_KD
-                                    ? answer_near(m, slot, f, a)
-                                    : incode_maker_face(m, slot, f, a);
-        if (r != INCODE_ANSWERED)
+        enum incode_step r = m->index == INCODE_KD
+                                 ? answer_near(m, slot, f, a)
+                                 : incode_maker_face(m, slot, f, a);
+        if (r != INCODE_FINISHED)
             return r;
         ++*done;
     }
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* --- whole ---------------------------------------------------------------- */
@@ -510,12 +509,12 @@ static struct incode_grid grid_of(struct incode_maker *m) {
     return (struct incode_grid){&m->pager, &m->tree, m->lo, m->hi, m->cells};
 }
 
-static enum incode_outcome begin(struct incode_maker *m,
-                                 struct incode_search *s, const uint32_t f[3]) {
+static enum incode_step begin(struct incode_maker *m, struct incode_search *s,
+                              const uint32_t f[3]) {
     double p[3][3];
     for (int i = 0; i < 3; i++)
         if (!incode_fetch_point(m, f[i], p[i], &s->page))
-            return INCODE_WAIT;
+            return INCODE_WAITING;
     m->counts.calls++;
     incode_search_begin(m, s, f, p[0], p[1], p[2], __builtin_inf());
     s->query.boxed = s->query.strictly_beyond = false;
@@ -527,13 +526,13 @@ static enum incode_outcome begin(struct incode_maker *m,
         s->sweep = m->sweep;
         s->sweep_left = m->tree.bricks;
     }
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* Every page of points in turn, from where the last search stands: several
  * searches share a page that has to be fetched. */
-static enum incode_outcome look_at_all(struct incode_maker *m,
-                                       struct incode_search *s) {
+static enum incode_step look_at_all(struct incode_maker *m,
+                                    struct incode_search *s) {
     for (int i = 0; i < SWEEP_BRICKS && s->sweep_left > 0; i++) {
         if (i > 0 && m->walker.left == 0)
             break;
@@ -544,7 +543,7 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
             s->page = brick;
             for (uint32_t k = 1; k < SWEEP_AHEAD && k < s->sweep_left; k++)
                 (void)incode_pager_get(&m->pager, (brick + k) % m->tree.bricks);
-            return INCODE_WAIT;
+            return INCODE_WAITING;
         }
         (void)incode_visit_points(&m->walker, &s->query, f, brick,
                                   (UINT32_C(1) << incode_frame_leaves(f)) - 1,
@@ -554,29 +553,29 @@ static enum incode_outcome look_at_all(struct incode_maker *m,
         s->sweep_left--;
         s->advanced = true;
     }
-    return s->sweep_left > 0 ? INCODE_MORE : INCODE_ANSWERED;
+    return s->sweep_left > 0 ? INCODE_WORKED : INCODE_FINISHED;
 }
 
-static enum incode_outcome look_at_cells(struct incode_maker *m,
-                                         struct incode_search *s) {
+static enum incode_step look_at_cells(struct incode_maker *m,
+                                      struct incode_search *s) {
     struct incode_query *q = &s->query;
     struct incode_cell_search *c = &s->cells;
     const struct incode_grid grid = grid_of(m);
     bool new_shell = c->any_done;
-    enum incode_walk r = incode_cell_search_run(c, &grid, &m->walker, q);
-    if (r == INCODE_WALK_WAIT) {
+    enum incode_step r = incode_cell_search_run(c, &grid, &m->walker, q);
+    if (r == INCODE_WAITING) {
         s->page = q->missing;
-        return INCODE_WAIT;
+        return INCODE_WAITING;
     }
     s->advanced = true;
     if (q->best == INCODE_NONE) {
         /* A facet of the hull?  Its plane may be known from another. */
-        if (r == INCODE_WALK_DONE && c->has_below)
+        if (r == INCODE_FINISHED && c->has_below)
             incode_hull_remember(m, q, c->below);
         else if (!new_shell && incode_hull_known(m, q->pv, q->pb, q->pc))
-            return INCODE_ANSWERED;
+            return INCODE_FINISHED;
     }
-    return r == INCODE_WALK_STOP ? INCODE_MORE : INCODE_ANSWERED;
+    return r == INCODE_WORKED ? INCODE_WORKED : INCODE_FINISHED;
 }
 
 static void whole_set_answer(struct incode_answer *a,
@@ -590,29 +589,29 @@ static void whole_set_answer(struct incode_answer *a,
     }
 }
 
-enum incode_outcome incode_maker_face(struct incode_maker *m, unsigned slot,
-                                      const uint32_t f[3],
-                                      struct incode_answer *a) {
+enum incode_step incode_maker_face(struct incode_maker *m, unsigned slot,
+                                   const uint32_t f[3],
+                                   struct incode_answer *a) {
     struct incode_search *s = &m->search[slot];
-    enum incode_outcome r = INCODE_ANSWERED;
+    enum incode_step r = INCODE_FINISHED;
     s->advanced = false;
     if (s->stage != INCODE_SEARCH_POINTS)
         r = begin(m, s, f);
-    if (r != INCODE_ANSWERED)
+    if (r != INCODE_FINISHED)
         return r;
     uint64_t before = m->counts.candidates;
     do {
         r = m->index == INCODE_GRID ? look_at_cells(m, s) : look_at_all(m, s);
-    } while (r == INCODE_MORE && m->index == INCODE_GRID &&
+    } while (r == INCODE_WORKED && m->index == INCODE_GRID &&
              m->walker.left > 0 && s->cells.reach <= SHELLS &&
              s->cells.list == s->cells.end);
     s->looked += m->counts.candidates - before;
-    if (r == INCODE_MORE)
+    if (r == INCODE_WORKED)
         s->page = INCODE_NONE;
-    if (r != INCODE_ANSWERED)
+    if (r != INCODE_FINISHED)
         return r;
     incode_count_candidates(m, s->looked);
     whole_set_answer(a, &s->query);
     s->stage = INCODE_SEARCH_NONE;
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }

@@ -51,11 +51,11 @@ static void go_on(struct incode_insertion *n,
     n->stage = stage;
 }
 
-enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n) {
+enum incode_step incode_insertion_rest(struct incode_insertion *n) {
     struct incode_insertion_work *work = n->work;
     size_t bits = (n->maker->tree.bricks + 63) / 64 * sizeof(uint64_t);
     if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from))
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     n->closing = n->from == n->own_last && !n->squeezed;
     n->shown = false;
     memset(n->touched, 0, bits);
@@ -69,7 +69,7 @@ enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n) {
      * come in between. */
     go_on(n, n->thorough && !n->squeezed ? INCODE_INSERTION_LOOK
                                          : INCODE_INSERTION_JUDGE);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* Now and then in a loop over cells. */
@@ -86,7 +86,7 @@ static uint32_t some_cells(const struct incode_insertion *n) {
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
-enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n) {
+enum incode_step incode_insertion_judge(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     uint32_t units = 2 + n->work->rest.count / 2; /* of 4 cells */
     for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
@@ -100,11 +100,11 @@ enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n) {
         n->final += final;
     }
     if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     bool enough = n->final == cells_left(n) ||
                   (!n->thorough && n->final >= cells_left(n) / 2);
     go_on(n, enough ? INCODE_INSERTION_SETTLE : INCODE_INSERTION_LOOK);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* Whether it is at an own point that has been taken in. */
@@ -142,7 +142,7 @@ static void note(struct incode_insertion *n) {
     }
 }
 
-enum incode_insertion_step incode_insertion_look(struct incode_insertion *n) {
+enum incode_step incode_insertion_look(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     struct incode_look *look = &n->work->look;
     uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
@@ -152,21 +152,20 @@ enum incode_insertion_step incode_insertion_look(struct incode_insertion *n) {
             incode_look_add(look, x, n->cell);
     }
     if (n->cell < x->cells && !incode_look_is_full(look))
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     incode_walker_spend(&n->maker->walker, look->count);
-    enum incode_look_result r = incode_look_go(look);
-    if (r != INCODE_LOOK_DONE)
-        return r == INCODE_LOOK_MORE ? INCODE_INSERTION_WORKED
-                                     : INCODE_INSERTION_WAITING;
+    enum incode_step r = incode_look_go(look);
+    if (r != INCODE_FINISHED)
+        return r == INCODE_WORKED ? INCODE_WORKED : INCODE_WAITING;
     note(n);
     incode_look_begin(look, n->round == 1, n->own_first, n->from);
     if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     /* Without a visit, those that are reached stay. */
     n->shown =
         n->thorough || n->round == 1 || n->final < cells_left(n) / LEAST_SHARE;
     go_on(n, n->shown ? INCODE_INSERTION_VISIT : INCODE_INSERTION_SETTLE);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* ---- points ---- */
@@ -277,14 +276,14 @@ static bool close_stars(struct incode_insertion *n, const double p[3],
     return true;
 }
 
-static enum incode_insertion_step end_visit(struct incode_insertion *n) {
+static enum incode_step end_visit(struct incode_insertion *n) {
     n->round++;
     go_on(n, n->round == 1 ? INCODE_INSERTION_LOOK : INCODE_INSERTION_SETTLE);
     incode_look_begin(&n->work->look, true, n->own_first, n->from);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
-enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n) {
+enum incode_step incode_insertion_visit(struct incode_insertion *n) {
     struct incode_pager *pager = &n->maker->pager;
     struct incode_walker *walker = &n->maker->walker;
     uint32_t bricks = n->maker->tree.bricks;
@@ -297,13 +296,13 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n) {
     }
     const struct incode_frame *f = incode_pager_get(pager, brick);
     if (f == NULL)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     const struct incode_brick *b = &f->page.brick;
     for (uint32_t first = n->next; n->next < f->count; n->next++) {
         const double p[3] = {b->x[n->next], b->y[n->next], b->z[n->next]};
         uint32_t id = brick * INCODE_BRICK_POINTS + n->next;
         if (walker->left == 0 && n->next > first)
-            return INCODE_INSERTION_WORKED;
+            return INCODE_WORKED;
         incode_walker_spend(walker, INCODE_INSERTION_UNITS);
         /* No cell holds a vertex; of one that is released, that is a look at
          * all of them. */
@@ -314,7 +313,7 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n) {
         } else if (!close_stars(n, p, id)) {
             n->squeezed = true; /* what is final makes room */
             n->stage = INCODE_INSERTION_REST;
-            return INCODE_INSERTION_WORKED;
+            return INCODE_WORKED;
         }
     }
     n->touched[brick / 64] &= ~(UINT64_C(1) << brick % 64);
@@ -322,12 +321,12 @@ enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n) {
     n->brick = brick + 1;
     n->next = 0;
     n->large = false;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* ---- what has come of it ---- */
 
-enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n) {
+enum incode_step incode_insertion_settle(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     if (n->cell == INCODE_COMPLEX_CELLS_FIRST)
         n->final = 0;
@@ -342,12 +341,12 @@ enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n) {
         n->final += final;
     }
     if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     if (!n->closing && n->final < cells_left(n) / LEAST_SHARE)
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     n->closed = n->closing && (n->shown || n->final == cells_left(n));
     incode_insertion_begin_list(n);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* --- look ----------------------------------------------------------------- */
@@ -427,16 +426,16 @@ static bool is_passed(const struct incode_look *look, uint32_t first,
 
 /* Looks at what is below page `index` of a level of boxes, whose children have
  * `span` bricks each. */
-static enum incode_look_result look_below(struct incode_look *look,
-                                          uint32_t level, uint32_t index,
-                                          uint64_t span, uint64_t cells) {
+static enum incode_step look_below(struct incode_look *look, uint32_t level,
+                                   uint32_t index, uint64_t span,
+                                   uint64_t cells) {
     const struct incode_tree *tree = &look->maker->tree;
     const struct incode_frame *f =
         incode_pager_get(&look->maker->pager, tree->base[level] + index);
     if (f == NULL)
-        return INCODE_LOOK_WAITING;
+        return INCODE_WAITING;
     if (look->pages-- == 0)
-        return INCODE_LOOK_MORE;
+        return INCODE_WORKED;
     alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
     const struct incode_boxes boxes = f->page.boxes;
     uint32_t first = index * INCODE_FANOUT;
@@ -454,9 +453,9 @@ static enum incode_look_result look_below(struct incode_look *look,
         cells &= look->every ? ~UINT64_C(0) : ~look->reached;
         uint64_t met = meeting(look, &boxes, i, from, to, cells);
         if (met != 0 && level > 1) {
-            enum incode_look_result r = look_below(look, level - 1, first + i,
-                                                   span / INCODE_FANOUT, met);
-            if (r != INCODE_LOOK_DONE)
+            enum incode_step r = look_below(look, level - 1, first + i,
+                                            span / INCODE_FANOUT, met);
+            if (r != INCODE_FINISHED)
                 return r;
         }
         if (met != 0 && level == 1) {
@@ -465,14 +464,14 @@ static enum incode_look_result look_below(struct incode_look *look,
         }
         look->at = (uint32_t)end;
     }
-    return INCODE_LOOK_DONE;
+    return INCODE_FINISHED;
 }
 
-enum incode_look_result incode_look_go(struct incode_look *look) {
+enum incode_step incode_look_go(struct incode_look *look) {
     const struct incode_tree *tree = &look->maker->tree;
     uint64_t span = 1;
     if (tree->levels < 2 || look->count == 0)
-        return INCODE_LOOK_DONE;
+        return INCODE_FINISHED;
     look->pages = PAGES;
     for (uint32_t level = 2; level < tree->levels; level++)
         span *= INCODE_FANOUT;
@@ -541,8 +540,8 @@ static void open_face(struct incode_fallback *h, struct incode_front *front,
         (struct incode_face){{f[turn], f[(turn + 1) % 3], f[(turn + 2) % 3]}};
 }
 
-static enum incode_insertion_step send_faces(struct incode_fallback *h,
-                                             struct incode_front *front) {
+static enum incode_step send_faces(struct incode_fallback *h,
+                                   struct incode_front *front) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->cell < x->cells; i++, h->cell++) {
         const struct incode_cell *c = incode_complex_cell(x, h->cell);
@@ -550,16 +549,16 @@ static enum incode_insertion_step send_faces(struct incode_fallback *h,
         if (incode_cell_is_free(c))
             continue;
         if (h->count + 4 > INCODE_BRICK_POINTS && !send(h))
-            return INCODE_INSERTION_WAITING;
+            return INCODE_WAITING;
         for (unsigned k = 0; k < 4; k++)
             if (c->n[k].cell == INCODE_COMPLEX_GONE)
                 open_face(h, front, c, k);
     }
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The points of own bricks to come that a released tetrahedron has. */
-static enum incode_insertion_step send_ahead(struct incode_fallback *h) {
+static enum incode_step send_ahead(struct incode_fallback *h) {
     const struct incode_complex *x = &h->n->complex;
     for (unsigned i = 0; i < CELLS && h->vertex < x->points; i++, h->vertex++) {
         const struct incode_complex_point *v = &x->point[h->vertex];
@@ -568,23 +567,23 @@ static enum incode_insertion_step send_ahead(struct incode_fallback *h) {
             brick >= h->n->own_last)
             continue;
         if (h->count == INCODE_BRICK_POINTS && !send(h))
-            return INCODE_INSERTION_WAITING;
+            return INCODE_WAITING;
         h->faces[h->count++] =
             (struct incode_face){{v->id, INCODE_NONE, INCODE_NONE}};
     }
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The points of a brick that a released tetrahedron has: those that have no
  * cell any more, or an open face. */
-static enum incode_insertion_step send_reached(struct incode_fallback *h) {
+static enum incode_step send_reached(struct incode_fallback *h) {
     const struct incode_complex *x = &h->n->complex;
     uint32_t brick = h->brick;
     uint32_t points = incode_maker_count(h->n->maker, brick);
     if (points == 0)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     if (!send(h))
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     uint64_t reached = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - points);
     for (uint32_t v = 1; v < x->points; v++) {
         fallback_yield_at(h, v);
@@ -597,11 +596,11 @@ static enum incode_insertion_step send_reached(struct incode_fallback *h) {
             {brick * INCODE_BRICK_POINTS + (uint32_t)__builtin_ctzll(reached),
              INCODE_NONE, INCODE_NONE}};
     h->brick++;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
-enum incode_insertion_step incode_fallback_step(struct incode_fallback *h,
-                                                struct incode_front *front) {
+enum incode_step incode_fallback_step(struct incode_fallback *h,
+                                      struct incode_front *front) {
     const struct incode_insertion *n = h->n;
     if (h->cell < n->complex.cells)
         return send_faces(h, front);
@@ -611,5 +610,5 @@ enum incode_insertion_step incode_fallback_step(struct incode_fallback *h,
         h->brick++;
     if (h->brick < n->from)
         return send_reached(h);
-    return send(h) ? INCODE_INSERTION_FINISHED : INCODE_INSERTION_WAITING;
+    return send(h) ? INCODE_FINISHED : INCODE_WAITING;
 }

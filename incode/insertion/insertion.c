@@ -161,7 +161,7 @@ void incode_insertion_take_in(struct incode_insertion *n) {
 
 /* The next bricks: the largest part, of those that cutting all bricks leads to,
  * that begins with the first of them and is not too large. */
-static enum incode_insertion_step choose(struct incode_insertion *n) {
+static enum incode_step choose(struct incode_insertion *n) {
     uint32_t first = 0, last = n->maker->tree.bricks;
     uint32_t room = room_for(n), most = n->most;
     if (!n->whole && room < most)
@@ -170,7 +170,7 @@ static enum incode_insertion_step choose(struct incode_insertion *n) {
     n->squeezed = false;
     if (n->from == n->own_last) {
         n->stage = INCODE_INSERTION_REST;
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     }
     while (last - first > 1 &&
            (first != n->from || last - first > most || last > n->own_last)) {
@@ -182,7 +182,7 @@ static enum incode_insertion_step choose(struct incode_insertion *n) {
     }
     n->to = last;
     incode_insertion_take_in(n);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* Of a set that is inserted whole, points are in the order of bricks. */
@@ -210,19 +210,19 @@ static bool will_fit(const struct incode_insertion *n) {
 
 /* In the midst of some bricks: these count among the rest, and what is not a
  * vertex yet is taken in again. */
-static enum incode_insertion_step make_room(struct incode_insertion *n) {
+static enum incode_step make_room(struct incode_insertion *n) {
     if (n->whole || (n->from == n->own_first && n->most > 1)) {
         /* More cells than is thought: brick after brick, or fewer at a time. */
         uint32_t most = n->whole ? n->most : (n->most + 3) / 4;
         n->vertices -= vertices(n);
         begin_job(n, false);
         n->most = most < n->most ? most : n->most;
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     }
     if (n->complex.cells == 0)
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     n->stage = INCODE_INSERTION_REST;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The brick from one on, or of every other from there, that is not among those
@@ -241,14 +241,14 @@ static bool is_of_four(const struct incode_insertion *n, uint32_t id) {
 /* Inserts the first point of a brick to come, or of every other, so that those
  * before it are not bounded by large cells that all change again: twice as fast
  * on some surfaces, and no slower elsewhere. */
-static enum incode_insertion_step sample(struct incode_insertion *n) {
+static enum incode_step sample(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
     uint32_t bricks = n->maker->tree.bricks;
     uint32_t brick = past_own(n, n->brick), id = brick * INCODE_BRICK_POINTS;
     if (brick >= bricks) {
         n->stage = INCODE_INSERTION_CHOOSE;
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     }
     for (uint32_t i = 0, ahead = brick;
          i < INCODE_INSERTION_AHEAD && ahead < bricks; i++) {
@@ -257,10 +257,10 @@ static enum incode_insertion_step sample(struct incode_insertion *n) {
     }
     const struct incode_frame *f = incode_pager_get(pager, brick);
     if (f == NULL)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     n->brick = brick + n->sample_step;
     if (is_of_four(n, id))
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     const struct incode_brick *b = &f->page.brick;
     const double p[3] = {b->x[0], b->y[0], b->z[0]};
     uint32_t v = incode_complex_add(x, p, id);
@@ -268,15 +268,15 @@ static enum incode_insertion_step sample(struct incode_insertion *n) {
     if (v == INCODE_NONE ||
         !incode_complex_insert(x, &n->maker->counts.tally, v, n->near)) {
         n->stage = INCODE_INSERTION_REST; /* it has taken the room */
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     }
     incode_insertion_note(n, id);
     n->vertices++;
     n->near = v;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
-static enum incode_insertion_step load(struct incode_insertion *n) {
+static enum incode_step load(struct incode_insertion *n) {
     struct incode_pager *pager = &n->maker->pager;
     (void)incode_pager_get(pager, n->brick); /* with the first credit */
     for (uint32_t i = 1; i < INCODE_INSERTION_AHEAD && n->brick + i < n->to;
@@ -284,7 +284,7 @@ static enum incode_insertion_step load(struct incode_insertion *n) {
         (void)incode_pager_get(pager, n->brick + i);
     const struct incode_frame *f = incode_pager_get(pager, n->brick);
     if (f == NULL)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     const struct incode_brick *b = &f->page.brick;
     incode_maker_yield(n->maker, f->count / LOAD_A_UNIT);
     for (uint32_t i = 0; i < f->count; i++) {
@@ -301,7 +301,7 @@ static enum incode_insertion_step load(struct incode_insertion *n) {
     }
     if (++n->brick == n->to)
         n->stage = INCODE_INSERTION_BEGIN;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The first point from `from` on, all around, that is not on the line of two or
@@ -322,27 +322,27 @@ static uint32_t find_off(struct incode_insertion *n, uint32_t from,
 }
 
 /* Begins with the four points, or looks for more of them elsewhere. */
-static enum incode_insertion_step begin_with(struct incode_insertion *n) {
+static enum incode_step begin_with(struct incode_insertion *n) {
     n->near = n->four[0];
     n->stage = INCODE_INSERTION_SPAN;
     if (n->four_count < 4)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     if (!incode_complex_begin(&n->complex, &n->maker->counts.tally, n->four))
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     n->vertices += 4;
     n->stage = INCODE_INSERTION_INSERT;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* Four points that span space, as far as these bricks have them, far apart in
  * their order. */
-static enum incode_insertion_step find_four(struct incode_insertion *n) {
+static enum incode_step find_four(struct incode_insertion *n) {
     uint32_t all = n->complex.points - 1, *four = n->four;
     four[0] = 1;
     four[1] = 1 + all / 2;
     n->four_count = 2;
     if (all < 4)
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     four[2] = find_off(n, all / 4, four, 2);
     n->four_count += four[2] != 0;
     four[3] = four[2] == 0 ? 0 : find_off(n, all / 4 * 3, four, 3);
@@ -355,20 +355,20 @@ static enum incode_insertion_step find_four(struct incode_insertion *n) {
  * a lake: the first points of others may be elsewhere.  Where they are not, the
  * set goes by faces, whose search of a first tetrahedron says whether there is
  * one at all. */
-static enum incode_insertion_step span(struct incode_insertion *n) {
+static enum incode_step span(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
     const struct incode_complex_point *q = x->point;
     uint32_t bricks = n->maker->tree.bricks;
     n->brick = past_own(n, n->brick);
     if (n->brick >= bricks)
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     for (uint32_t i = 1; i < INCODE_INSERTION_AHEAD && n->brick + i < bricks;
          i++)
         (void)incode_pager_get(pager, n->brick + i);
     const struct incode_frame *f = incode_pager_get(pager, n->brick);
     if (f == NULL)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     const double p[3] = {f->page.brick.x[0], f->page.brick.y[0],
                          f->page.brick.z[0]};
     uint32_t id = n->brick++ * INCODE_BRICK_POINTS, *four = n->four;
@@ -377,20 +377,20 @@ static enum incode_insertion_step span(struct incode_insertion *n) {
             ? incode_collinear(q[four[0]].p, q[four[1]].p, p)
             : incode_orient3d(&n->maker->counts.tally, q[four[0]].p,
                               q[four[1]].p, q[four[2]].p, p) == 0)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     four[n->four_count] = incode_complex_add(x, p, id);
     if (four[n->four_count++] == INCODE_NONE)
-        return INCODE_INSERTION_FULL;
+        return INCODE_FULL;
     return begin_with(n);
 }
 
-static enum incode_insertion_step begin(struct incode_insertion *n) {
+static enum incode_step begin(struct incode_insertion *n) {
     n->next = 0;
     n->level = 0;
     for (uint32_t left = n->staged_count; left > SAMPLE; left >>= ROUND)
         n->level++;
     n->stage = INCODE_INSERTION_INSERT;
-    return n->complex.cells == 0 ? find_four(n) : INCODE_INSERTION_WORKED;
+    return n->complex.cells == 0 ? find_four(n) : INCODE_WORKED;
 }
 
 /* The round in which a point is inserted: a random sample first, four times as
@@ -405,7 +405,7 @@ static unsigned round_of(uint32_t id) {
 }
 
 /* Inserts points of the round, or begins the next. */
-static enum incode_insertion_step insert(struct incode_insertion *n) {
+static enum incode_step insert(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_walker *walker = &n->maker->walker;
     unsigned done = 0;
@@ -417,7 +417,7 @@ static enum incode_insertion_step insert(struct incode_insertion *n) {
                 continue;
             if (done > 0 &&
                 (done == INCODE_INSERTION_STEPS || walker->left == 0))
-                return INCODE_INSERTION_WORKED;
+                return INCODE_WORKED;
             incode_walker_spend(walker, INCODE_INSERTION_UNITS);
             if (!incode_complex_insert(x, &n->maker->counts.tally, v, n->near))
                 return make_room(n);
@@ -428,8 +428,7 @@ static enum incode_insertion_step insert(struct incode_insertion *n) {
     }
     n->next = 0;
     if (n->level-- > 0)
-        return n->whole && !will_fit(n) ? make_room(n)
-                                        : INCODE_INSERTION_WORKED;
+        return n->whole && !will_fit(n) ? make_room(n) : INCODE_WORKED;
     n->from = n->to;
     n->stage = is_short(n) ? INCODE_INSERTION_REST : INCODE_INSERTION_CHOOSE;
     if (!n->sampled) { /* after the first bricks */
@@ -437,12 +436,12 @@ static enum incode_insertion_step insert(struct incode_insertion *n) {
         n->brick = 0;
         n->stage = INCODE_INSERTION_SAMPLE;
     }
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* ---- steps ---- */
 
-static enum incode_insertion_step step(struct incode_insertion *n) {
+static enum incode_step step(struct incode_insertion *n) {
     switch (n->stage) {
     case INCODE_INSERTION_CHOOSE:
         return choose(n);
@@ -476,7 +475,7 @@ static enum incode_insertion_step step(struct incode_insertion *n) {
         return incode_insertion_commit(n);
     case INCODE_INSERTION_DONE:
     default:
-        return INCODE_INSERTION_FINISHED;
+        return INCODE_FINISHED;
     }
 }
 
@@ -487,10 +486,10 @@ static void note_used(struct incode_insertion *n) {
     n->used = used > n->used ? used : n->used;
 }
 
-enum incode_insertion_step incode_insertion_step(struct incode_insertion *n) {
-    enum incode_insertion_step r = INCODE_INSERTION_WORKED;
-    for (unsigned i = 0;
-         i < INCODE_INSERTION_STEPS && r == INCODE_INSERTION_WORKED; i++) {
+enum incode_step incode_insertion_step(struct incode_insertion *n) {
+    enum incode_step r = INCODE_WORKED;
+    for (unsigned i = 0; i < INCODE_INSERTION_STEPS && r == INCODE_WORKED;
+         i++) {
         incode_maker_yield(n->maker, A_STEP);
         r = step(n);
         note_used(n);

@@ -93,12 +93,6 @@ uint64_t incode_regions_meeting_lifted(const struct incode_regions *regions,
 
 enum { INCODE_LOOK_CELLS = INCODE_REGIONS };
 
-enum incode_look_result {
-    INCODE_LOOK_DONE,
-    INCODE_LOOK_MORE,   /* call again */
-    INCODE_LOOK_WAITING /* for a page, which is asked for */
-};
-
 struct incode_look {
     struct incode_maker *maker;
     double scale; /* 2^k, of relative coordinates */
@@ -132,7 +126,7 @@ void incode_look_add(struct incode_look *look, const struct incode_complex *x,
                      uint32_t cell);
 
 /* Looks at some pages. */
-enum incode_look_result incode_look_go(struct incode_look *look);
+enum incode_step incode_look_go(struct incode_look *look);
 
 /* Whether cell i of those added may reach a brick. */
 static inline bool incode_look_has_reached(const struct incode_look *look,
@@ -175,13 +169,6 @@ enum {
     INCODE_INSERTION_LISTED = 1024,    /* cells */
     INCODE_INSERTION_LEAST = 40 << 10, /* bytes */
     INCODE_INSERTION_KNOWN = 32        /* part of the memory, below */
-};
-
-enum incode_insertion_step {
-    INCODE_INSERTION_WORKED,  /* call again */
-    INCODE_INSERTION_WAITING, /* for a page, or for room outside */
-    INCODE_INSERTION_FULL,    /* what is not final does not fit */
-    INCODE_INSERTION_FINISHED /* the own bricks are committed */
 };
 
 struct incode_insertion {
@@ -285,7 +272,7 @@ incode_insertion_has_committed(const struct incode_insertion *n,
     return (n->committed[brick / 64] >> brick % 64 & 1) != 0;
 }
 
-enum incode_insertion_step incode_insertion_step(struct incode_insertion *n);
+enum incode_step incode_insertion_step(struct incode_insertion *n);
 
 /* The stages of an insertion, for the files of this room alone: insertion.c
  * takes points in, finality.c says which cells are final, emission.c emits and
@@ -301,19 +288,19 @@ enum {
 /* Begins to take the bricks [from, to) in. */
 void incode_insertion_take_in(struct incode_insertion *n);
 
-enum incode_insertion_step incode_insertion_rest(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_judge(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_look(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_visit(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_settle(struct incode_insertion *n);
+enum incode_step incode_insertion_rest(struct incode_insertion *n);
+enum incode_step incode_insertion_judge(struct incode_insertion *n);
+enum incode_step incode_insertion_look(struct incode_insertion *n);
+enum incode_step incode_insertion_visit(struct incode_insertion *n);
+enum incode_step incode_insertion_settle(struct incode_insertion *n);
 
 /* Begins to emit the cells that are proved. */
 void incode_insertion_begin_list(struct incode_insertion *n);
 
-enum incode_insertion_step incode_insertion_list(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_release(struct incode_insertion *n);
-enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n);
+enum incode_step incode_insertion_list(struct incode_insertion *n);
+enum incode_step incode_insertion_emit(struct incode_insertion *n);
+enum incode_step incode_insertion_release(struct incode_insertion *n);
+enum incode_step incode_insertion_commit(struct incode_insertion *n);
 
 static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i) {
     bits[i / 64] |= UINT64_C(1) << i % 64;
@@ -359,8 +346,8 @@ void incode_fallback_begin(struct incode_fallback *h,
                            struct incode_insertion *n);
 
 /* front: idle, with the rule and the bricks of the job, which is its next one.
- * INCODE_INSERTION_FINISHED: all has gone out. */
-enum incode_insertion_step incode_fallback_step(struct incode_fallback *h,
-                                                struct incode_front *front);
+ * INCODE_FINISHED: all has gone out. */
+enum incode_step incode_fallback_step(struct incode_fallback *h,
+                                      struct incode_front *front);
 
 #endif

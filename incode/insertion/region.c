@@ -365,7 +365,7 @@ void incode_insertion_begin_list(struct incode_insertion *n) {
 
 /* Lists some final tetrahedra by the vertex that owns them; the triangulation
  * is set right when they are released. */
-enum incode_insertion_step incode_insertion_list(struct incode_insertion *n) {
+enum incode_step incode_insertion_list(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t end = x->cells - n->cell < INCODE_INSERTION_CELLS
                        ? x->cells
@@ -383,10 +383,10 @@ enum incode_insertion_step incode_insertion_list(struct incode_insertion *n) {
         owner->cell = n->cell;
     }
     if (n->cell < x->cells)
-        return INCODE_INSERTION_WORKED;
+        return INCODE_WORKED;
     n->v = n->fetched = 1;
     n->stage = INCODE_INSERTION_EMIT;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The vertices of a cell after v, so that all have positive orientation. */
@@ -407,12 +407,12 @@ static uint32_t next_of(const struct incode_cell *c) {
 }
 
 /* Emits tetrahedra of v, as far as there is room for them. */
-static enum incode_insertion_step emit_some(struct incode_insertion *n,
-                                            struct incode_complex_point *v) {
+static enum incode_step emit_some(struct incode_insertion *n,
+                                  struct incode_complex_point *v) {
     const struct incode_complex *x = &n->complex;
     size_t room = n->outside.emit_room(n->outside.context), count = 0;
     if (room == 0)
-        return INCODE_INSERTION_WAITING;
+        return INCODE_WAITING;
     if (room > INCODE_INSERTION_EMITTED)
         room = INCODE_INSERTION_EMITTED;
     for (; v->cell != INCODE_NONE && count < room; count++) {
@@ -425,7 +425,7 @@ static enum incode_insertion_step emit_some(struct incode_insertion *n,
     n->kept += count;
     incode_maker_yield(n->maker, (uint32_t)count / EMIT_A_BREATH);
     incode_walker_spend(&n->maker->walker, (uint32_t)count / EMIT_A_UNIT);
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* The lists of the points from v on come into the cache, all at a time: one
@@ -455,7 +455,7 @@ static void fetch(const struct incode_insertion *n) {
     }
 }
 
-enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n) {
+enum incode_step incode_insertion_emit(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     if (n->v >= n->fetched) {
         fetch(n);
@@ -466,18 +466,17 @@ enum incode_insertion_step incode_insertion_emit(struct incode_insertion *n) {
             return emit_some(n, &x->point[n->v]);
     if (n->v == x->points)
         n->stage = INCODE_INSERTION_RELEASE;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 /* Releases what has been emitted. */
-enum incode_insertion_step
-incode_insertion_release(struct incode_insertion *n) {
+enum incode_step incode_insertion_release(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     uint32_t words = (n->maker->tree.bricks + 63) / 64, latest = 0;
     uint32_t free = x->free_count;
     incode_complex_release(x, &n->maker->counts.tally.yield);
     if (free == x->free_count && !n->closed)
-        return INCODE_INSERTION_FULL; /* all of it is kept for bricks to come */
+        return INCODE_FULL; /* all of it is kept for bricks to come */
     memset(n->touched, 0, words * sizeof *n->touched);
     for (uint32_t v = 1; v < x->points; v++) {
         uint32_t id = x->point[v].id;
@@ -493,7 +492,7 @@ incode_insertion_release(struct incode_insertion *n) {
     }
     n->brick = n->own_first;
     n->stage = INCODE_INSERTION_COMMIT;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }
 
 static bool is_half_full(const struct incode_insertion *n) {
@@ -502,7 +501,7 @@ static bool is_half_full(const struct incode_insertion *n) {
 }
 
 /* Commits the bricks at whose points no cell is left. */
-enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n) {
+enum incode_step incode_insertion_commit(struct incode_insertion *n) {
     for (; n->brick < n->from; n->brick++) {
         if (n->brick % AT_ONCE == 0)
             incode_maker_yield(n->maker, 1);
@@ -510,7 +509,7 @@ enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n) {
             incode_insertion_has_committed(n, n->brick))
             continue;
         if (n->outside.emit_room(n->outside.context) == 0)
-            return INCODE_INSERTION_WAITING;
+            return INCODE_WAITING;
         incode_maker_yield(n->maker, 1);
         incode_insertion_set_bit(n->committed, n->brick);
         n->outside.commit(n->outside.context, n->brick);
@@ -525,5 +524,5 @@ enum incode_insertion_step incode_insertion_commit(struct incode_insertion *n) {
         incode_insertion_take_in(n);
     else
         n->stage = INCODE_INSERTION_CHOOSE;
-    return INCODE_INSERTION_WORKED;
+    return INCODE_WORKED;
 }

@@ -151,20 +151,20 @@ static void share_apex(struct incode_lent *lent, const uint32_t t[4]) {
     }
 }
 
-static enum incode_outcome answer_face(struct incode_builder *b,
-                                       struct incode_lent *lent) {
+static enum incode_step answer_face(struct incode_builder *b,
+                                    struct incode_lent *lent) {
     struct incode_answer a;
     uint32_t i = lent->done, done = 0;
     uint64_t before = b->maker.counts.candidates;
     if ((lent->known[i / 64] >> i % 64 & 1) != 0)
-        return INCODE_ANSWERED;
-    enum incode_outcome r = incode_maker_apexes(
+        return INCODE_FINISHED;
+    enum incode_step r = incode_maker_apexes(
         &b->maker, (unsigned)(lent - b->lent),
         (const uint32_t(*)[3])lent->list.v + i, 1, &a, &done);
     uint64_t looked = b->maker.counts.candidates - before;
     incode_walker_spend(&b->maker.walker,
                         1 + (uint32_t)(looked / INCODE_BRICK_POINTS));
-    if (r == INCODE_ANSWERED) {
+    if (r == INCODE_FINISHED) {
         memcpy(lent->answers.v[i], a.f, sizeof a.f);
         b->built += a.f[3] != INCODE_NONE;
         if (a.f[3] != INCODE_NONE)
@@ -173,30 +173,30 @@ static enum incode_outcome answer_face(struct incode_builder *b,
     return r;
 }
 
-static enum incode_outcome answer_first(struct incode_builder *b,
-                                        struct incode_lent *lent) {
+static enum incode_step answer_first(struct incode_builder *b,
+                                     struct incode_lent *lent) {
     struct incode_answer a;
-    enum incode_outcome r = incode_maker_first(
+    enum incode_step r = incode_maker_first(
         &b->maker, (unsigned)(lent - b->lent), lent->list.v[0][0], &a);
     incode_walker_spend(&b->maker.walker, 1);
-    if (r == INCODE_ANSWERED && b->maker.fault == NULL) {
+    if (r == INCODE_FINISHED && b->maker.fault == NULL) {
         memcpy(lent->answers.v[0], a.f, sizeof a.f);
         b->built++;
     }
     return r;
 }
 
-static enum incode_outcome answer_count(struct incode_builder *b,
-                                        struct incode_lent *lent) {
+static enum incode_step answer_count(struct incode_builder *b,
+                                     struct incode_lent *lent) {
     uint32_t i = lent->done, brick = lent->list.v[i][0];
     uint32_t count = incode_maker_count(&b->maker, brick);
     const uint32_t answer[4] = {brick, count, 0, 0};
     incode_walker_spend(&b->maker.walker, 1);
     b->maker.search[lent - b->lent].page = brick;
     if (count == 0)
-        return INCODE_WAIT;
+        return INCODE_WAITING;
     memcpy(lent->answers.v[i], answer, sizeof answer);
-    return INCODE_ANSWERED;
+    return INCODE_FINISHED;
 }
 
 /* ---- steps ---- */
@@ -221,16 +221,16 @@ static struct incode_lent *choose(const struct incode_builder *b) {
 
 static enum incode_step go_on(struct incode_builder *b,
                               struct incode_lent *lent) {
-    enum incode_outcome r = INCODE_ANSWERED;
-    while (r == INCODE_ANSWERED && lent->done < lent->list.count &&
+    enum incode_step r = INCODE_FINISHED;
+    while (r == INCODE_FINISHED && lent->done < lent->list.count &&
            b->maker.walker.left > 0 && b->maker.fault == NULL) {
         r = lent->list.kind == INCODE_LIST_FACES   ? answer_face(b, lent)
             : lent->list.kind == INCODE_LIST_FIRST ? answer_first(b, lent)
                                                    : answer_count(b, lent);
-        lent->done += r == INCODE_ANSWERED;
-        lent->retries = r == INCODE_ANSWERED ? 0 : lent->retries;
+        lent->done += r == INCODE_FINISHED;
+        lent->retries = r == INCODE_FINISHED ? 0 : lent->retries;
     }
-    if (r != INCODE_WAIT)
+    if (r != INCODE_WAITING)
         return INCODE_WORKED;
     unsigned slot = (unsigned)(lent - b->lent);
     b->faults += lent->retries == 0;

@@ -13,6 +13,16 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* What a part of the work has come to, in all rooms of incode. */
+enum incode_step {
+    INCODE_WORKED,   /* not yet done: call again */
+    INCODE_WAITING,  /* for a page, for an answer, or for room outside */
+    INCODE_FINISHED, /* done: what was asked for is there */
+    INCODE_AGAIN,    /* not done: begin again at the vertex, without waiting */
+    INCODE_FULL,     /* it does not fit the memory that is given */
+    INCODE_BROKEN    /* an invariant failed: see the module's `fault` */
+};
+
 enum {
     INCODE_YIELD_UNITS = 64,
     INCODE_YIELD_UNITS_MAX = 1 << 20,

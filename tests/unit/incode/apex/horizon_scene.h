@@ -221,8 +221,8 @@ static inline uint32_t draw_vertex(const struct scene *s, uint32_t brick) {
 }
 
 /* The horizon of a brick, of some times its extent. */
-static inline enum incode_horizon_made
-try_horizon(struct scene *s, uint32_t brick, double reach, uint32_t *missing) {
+static inline enum incode_step try_horizon(struct scene *s, uint32_t brick,
+                                           double reach, uint32_t *missing) {
     double extent = 0;
     incode_frame_box(frame_of(s, brick), s->lo, s->hi);
     for (int d = 0; d < 3; d++)
@@ -237,10 +237,9 @@ try_horizon(struct scene *s, uint32_t brick, double reach, uint32_t *missing) {
 /* Smaller and smaller, until there is room. */
 static inline void make_horizon(struct scene *s, uint32_t brick, double reach) {
     uint32_t missing;
-    enum incode_horizon_made made;
-    while ((made = try_horizon(s, brick, reach, &missing)) !=
-           INCODE_HORIZON_MADE)
-        if (made == INCODE_HORIZON_WAIT)
+    enum incode_step made;
+    while ((made = try_horizon(s, brick, reach, &missing)) != INCODE_FINISHED)
+        if (made == INCODE_WAITING)
             deliver(s);
         else
             reach *= 0.75;
@@ -269,15 +268,14 @@ static inline bool split_all(struct scene *s,
         r.count = incode_horizon_reached(s->h, cap, done, r.index);
         for (uint32_t i = 0; i < r.count; i++) {
             uint32_t at = r.index[i], missing;
-            enum incode_horizon_made made;
+            enum incode_step made;
             if (s->h->level[at] == 0)
                 continue;
             any = true;
             while ((made = incode_horizon_split(s->h, &s->walker, at, cap,
-                                                &missing)) ==
-                   INCODE_HORIZON_WAIT)
+                                                &missing)) == INCODE_WAITING)
                 deliver(s);
-            if (made == INCODE_HORIZON_FULL)
+            if (made == INCODE_FULL)
                 return false;
             done[at / 64] |= UINT64_C(1) << (at % 64);
         }

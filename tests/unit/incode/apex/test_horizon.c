@@ -253,7 +253,7 @@ static void try_walk(struct scene *s, const char *name, struct tried *tried) {
             incode_sphere_refine(&q.sphere, f.v, f.b, f.c, f.a, f.scale);
         incode_query_start(&q, f.id[3], f.a);
     }
-    while (incode_walk(&s->walker, &q, see, &seen) == INCODE_WALK_WAIT)
+    while (incode_walk(&s->walker, &q, see, &seen) == INCODE_WAITING)
         deliver(s);
     tried->walks++;
     for (uint32_t b = 0; b < s->order.bricks; b++) {

@@ -18,7 +18,7 @@ TEST(a_missing_page_is_named) {
     struct incode_horizon_cap cap;
     open_scene(&s, terrain, 20000);
     brick = s.order.bricks / 2;
-    while (try_horizon(&s, brick, 0.5, &missing) == INCODE_HORIZON_WAIT) {
+    while (try_horizon(&s, brick, 0.5, &missing) == INCODE_WAITING) {
         assert_true(missing >= s.order.bricks);
         assert_true(missing < s.order.tree.pages);
         assert_true(waits > 0 || missing == s.order.tree.pages - 1);
@@ -44,7 +44,7 @@ TEST(a_missing_page_is_named) {
     uint32_t at = r.index[i], left = s.h->left[at];
     forget_pages(&s);
     assert_int_equal(incode_horizon_split(s.h, &s.walker, at, &cap, &missing),
-                     INCODE_HORIZON_WAIT);
+                     INCODE_WAITING);
     assert_int_equal(missing, s.h->page[at]);
     assert_true(s.h->count == count && s.h->left[at] == left);
     deliver(&s);
@@ -52,7 +52,7 @@ TEST(a_missing_page_is_named) {
     for (int k = 0; k < 2; k++) {
         assert_int_equal(
             incode_horizon_split(s.h, &s.walker, at, &cap, &missing),
-            INCODE_HORIZON_MADE);
+            INCODE_FINISHED);
         assert_true(s.h->count > count && s.h->left[at] != left);
         assert_int_equal(s.h->count - count,
                          __builtin_popcount(left & ~s.h->left[at]));
@@ -67,8 +67,7 @@ TEST(too_many_bricks_are_told) {
     open_scene(&s, volume, 30000);
     for (uint32_t p = 0; p < s.order.tree.pages; p++)
         (void)frame_of(&s, p);
-    assert_int_equal(try_horizon(&s, brick, 1e3, &missing),
-                     INCODE_HORIZON_FULL);
+    assert_int_equal(try_horizon(&s, brick, 1e3, &missing), INCODE_FULL);
     assert_int_equal(s.h->count, 0);
     assert_int_equal(s.h->centre, brick); /* it need not be tried again */
     assert_false(incode_horizon_holds(s.h, s.lo, s.hi));
@@ -172,7 +171,7 @@ TEST(a_box_misses_no_leaf) {
             }
             assert_true(incode_horizon_holds(s.h, q.lo, q.hi));
             while (incode_horizon_box(s.h, &s.walker, &q, see, &seen) ==
-                   INCODE_WALK_WAIT)
+                   INCODE_WAITING)
                 deliver(&s);
             for (uint32_t v = 0; v < s.order.bricks * INCODE_BRICK_POINTS;
                  v++) {

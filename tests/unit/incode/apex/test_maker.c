@@ -170,18 +170,18 @@ static void answer_all(struct bench *b) {
                 continue;
         }
         uint32_t before = s->done;
-        enum incode_outcome r = incode_maker_apexes(
+        enum incode_step r = incode_maker_apexes(
             &b->maker, slot, (const uint32_t(*)[3])b->face + s->first, s->count,
             s->answer, &s->done);
         assert_null(b->maker.fault);
-        idle = s->done > before || r == INCODE_MORE ? 0 : idle + 1;
+        idle = s->done > before || r == INCODE_WORKED ? 0 : idle + 1;
         assert_in_range(idle, 0, IDLE_MAX); /* or it goes in circles */
-        if (r == INCODE_WAIT) {
+        if (r == INCODE_WAITING) {
             assert_true(s->done < s->count);
             b->waits++;
             deliver(b);
         }
-        if (r != INCODE_ANSWERED)
+        if (r != INCODE_FINISHED)
             continue;
         assert_int_equal(s->done, s->count);
         for (uint32_t i = 0; i < s->count; i++)
@@ -259,12 +259,12 @@ TEST(first_tetrahedra) {
     for (uint32_t k = 0; k < 300; k++) {
         uint32_t v = draw(&b, b.solo.order.bricks * INCODE_BRICK_POINTS);
         struct incode_answer a;
-        enum incode_outcome r;
+        enum incode_step r;
         if (b.solo.order.row[v] == INCODE_NONE)
             continue;
-        while ((r = incode_maker_first(&b.maker, 3, v, &a)) == INCODE_WAIT)
+        while ((r = incode_maker_first(&b.maker, 3, v, &a)) == INCODE_WAITING)
             deliver(&b);
-        assert_int_equal(r, INCODE_ANSWERED);
+        assert_int_equal(r, INCODE_FINISHED);
         assert_null(b.maker.fault);
         assert_int_equal(a.f[0], v);
         assert_int_not_equal(a.f[3], INCODE_NONE);
@@ -287,7 +287,7 @@ TEST(abandoned) {
         struct incode_answer a;
         uint32_t done = 0, left = draw(&b, 10);
         while (incode_maker_apexes(&b.maker, 0, f, 1, &a, &done) !=
-                   INCODE_ANSWERED &&
+                   INCODE_FINISHED &&
                left-- > 0)
             deliver(&b);
         if (done == 1)
@@ -311,7 +311,7 @@ TEST(waiting_and_ahead) {
     assert_int_equal(incode_maker_apexes(&b.maker, 4,
                                          (const uint32_t(*)[3])b.face, 1, &a,
                                          &done),
-                     INCODE_WAIT);
+                     INCODE_WAITING);
     assert_int_equal(incode_maker_waiting(&b.maker, 1 << 4), 1 << 4);
     assert_int_equal(incode_maker_waiting(&b.maker, 0), 0);
     while (b.pages > 0)

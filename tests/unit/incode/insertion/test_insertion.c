@@ -133,7 +133,7 @@ static void start(size_t bytes, uint32_t first, uint32_t last) {
                            last);
 }
 
-static enum incode_insertion_step one_step(uint32_t units) {
+static enum incode_step one_step(uint32_t units) {
     world.solo.t->maker.walker.left = units;
     return incode_insertion_step(&world.n);
 }
@@ -159,15 +159,15 @@ static void check_final(void) {
 }
 
 /* To its end: finished, or full. */
-static enum incode_insertion_step finish(uint32_t units) {
-    enum incode_insertion_step r = INCODE_INSERTION_WORKED;
-    for (uint32_t i = 0; r <= INCODE_INSERTION_WAITING; i++) {
+static enum incode_step finish(uint32_t units) {
+    enum incode_step r = INCODE_WORKED;
+    for (uint32_t i = 0; r <= INCODE_WAITING; i++) {
         assert_in_range(i, 0, 10000000);
         bool settling = world.n.stage < INCODE_INSERTION_LIST;
         r = one_step(units);
         if (settling && world.n.stage == INCODE_INSERTION_LIST)
             check_final();
-        if (r == INCODE_INSERTION_WAITING)
+        if (r == INCODE_WAITING)
             assert_true(solo_deliver(&world.solo));
     }
     return r;
@@ -221,16 +221,16 @@ static enum outcome try_memory(size_t bytes) {
     uint32_t bricks = world.solo.order.bricks;
     start(bytes, 0, bricks);
     uint64_t releases = world.n.releases, vertices = world.n.vertices;
-    enum incode_insertion_step r = finish(1);
+    enum incode_step r = finish(1);
     assert_in_range(world.n.used, 0, bytes);
-    if (r == INCODE_INSERTION_FINISHED) {
-        assert_int_equal(one_step(9), INCODE_INSERTION_FINISHED);
+    if (r == INCODE_FINISHED) {
+        assert_int_equal(one_step(9), INCODE_FINISHED);
         assert_int_equal(world.committed, bricks);
         assert_int_equal(world.n.vertices - vertices, world.solo.order.points);
         compare();
         return world.n.releases - releases > 1 ? STREAMED : AT_ONCE;
     }
-    assert_int_equal(r, INCODE_INSERTION_FULL);
+    assert_int_equal(r, INCODE_FULL);
     if (!world.n.emitted)
         assert_int_equal(world.emitted + world.committed, 0);
     else
@@ -289,7 +289,7 @@ TEST(each_range_of_bricks) {
         for (uint32_t last = first + 1; last <= bricks; last++) {
             uint64_t kept = world.n.kept, vertices = world.n.vertices;
             start(WHOLE, first, last);
-            assert_int_equal(finish(UINT32_MAX), INCODE_INSERTION_FINISHED);
+            assert_int_equal(finish(UINT32_MAX), INCODE_FINISHED);
             assert_int_equal(world.committed, last - first);
             assert_int_equal(world.n.kept - kept, world.emitted);
             assert_in_range(world.n.vertices - vertices,
@@ -305,7 +305,7 @@ TEST(each_range_of_bricks) {
     /* Brick after brick, all of it. */
     for (uint32_t first = 0; first < bricks; first++) {
         start(WHOLE, first, first + 1);
-        assert_int_equal(finish(UINT32_MAX), INCODE_INSERTION_FINISHED);
+        assert_int_equal(finish(UINT32_MAX), INCODE_FINISHED);
     }
     assert_int_equal(world.solo.tets.count, all);
     compare();
@@ -319,12 +319,12 @@ TEST(jobs_that_are_left) {
     for (uint32_t steps = 0; steps < 120; steps++) {
         start(steps % 2 ? WHOLE : 50000, steps % bricks, bricks);
         for (uint32_t i = 0; i < steps; i++)
-            if (one_step(5) == INCODE_INSERTION_WAITING)
+            if (one_step(5) == INCODE_WAITING)
                 (void)solo_deliver(&world.solo);
         host_tetrahedra_cut(&world.solo.tets, 0);
         memset(world.solo.committed, 0, bricks);
         start(WHOLE, 0, bricks);
-        assert_int_equal(finish(UINT32_MAX), INCODE_INSERTION_FINISHED);
+        assert_int_equal(finish(UINT32_MAX), INCODE_FINISHED);
         compare();
     }
     close_world();
@@ -335,7 +335,7 @@ TEST(jobs_that_are_left) {
 TEST(rooms) {
     open_made("hub", 400);
     for (size_t room = 1; room < 300; room += room < 8 ? 1 : 71) {
-        enum incode_insertion_step r;
+        enum incode_step r;
         uint32_t waits = 0;
         start(WHOLE, 0, world.solo.order.bricks);
         do {
@@ -344,12 +344,12 @@ TEST(rooms) {
             world.room = 0;
             r = one_step(1);
             assert_int_equal(world.emitted, before);
-            waits += r == INCODE_INSERTION_WAITING;
+            waits += r == INCODE_WAITING;
             world.room = room;
             r = one_step(1);
             assert_in_range(world.emitted - before, 0, room);
             (void)solo_deliver(&world.solo);
-        } while (r != INCODE_INSERTION_FINISHED);
+        } while (r != INCODE_FINISHED);
         assert_in_range(waits, 1, UINT32_MAX);
         compare();
     }
@@ -367,13 +367,13 @@ TEST(pages) {
         pager->loading_max = chance < 3 ? 1 : 16;
         world.room = ROOM_MANY;
         start(2 << 20, 0, world.solo.order.bricks);
-        enum incode_insertion_step r = INCODE_INSERTION_WORKED;
-        while (r <= INCODE_INSERTION_WAITING) {
+        enum incode_step r = INCODE_WORKED;
+        while (r <= INCODE_WAITING) {
             r = one_step(64);
-            if (r == INCODE_INSERTION_WAITING)
+            if (r == INCODE_WAITING)
                 (void)solo_deliver(&world.solo);
         }
-        assert_int_equal(r, INCODE_INSERTION_FINISHED);
+        assert_int_equal(r, INCODE_FINISHED);
         assert_in_range(pager->requests - before, 0,
                         world.solo.order.bricks + 4);
         compare();
@@ -386,7 +386,7 @@ TEST(steps_are_short) {
     open_made("uniform", 700);
     start(WHOLE, 0, world.solo.order.bricks);
     uint32_t steps = 0, cells = 0, most = 0;
-    enum incode_insertion_step r;
+    enum incode_step r;
     do {
         const struct incode_complex *x = &world.n.complex;
         uint32_t left = 0, listed = world.n.cell, calls = world.calls;
@@ -404,10 +404,10 @@ TEST(steps_are_short) {
             most = cells > most ? cells : most;
         }
         assert_in_range(world.calls - calls, 0, 1);
-        if (r == INCODE_INSERTION_WAITING)
+        if (r == INCODE_WAITING)
             (void)solo_deliver(&world.solo);
         steps++;
-    } while (r != INCODE_INSERTION_FINISHED);
+    } while (r != INCODE_FINISHED);
     assert_in_range(most, 1, 64);
     assert_true(steps > 700);
     compare();
@@ -418,7 +418,7 @@ TEST(steps_are_short) {
 
 static void *insert_all(void *unused) {
     (void)unused;
-    while (one_step(UINT32_MAX) == INCODE_INSERTION_WORKED)
+    while (one_step(UINT32_MAX) == INCODE_WORKED)
         continue;
     return NULL;
 }
@@ -433,7 +433,7 @@ TEST(little_stack) {
         open_made(kinds[k], 400);
         start(4 << 20, 0, world.solo.order.bricks);
         while (world.n.stage <= INCODE_INSERTION_LOAD)
-            if (one_step(UINT32_MAX) == INCODE_INSERTION_WAITING)
+            if (one_step(UINT32_MAX) == INCODE_WAITING)
                 (void)solo_deliver(&world.solo);
         world.room = 0;
         assert_int_equal(pthread_attr_init(&attributes), 0);
@@ -445,7 +445,7 @@ TEST(little_stack) {
         (void)pthread_attr_destroy(&attributes);
         assert_int_equal(world.n.stage, INCODE_INSERTION_EMIT);
         world.room = ROOM_MANY;
-        assert_int_equal(finish(UINT32_MAX), INCODE_INSERTION_FINISHED);
+        assert_int_equal(finish(UINT32_MAX), INCODE_FINISHED);
         compare();
         close_world();
     }
@@ -494,12 +494,12 @@ static void expect_no_space(const double (*p)[3], uint32_t n) {
     assert_non_null(world.solo.t);
     incode_insertion_init(&world.n, &world.solo.t->maker, &outside.front);
     start(WHOLE, 0, setup.bricks);
-    enum incode_insertion_step r = INCODE_INSERTION_WAITING;
-    while (r <= INCODE_INSERTION_WAITING) {
+    enum incode_step r = INCODE_WAITING;
+    while (r <= INCODE_WAITING) {
         r = one_step(UINT32_MAX);
         bare_deliver(world.solo.t, &bare);
     }
-    assert_int_equal(r, INCODE_INSERTION_FULL);
+    assert_int_equal(r, INCODE_FULL);
     assert_int_equal(world.emitted + world.committed, 0);
     free(world.memory);
     free(world.bits);
@@ -534,7 +534,7 @@ TEST(hardly_any_space) {
         open_points(p[0], COUNT);
         expect(p[0], COUNT);
         start(WHOLE, 0, world.solo.order.bricks);
-        assert_int_equal(finish(UINT32_MAX), INCODE_INSERTION_FINISHED);
+        assert_int_equal(finish(UINT32_MAX), INCODE_FINISHED);
         compare();
         close_world();
     }

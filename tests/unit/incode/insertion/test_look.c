@@ -54,7 +54,7 @@ struct told {
 /* Looks at cells [first, end) of a batch. */
 static void look_at(struct points_scene *s, const struct batch *b, bool every,
                     uint32_t first, uint32_t end, struct told *told) {
-    enum incode_look_result r;
+    enum incode_step r;
     incode_look_init(&look, &s->maker, b->passed.bits, told->wanted.bits);
     incode_look_begin(&look, every, b->pass_first, b->pass_last);
     for (uint32_t i = first; i < end; i++) {
@@ -63,11 +63,11 @@ static void look_at(struct points_scene *s, const struct batch *b, bool every,
     }
     assert_int_equal(incode_look_is_full(&look),
                      end - first == INCODE_LOOK_CELLS);
-    while ((r = incode_look_go(&look)) != INCODE_LOOK_DONE) {
-        if (r == INCODE_LOOK_WAITING)
+    while ((r = incode_look_go(&look)) != INCODE_FINISHED) {
+        if (r == INCODE_WAITING)
             points_deliver(s);
-        told->waiting += r == INCODE_LOOK_WAITING;
-        told->more += r == INCODE_LOOK_MORE;
+        told->waiting += r == INCODE_WAITING;
+        told->more += r == INCODE_WORKED;
     }
     told->reached = 0;
     for (uint32_t i = 0; i < end - first; i++)
