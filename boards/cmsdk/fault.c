@@ -15,6 +15,7 @@ enum { MMAR_VALID = 1 << 7, BFAR_VALID = 1 << 15 };
 /* The frame could not be laid down, or only in part. */
 enum { NO_FRAME = 1 << 4 | 1 << 5 | 1 << 12 | 1 << 13 };
 
+enum { OF_PROGRAM = 1 << 2 }; /* in EXC_RETURN: the program was interrupted */
 enum { FRAME_LR = 5, FRAME_PC = 6, FRAME_XPSR = 7, FRAME_WORDS = 8 };
 
 /* What a UART has of its own is the end of a report, or of a farewell. */
@@ -57,37 +58,52 @@ static void tell_place(struct cube_text *text, uint32_t exception,
     }
 }
 
-_Noreturn void cmsdk_fault(const uint32_t *frame, const uint32_t *saved,
+/* What start.S has pushed. */
+struct cmsdk_pushed {
+    const uint32_t *program, *handlers; /* stack pointers */
+    uint32_t r4_r11[8];
+};
+
+_Noreturn void cmsdk_fault(const struct cmsdk_pushed *pushed,
                            uint32_t exc_return, uint32_t exception);
-_Noreturn void cmsdk_fault(const uint32_t *frame, const uint32_t *saved,
+/* A program that hangs is reported at its own place, also where the watchdog
+ * came during a handler: that one's place is told beside it. */
+_Noreturn void cmsdk_fault(const struct cmsdk_pushed *pushed,
                            uint32_t exc_return, uint32_t exception) {
     static const uint32_t none[FRAME_WORDS];
     volatile uint32_t *scb = cmsdk_at(CORTEX_SCB);
     uint32_t status = scb[CFSR];
     uint32_t address = (status & MMAR_VALID) != 0 ? scb[MMFAR] : scb[BFAR];
+    bool in_handler = (exc_return & OF_PROGRAM) == 0;
+    const uint32_t *frame =
+        in_handler && exception != NMI ? pushed->handlers : pushed->program;
+    const uint32_t *saved = pushed->r4_r11;
     const uint32_t *f = sound(frame, status) ? frame : none;
-    struct bare_register registers[] = {{"pc", f[FRAME_PC]},
-                                        {"lr", f[FRAME_LR]},
-                                        {"xpsr", f[FRAME_XPSR]},
-                                        {"sp", (uintptr_t)frame},
-                                        {"r0", f[0]},
-                                        {"r1", f[1]},
-                                        {"r2", f[2]},
-                                        {"r3", f[3]},
-                                        {"r4", saved[0]},
-                                        {"r5", saved[1]},
-                                        {"r6", saved[2]},
-                                        {"r7", saved[3]},
-                                        {"r8", saved[4]},
-                                        {"r9", saved[5]},
-                                        {"r10", saved[6]},
-                                        {"r11", saved[7]},
-                                        {"r12", f[4]},
-                                        {"exc", exc_return},
-                                        {"cfsr", status},
-                                        {"hfsr", scb[HFSR]},
-                                        {"mmfar", scb[MMFAR]},
-                                        {"bfar", scb[BFAR]}};
+    bool both = in_handler && sound(pushed->handlers, status);
+    struct bare_register registers[] = {
+        {"pc", f[FRAME_PC]},
+        {"lr", f[FRAME_LR]},
+        {"xpsr", f[FRAME_XPSR]},
+        {"sp", (uintptr_t)frame},
+        {"r0", f[0]},
+        {"r1", f[1]},
+        {"r2", f[2]},
+        {"r3", f[3]},
+        {"r4", saved[0]},
+        {"r5", saved[1]},
+        {"r6", saved[2]},
+        {"r7", saved[3]},
+        {"r8", saved[4]},
+        {"r9", saved[5]},
+        {"r10", saved[6]},
+        {"r11", saved[7]},
+        {"r12", f[4]},
+        {"exc", exc_return},
+        {"cfsr", status},
+        {"hfsr", scb[HFSR]},
+        {"mmfar", scb[MMFAR]},
+        {"bfar", scb[BFAR]},
+        {"handler", both ? pushed->handlers[FRAME_PC] : 0}};
     char room[128];
     struct cube_text text = cube_text_in(room, sizeof room);
     tell_place(&text, exception, status, address);

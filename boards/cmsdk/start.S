@@ -83,20 +83,19 @@ function cmsdk_start
     bl bare_main
     .ltorg
 
-/* What no handler is for: with the frame that the processor has laid down, the
- * other registers, and on a stack of its own. */
+/* An exception without a handler.  It goes on with a stack of its own.  Pushed
+ * are the registers that the processor has not saved, and both stack pointers:
+ * a frame lies at each where the watchdog comes during a handler. */
 function cmsdk_fault_entry
     cpsid i
-    tst lr, #4
-    ite eq
-    mrseq r0, msp
-    mrsne r0, psp
-    ldr r1, =bare_fault_stack_end
-    mov sp, r1
-    push {r4-r11}
-    mov r1, sp
-    mov r2, lr
-    mrs r3, ipsr
+    mrs r0, psp
+    mrs r1, msp
+    ldr r2, =bare_fault_stack_end
+    mov sp, r2
+    push {r0, r1, r4-r11}
+    mov r0, sp
+    mov r1, lr
+    mrs r2, ipsr
     bl cmsdk_fault
     .ltorg
 

@@ -10,6 +10,11 @@ struct raspi3b_frame {
     uint64_t sp_program, sp_handler, elr, spsr, esr, far;
 };
 
+/* The end of what raspi3b_irq pushes first onto the handlers' stack. */
+struct raspi3b_interrupted {
+    uint64_t lr, elr, spsr, unused[2];
+};
+
 /* Exception classes of ESR. */
 enum { FETCH = 0x21, ACCESS = 0x25 };
 
@@ -31,20 +36,43 @@ static void tell_place(struct cube_text *text,
     }
 }
 
-_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame,
-                             unsigned vector);
-_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame,
-                             unsigned vector) {
+_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame, unsigned vector,
+                             const struct raspi3b_interrupted *interrupted);
+/* A program that hangs is reported at its own place, also where the guard came
+ * during a handler: that one's place is told beside it. */
+_Noreturn void raspi3b_fault(const struct raspi3b_frame *frame, unsigned vector,
+                             const struct raspi3b_interrupted *interrupted) {
     const uint64_t *x = frame->x;
-    uint64_t sp = vector < 4 ? frame->sp_program : frame->sp_handler;
+    bool in_handler = vector >= 4;
+    uint64_t sp = in_handler ? frame->sp_handler : frame->sp_program;
+    uint64_t pc = frame->elr, lr = x[30];
+    if (in_handler && vector % 4 == FAST) {
+        pc = interrupted->elr;
+        lr = interrupted->lr;
+        sp = frame->sp_program;
+    }
     struct bare_register registers[] = {
-        {"pc", frame->elr},  {"lr", x[30]},       {"sp", sp},
-        {"esr", frame->esr}, {"far", frame->far}, {"spsr", frame->spsr},
-        {"x0", x[0]},        {"x1", x[1]},        {"x2", x[2]},
-        {"x3", x[3]},        {"x4", x[4]},        {"x5", x[5]},
-        {"x6", x[6]},        {"x7", x[7]},        {"x8", x[8]},
-        {"x19", x[19]},      {"x20", x[20]},      {"x21", x[21]},
-        {"x22", x[22]},      {"x29", x[29]}};
+        {"pc", pc},
+        {"lr", lr},
+        {"sp", sp},
+        {"esr", frame->esr},
+        {"far", frame->far},
+        {"spsr", frame->spsr},
+        {"x0", x[0]},
+        {"x1", x[1]},
+        {"x2", x[2]},
+        {"x3", x[3]},
+        {"x4", x[4]},
+        {"x5", x[5]},
+        {"x6", x[6]},
+        {"x7", x[7]},
+        {"x8", x[8]},
+        {"x19", x[19]},
+        {"x20", x[20]},
+        {"x21", x[21]},
+        {"x22", x[22]},
+        {"x29", x[29]},
+        {"handler", in_handler ? frame->elr : 0}};
     char room[128];
     struct cube_text text = cube_text_in(room, sizeof room);
     tell_place(&text, frame, vector);

@@ -170,7 +170,10 @@ raspi3b_report:
     mrs x3, far_el1
     stp x2, x3, [sp, #280]
     mov x0, sp
+    ldr x2, =bare_handler_stack_end
+    sub x2, x2, #40                /* struct raspi3b_interrupted */
     bl raspi3b_fault
+    .ltorg
 
     .section .text.handlers, "ax"
 /* The guard may interrupt it, and never comes back. */
