@@ -1,4 +1,5 @@
 #include <float.h>
+#include <stdalign.h>
 #include <string.h>
 
 #include "horizon.h"
@@ -97,10 +98,49 @@ static void thin_out(const struct incode_query *q,
     hits->count = hits->placed = kept;
 }
 
+/* Of many points of a brick, those that may be the first, by their places in
+ * double precision; the first place draws the ball in. */
+static uint64_t contending(const struct incode_pencil *pencil,
+                           struct incode_query *q, const struct incode_brick *b,
+                           uint64_t in) {
+    const double *const xyz[3] = {b->x, b->y, b->z};
+    alignas(64) double t[INCODE_BRICK_POINTS];
+    double first = __builtin_inf();
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES)
+        *(incode_vd *)(t + i) = places(q, pencil, xyz, i);
+    for (uint64_t left = in; left != 0; left &= left - 1) {
+        double here = t[__builtin_ctzll(left)];
+        first = here < first ? here : first;
+    }
+    if (first < q->t)
+        incode_hits_draw_in(q, pencil, first);
+    incode_vd last = incode_vd_all(incode_pencil_later(pencil, q->t));
+    incode_vd infinite = incode_vd_all(__builtin_inf());
+    uint64_t out = 0;
+    for (uint32_t i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
+        incode_vd place = incode_vd_load(t + i), square = incode_vd_all(0);
+        for (int d = 0; d < 3; d++) {
+            incode_vd r = incode_vd_load(xyz[d] + i) * incode_vd_all(q->scale) -
+                          incode_vd_all(q->pv[d] * q->scale) -
+                          incode_vd_all(q->centre[d]);
+            square += r * r;
+        }
+        incode_vl after = (place < infinite) & (place > last);
+        incode_vl outside =
+            (place >= infinite) & (square > incode_vd_all(q->square));
+        out |= (uint64_t)incode_vd_mask(after | outside) << i;
+    }
+    return in & ~out;
+}
+
+enum { MANY = 16 /* points of a brick */ };
+
 bool incode_hits_add(const struct incode_pencil *pencil, struct incode_query *q,
                      const struct incode_frame *frame, uint64_t in,
                      struct incode_hits *hits) {
     const struct incode_brick *b = &frame->page.brick;
+    if (__builtin_popcountll(in) >= MANY)
+        in = contending(pencil, q, b, in);
     for (; in != 0; in &= in - 1) {
         uint32_t slot = (uint32_t)__builtin_ctzll(in);
         if (hits->count == INCODE_HITS) {
