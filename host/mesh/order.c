@@ -197,6 +197,17 @@ static struct incode_boxes *boxes_above(const struct level *l, uint32_t child) {
            child / INCODE_FANOUT;
 }
 
+/* Where a page has children of very different sizes, boxes are finest around
+ * the origin: there the smallest one is put. */
+static void move_origin(struct incode_boxes *boxes,
+                        const struct host_lump *child, uint32_t count) {
+    const struct host_lump *small = child;
+    for (uint32_t c = 1; c < count; c++)
+        small = child[c].unit < small->unit ? &child[c] : small;
+    if (small->unit < boxes->unit * 0x1p-12 && boxes->unit < 0x1p1022)
+        memcpy(boxes->origin, small->origin, sizeof boxes->origin);
+}
+
 static void make_pages(void *context, unsigned part) {
     const struct level *l = context;
     const struct incode_tree *tree = &l->order->tree;
@@ -212,6 +223,7 @@ static void make_pages(void *context, unsigned part) {
         count = count > INCODE_FANOUT ? INCODE_FANOUT : count;
         host_lump_join(all, first, count);
         incode_boxes_init(boxes, all->lo, all->hi);
+        move_origin(boxes, first, count);
         for (uint32_t c = 0; c < count; c++)
             incode_boxes_set(boxes, c, first[c].lo, first[c].hi);
     }

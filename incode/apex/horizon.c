@@ -55,6 +55,11 @@ void incode_horizon_init(struct incode_horizon *h, void *memory, uint32_t boxes,
  * with the part in 2^20 of the radius that a lifted box does not hold. */
 #define AXES_DOUBT 0x1p-17
 
+/* Below that, a coordinate is 0, and a distance too small for squares to be
+ * numbers of single precision. */
+#define SMALLEST 1e-30F
+#define LEAST_FAR 1e-15F
+
 /* Beyond that, a coordinate tells nothing. */
 #define FARTHEST 1e15
 
@@ -83,28 +88,28 @@ struct view {
     alignas(64) float far[INCODE_FANOUT];
 };
 
-/* The boxes' coordinates, widened by what their rounding may do. */
+/* The boxes' coordinates, widened by what their rounding may do: a part of
+ * each, and in double precision a part of the page, so that small boxes stay
+ * small where they lie near the origin. */
 static void set_sides(struct view *view) {
     const struct incode_boxes *boxes = view->boxes;
-    incode_vf unit = incode_vf_all((float)view->unit), far, slack[3], at[3];
+    float far[INCODE_FANOUT] = {0};
     for (int d = 0; d < 3; d++) {
-        double size = __builtin_fabs(view->at[d]) + 2 * view->unit;
-        slack[d] = incode_vf_all((float)(OUTWARD * (1 + size)));
-        at[d] = incode_vf_all((float)view->at[d]);
-    }
-    for (int i = 0; i < INCODE_FANOUT; i += INCODE_VF_LANES) {
-        far = incode_vf_all(0);
-        for (int d = 0; d < 3; d++) {
-            incode_vf lo = incode_vf_load(boxes->lo[d] + i) * unit + at[d];
-            incode_vf hi = incode_vf_load(boxes->hi[d] + i) * unit + at[d];
-            lo -= slack[d];
-            hi += slack[d];
-            *(incode_vf *)(view->lo[d] + i) = lo;
-            *(incode_vf *)(view->hi[d] + i) = hi;
-            far += incode_vf_max(incode_vf_abs(lo), incode_vf_abs(hi));
+        double slack = 0x1p-50 * (__builtin_fabs(view->at[d]) + 2 * view->unit);
+        double unit = view->unit, at = view->at[d];
+        for (int i = 0; i < INCODE_FANOUT; i++) {
+            double a = boxes->lo[d][i] * unit + at - slack;
+            double b = boxes->hi[d][i] * unit + at + slack;
+            /* Of either sign; where there is no child, infinite. */
+            float lo = (float)(a * (a > 0 ? 1 - OUTWARD : 1 + OUTWARD));
+            float hi = (float)(b * (b > 0 ? 1 + OUTWARD : 1 - OUTWARD));
+            view->lo[d][i] = lo - SMALLEST;
+            view->hi[d][i] = hi + SMALLEST;
+            far[i] += -lo > hi ? -lo : hi;
         }
-        *(incode_vf *)(view->far + i) = far * incode_vf_all(1 + 0x1p-20F);
     }
+    for (int i = 0; i < INCODE_FANOUT; i++)
+        view->far[i] = far[i] * (1 + 0x1p-20F) + LEAST_FAR;
 }
 
 /* Too far off to be told apart: anywhere. */
@@ -160,14 +165,16 @@ static void set_lifted(struct incode_horizon *h, uint32_t i,
     if (!(h->far[i] < FARTHEST) || !(square > 1e-30) ||
         !incode_boxes_lifted(view->boxes, child, &l))
         return;
+    double far = 2 * view->unit;
     for (int d = 0; d < 3; d++) {
+        far += __builtin_fabs(view->at[d]);
         h->o[d][i] = (float)(view->at[d] + view->unit * l.o[d]);
         h->slope[d][i] = (float)(square * l.slope[d]);
         for (int k = 0; k < 3; k++)
             h->a[k][d][i] = (float)(view->unit * l.a[k][d]);
     }
     h->lid[i] = (float)(square * l.lid);
-    h->doubt[i] = (float)(AXES_DOUBT * view->unit * l.radius);
+    h->doubt[i] = (float)(AXES_DOUBT * view->unit * l.radius + 0x1p-48 * far);
 }
 
 /* ---- making it ---- */
@@ -237,7 +244,7 @@ static bool add_rest(struct incode_horizon *h, const struct view *view,
         float hi = __builtin_fabsf(h->hi[d][i]);
         far += lo > hi ? lo : hi;
     }
-    h->far[i] = far * (1 + 0x1p-20F);
+    h->far[i] = far * (1 + 0x1p-20F) + LEAST_FAR;
     return true;
 }
 

@@ -12,9 +12,9 @@ enum {
     PLANE = SIDE * SIDE + 1,
     MIXED = 4000,
     MORE_MIXED = 9000,
-    EXACT = 100,   /* orient3d that is exact, a tetrahedron */
-    REQUESTS = 20, /* of pages, a tetrahedron */
-    SCANS = 100    /* of all cells, by all regions */
+    EXACT = 100,  /* orient3d that is exact, a tetrahedron */
+    REQUESTS = 2, /* of pages, a tetrahedron */
+    SCANS = 100   /* of all cells, by all regions */
 };
 
 static uint64_t state = 1;
@@ -109,6 +109,22 @@ TEST(frames_before_faces) {
     struct incode_statistics s =
         run((const double(*)[3])xyz, MORE_MIXED, 4, 0, 376 << 10);
     assert_in_range(s.page_requests, 0, s.tetrahedra_built);
+}
+
+/* Most of these bricks lie close to one point, as seen from the whole set:
+ * boxes that were rounded by a part of its extent met nearly every sphere. */
+TEST(small_boxes_stay_small) {
+    static double xyz[MORE_MIXED][3];
+    make_mixed(xyz, MORE_MIXED);
+    uint64_t kept = 0;
+    for (uint32_t r = 0; r < 8; r++) {
+        struct incode_statistics s =
+            run((const double(*)[3])xyz, MORE_MIXED, 8, r, 0);
+        kept += s.tetrahedra_kept;
+        assert_in_range(s.page_requests, 0, s.tetrahedra_built);
+    }
+    assert_int_equal(kept,
+                     count_by_points((const double(*)[3])xyz, MORE_MIXED));
 }
 
 /* Points of others' bricks are inserted, released, and visited again each time

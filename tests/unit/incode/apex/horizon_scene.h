@@ -112,6 +112,12 @@ static inline void all_scales(double p[3]) {
     times(p, ldexp(1, 40 * (int)(draw() * 40) - 800));
 }
 
+/* Each point: most of a page lies close to one corner of it. */
+static inline void point_scales(double p[3]) {
+    volume(p);
+    times(p, ldexp(1, (int)(draw() * 80) - 40));
+}
+
 static inline void each_scale(double p[3]) {
     for (int d = 0; d < 3; d++)
         p[d] = ldexp(even(), (int)(draw() * 2000) - 1000);

@@ -300,6 +300,7 @@ TEST(no_point_is_lost) {
                 {small, "small"},
                 {denormal, "denormal"},
                 {all_scales, "all scales"},
+                {point_scales, "each point of its own scale"},
                 {each_scale, "each coordinate of its own scale"}};
     unsigned unseen = 0;
     for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
