@@ -288,6 +288,7 @@ struct cloud {
     const struct incode_brick *brick;
     uint32_t bricks;
     double origin[3], inverse;
+    double far; /* the largest coordinate, at most 1 */
 };
 
 INCODE_INLINE void relative(const struct cloud *cloud,
@@ -353,10 +354,11 @@ static double clamped(double a, double most) {
  * coordinate, in units u = 2^-53: 2 a coordinate for x (the difference, for the
  * division is exact) and 4 for x - m, so 6 sqrt 3 along an axis; 3 |x - m| <=
  * 21 for the products and sums; as much and less for o - m; 14 for the last
- * difference. */
-static const double slack = 0x1p-46;
+ * difference.  Of a child within `far` of the origin, |o| <= 2 far, and each of
+ * these is less by that factor. */
+#define SLACK 0x1p-46
 
-/* Below that it would be larger than what the turn loses. */
+/* Times far: below that it would be larger than what the turn loses. */
 #define E_LEAST 0x1p-32
 
 /* Centre and half axes from the extents along the axes. */
@@ -379,7 +381,7 @@ static void set_halves(struct incode_boxes *boxes, unsigned child,
         o[d] = middle.o[d] - o[d];
     for (int k = 0; k < 3; k++) {
         double at = dot(axis[k], o);
-        double half = fmax(hi[k] - at, at - lo[k]) + slack;
+        double half = fmax(hi[k] - at, at - lo[k]) + SLACK * cloud->far;
         boxes->half[k][child] = half_rounded_up(half / e * (1 + 0x1p-50));
     }
 }
@@ -406,11 +408,11 @@ static void set_slopes(struct incode_boxes *boxes, unsigned child,
     }
 }
 
-/* The lid, below all points.  Rounding: with u = 2^-53, x - o has 10 u a
- * coordinate, so 18 u in length; r bounds it, and c the length of the gradient
- * q.  |x - o|^2 is wrong by 36 u r + 3 u r^2, q . (x - o) by 18 u c + 12 u c r,
- * with the rounding of q's own terms, and the difference by u (r^2 + c r).
- * False: it is too low to be told. */
+/* The lid, below all points.  Rounding: with u = 2^-53, x - o has 10 u far a
+ * coordinate, so 18 u far in length; r bounds it, and c the length of the
+ * gradient q.  |x - o|^2 is wrong by 36 u far r + 3 u r^2, q . (x - o) by
+ * 18 u far c + 12 u c r, with the rounding of q's own terms, and the difference
+ * by u (r^2 + c r).  False: it is too low to be told. */
 static bool set_lid(struct incode_boxes *boxes, unsigned child,
                     const struct cloud *cloud, double e) {
     struct incode_lifted l;
@@ -423,7 +425,7 @@ static bool set_lid(struct incode_boxes *boxes, unsigned child,
         c += fabs(l.slope[k]) / sqrt(square);
     }
     double lid = least_above(cloud, l.o, q);
-    lid -= (1 + l.radius) * (l.radius + c) * 0x1p-46;
+    lid -= (cloud->far + l.radius) * (l.radius + c) * 0x1p-46;
     double units = floor(lid / e / e * 8192);
     boxes->lid[child] = (int16_t)fmin(units, 32767);
     return units >= -32767;
@@ -433,15 +435,20 @@ void host_lift(struct incode_boxes *boxes, unsigned child,
                const struct host_lump *lump, const struct incode_brick *brick,
                uint32_t bricks) {
     struct shape shape;
-    double axis[3][3], e = 0;
+    double axis[3][3], e = 0, far = 0;
     find_shape(&shape, lump);
-    for (int d = 0; d < 3; d++)
-        e = fmax(e, 0.5 * ((double)boxes->hi[d][child] -
-                           (double)boxes->lo[d][child]));
-    if (!(shape.flat || shape.round) || e < E_LEAST)
+    for (int d = 0; d < 3; d++) {
+        double lo = boxes->lo[d][child], hi = boxes->hi[d][child];
+        e = fmax(e, 0.5 * (hi - lo));
+        far = fmax(far, fmax(-lo, hi));
+    }
+    far = fmin(far, 1);
+    if (!(shape.flat || shape.round) || e < E_LEAST * far)
         return;
-    struct cloud cloud = {
-        .brick = brick, .bricks = bricks, .inverse = 1 / boxes->unit};
+    struct cloud cloud = {.brick = brick,
+                          .bricks = bricks,
+                          .inverse = 1 / boxes->unit,
+                          .far = far};
     memcpy(cloud.origin, boxes->origin, sizeof cloud.origin);
     principal_axes(axis, shape.spread);
     set_turn(boxes, child, axis);
