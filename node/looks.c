@@ -124,6 +124,16 @@ bool node_looks_silent(struct node_looks *looks, uint64_t now_us) {
     return news;
 }
 
+uint32_t node_looks_silent_yet(const struct node_looks *looks) {
+    uint32_t silent = looks->silent;
+    for (unsigned d = 0; d < cube_links(looks->cube); d++) {
+        const struct link_statistics *s = cube_link_statistics(looks->cube, d);
+        if (s->frames_received != looks->heard[d].frames)
+            silent &= ~((uint32_t)1 << d);
+    }
+    return silent;
+}
+
 /* A wire whose ends never met is missing, or not there yet: the host says. */
 uint32_t node_looks_seen(const struct node_looks *looks) {
     uint32_t seen = 0;

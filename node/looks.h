@@ -50,6 +50,9 @@ void node_looks_between(struct node_looks *looks);
  * a second at most. */
 bool node_looks_silent(struct node_looks *looks, uint64_t now_us);
 
+/* The links that were silent at the last look and have said nothing since. */
+uint32_t node_looks_silent_yet(const struct node_looks *looks);
+
 /* Links that have been up since the start. */
 uint32_t node_looks_seen(const struct node_looks *looks);
 

@@ -258,7 +258,7 @@ static bool send_pong(struct node *n) {
     n->pong.start = n->board->identity.epoch;
     n->pong.sent = n->counted.sent;
     n->pong.links = node_looks_seen(&n->looks);
-    n->pong.silent = n->looks.silent;
+    n->pong.silent = node_looks_silent_yet(&n->looks);
     n->pong.refused =
         n->board->refused == NULL ? 0 : n->board->refused(n->board->context);
     n->pong.work = n->work;

@@ -192,3 +192,31 @@ TEST(what_is_told_of_it) {
     assert_int_equal(finished.overruns, 3);
     tear_down();
 }
+
+/* Both cubes, or the looking one alone, for so long. */
+static void run_for(uint64_t us, bool both) {
+    for (uint64_t end = world.now_us + us; world.now_us < end;) {
+        pass(1000000);
+        (void)cube_poll(world.cube[0], world.now_us);
+        if (both)
+            (void)cube_poll(world.cube[1], world.now_us);
+        else
+            (void)node_looks_silent(&world.looks, world.now_us);
+    }
+}
+
+/* A host that comes again is answered at once: its link is not told as silent
+ * until the next look. */
+TEST(what_speaks_again_is_not_silent) {
+    set_up();
+    run_for(1000000, true);
+    assert_true(cube_link_state(world.cube[0], 0) == LINK_UP);
+    run_for(1000000, false);
+    assert_int_equal(node_looks_silent_yet(&world.looks), 0);
+    run_for(10000000, false);
+    assert_int_equal(node_looks_silent_yet(&world.looks), 1);
+    run_for(1000000, true);
+    assert_int_equal(world.looks.silent, 1);
+    assert_int_equal(node_looks_silent_yet(&world.looks), 0);
+    tear_down();
+}
