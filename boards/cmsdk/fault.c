@@ -66,8 +66,8 @@ struct cmsdk_pushed {
 
 _Noreturn void cmsdk_fault(const struct cmsdk_pushed *pushed,
                            uint32_t exc_return, uint32_t exception);
-/* A program that hangs is reported at its own place, also where the watchdog
- * came during a handler: that one's place is told beside it. */
+/* The report of a hang names the place in the program, also if the watchdog
+ * came during a handler.  The place in the handler is reported as well. */
 _Noreturn void cmsdk_fault(const struct cmsdk_pushed *pushed,
                            uint32_t exc_return, uint32_t exception) {
     static const uint32_t none[FRAME_WORDS];

@@ -38,8 +38,8 @@ static void tell_place(struct cube_text *text,
 
 _Noreturn void raspi3b_fault(const struct raspi3b_frame *frame, unsigned vector,
                              const struct raspi3b_interrupted *interrupted);
-/* A program that hangs is reported at its own place, also where the guard came
- * during a handler: that one's place is told beside it. */
+/* The report of a hang names the place in the program, also if the guard came
+ * during a handler.  The place in the handler is reported as well. */
 _Noreturn void raspi3b_fault(const struct raspi3b_frame *frame, unsigned vector,
                              const struct raspi3b_interrupted *interrupted) {
     const uint64_t *x = frame->x;

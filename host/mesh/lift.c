@@ -443,7 +443,7 @@ void host_lift(struct incode_boxes *boxes, unsigned child,
         far = fmax(far, fmax(-lo, hi));
     }
     far = fmin(far, 1);
-    if (!(shape.flat || shape.round) || e < E_LEAST * far)
+    if (!(shape.flat || shape.round) || !(e > E_LEAST * far))
         return;
     struct cloud cloud = {.brick = brick,
                           .bricks = bricks,

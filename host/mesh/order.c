@@ -197,15 +197,24 @@ static struct incode_boxes *boxes_above(const struct level *l, uint32_t child) {
            child / INCODE_FANOUT;
 }
 
-/* Where a page has children of very different sizes, boxes are finest around
- * the origin: there the smallest one is put. */
+static bool is_a_point(const struct host_lump *lump) {
+    return lump->lo[0] == lump->hi[0] && lump->lo[1] == lump->hi[1] &&
+           lump->lo[2] == lump->hi[2];
+}
+
+/* Boxes are finest around the origin.  If children differ much in size, it
+ * moves to the smallest one that is not a point. */
 static void move_origin(struct incode_boxes *boxes,
                         const struct host_lump *child, uint32_t count) {
-    const struct host_lump *small = child;
-    for (uint32_t c = 1; c < count; c++)
-        small = child[c].unit < small->unit ? &child[c] : small;
-    if (small->unit < boxes->unit * 0x1p-12 && boxes->unit < 0x1p1022)
-        memcpy(boxes->origin, small->origin, sizeof boxes->origin);
+    double least = boxes->unit * 0x1p-12;
+    if (boxes->unit >= 0x1p1022) /* differences could overflow */
+        return;
+    for (uint32_t c = 0; c < count; c++) {
+        if (child[c].unit >= least || is_a_point(&child[c]))
+            continue;
+        least = child[c].unit;
+        memcpy(boxes->origin, child[c].origin, sizeof boxes->origin);
+    }
 }
 
 static void make_pages(void *context, unsigned part) {

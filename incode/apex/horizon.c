@@ -174,6 +174,7 @@ static void set_lifted(struct incode_horizon *h, uint32_t i,
             h->a[k][d][i] = (float)(view->unit * l.a[k][d]);
     }
     h->lid[i] = (float)(square * l.lid);
+    /* What is added are the roundings of o in double precision. */
     h->doubt[i] = (float)(AXES_DOUBT * view->unit * l.radius + 0x1p-48 * far);
 }
 

@@ -44,8 +44,9 @@ enum { INCODE_FANOUT = 32 /* children a box page, at most */ };
 
 /* Rows begin at multiples of 64 bytes.  Coordinates are origin + unit x, unit a
  * normal power of two, about half the longest side of all children; |x| <= 2.
- * The origin is the middle of all children, or of the smallest one where that
- * is less than a part in 2^12 of them: single precision is finest there.
+ * The origin is the middle of all children.  If the smallest child that is not
+ * a point is less than a part in 2^12 of them, it is the middle of that one:
+ * single precision is finest there.
  * Absent children have lo > hi (+inf, -inf) in every dimension. */
 struct incode_boxes {
     float lo[3][INCODE_FANOUT];

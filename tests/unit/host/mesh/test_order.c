@@ -347,6 +347,36 @@ TEST(extreme_coordinates) {
     free(xyz);
 }
 
+/* The origin of the only page of boxes, and the middle of all points. */
+static void origin_of(const double *xyz, size_t n, double origin[3],
+                      double middle[3]) {
+    struct host_order order;
+    struct host_error error = {0};
+    assert_int_equal(host_order_make(&order, "test", xyz, n, HOST_ADAPTIVE, 1,
+                                     false, &error),
+                     0);
+    assert_int_equal(order.tree.levels, 2);
+    memcpy(origin, order.boxes[0].origin, sizeof order.boxes[0].origin);
+    for (int d = 0; d < 3; d++)
+        middle[d] = 0.5 * order.lo[d] + 0.5 * order.hi[d];
+    host_order_free(&order);
+}
+
+/* A brick of one point is no reason to move the origin; one that is small is.
+ */
+TEST(boxes_are_finest_where_they_are_small) {
+    enum { POINTS = 16 * INCODE_BRICK_POINTS };
+    double origin[3], middle[3], *xyz = random_points(POINTS + 1, 0);
+    origin_of(xyz, POINTS + 1, origin, middle);
+    assert_true(same(origin, middle));
+    for (size_t i = 0; i < (size_t)3 * POINTS / 2; i++)
+        xyz[i] = 0.25 + 0x1p-20 * xyz[i];
+    origin_of(xyz, POINTS + 1, origin, middle);
+    for (int d = 0; d < 3; d++)
+        assert_true(fabs(origin[d] - 0.25) < 0x1p-19);
+    free(xyz);
+}
+
 TEST(flat_input_is_refused) {
     struct host_order order;
     struct host_error error = {0};
