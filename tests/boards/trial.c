@@ -85,9 +85,10 @@ static void be_deaf(void) {
             since_us = board_now_us(); /* clock: anew */
         }
     }
-    say("overruns ", "", bare_uarts_overruns(), "");
     while (bare_uart_heard(&bare_uart[0]))
         (void)next();
+    /* Last: the next order follows at once. */
+    say("overruns ", "", bare_uarts_overruns(), "");
 }
 
 static uint8_t *data_end(void) {
