@@ -101,11 +101,13 @@ for signal in TERM HUP; do
         > output 2> errors &
     ended=$!
     await has_folder
+    begun=$?
     kill -$signal $ended
     wait $ended 2> /dev/null
     status=$?
-    check "console-ended-by-$signal" "exit $status: $(last errors)" \
-        test $status = $((128 + $(kill -l $signal)))
+    check "console-ended-by-$signal" \
+        "exit $status, begun: $begun: $(last errors)" \
+        test $begun/$status = 0/$((128 + $(kill -l $signal)))
     check "console-ended-by-$signal-leaves-nothing" "$(ls)" \
         eval '! has_folder && [ ! -e no.ele ]'
 done
