@@ -2,271 +2,316 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <libconfig.h>
 #include <netdb.h>
-#include <stdbool.h>
-#include <stdint.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/base/text.h"
-#include "host/base/progress.h"
-#include "transport/drivers/secure_sodium.h"
+#include "transport/cube.h"
 #include "transport/secure_wipe.h"
-#include "port.h"
-#include "host/base/create.h"
-#include "transport/secure.h"
 
-enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
+/* --- what is there ----------------------------------------------------------
+ */
 
-static int read_key(struct host_cube_file *file, const config_setting_t *where,
-                    struct host_error *error) {
-    char message[HOST_NODE_OPTION_BYTES + 200];
-    if (config_setting_get_string(where) == NULL) {
-        return host_cube_wrong(file, where, error,
-                               "key: not a file's name; write it in "
-                               "quotes");
+const struct host_cube_wire *
+host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
+                  unsigned *count) {
+    const struct host_cube_wire *found = NULL;
+    *count = 0;
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        if ((w->node == a && w->to == b) || (w->node == b && w->to == a)) {
+            found = w;
+            (*count)++;
+        }
     }
-    if (host_cube_beside(file, where, file->key_path, sizeof file->key_path) !=
-        0) {
-        return host_cube_wrong(file, where, error,
-                               "key: none, or too long a path; make one with: "
-                               "incode key FILE");
+    return found;
+}
+
+const struct host_cube_wire *
+host_cube_host_wire(const struct host_cube_file *file, unsigned k) {
+    for (unsigned i = 0; i < file->wires; i++)
+        if (file->wire[i].to == CUBE_HOST && k-- == 0)
+            return &file->wire[i];
+    return NULL;
+}
+
+/* "nodes 0 and 1", "node 0 and the host" */
+static void name_wire(const struct host_cube_wire *wire, char text[40]) {
+    if (wire->to == CUBE_HOST)
+        snprintf(text, 40, "node %u and the host", wire->node);
+    else
+        snprintf(text, 40, "nodes %u and %u", wire->node, wire->to);
+}
+
+void host_cube_name_wire(const struct host_cube_file *file,
+                         const struct host_cube_wire *wire, char text[160]) {
+    char ends[40];
+    name_wire(wire, ends);
+    snprintf(text, 160, "%.80s:%u: the wire between %s", file->path, wire->line,
+             ends);
+}
+
+const struct host_link *host_cube_link(const struct host_cube_file *file) {
+    const char *first = NULL;
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        const char *name =
+            w->serial ? "serial"
+            : host_cube_is_bare(file, w->node) || host_cube_is_bare(file, w->to)
+                ? "uart"
+            : tcp_address_path(&w->at) != NULL ? "unix"
+                                               : "tcp";
+        if (first != NULL && strcmp(first, name) != 0)
+            return host_link_named("mixed");
+        first = name;
     }
-    enum key_file_state state = key_file_read(file->key_path, file->key);
-    int reason = state == KEY_FILE_UNREADABLE ? errno : 0;
-    struct key_file_text fault = key_file_text(state);
-    file->has_key = state == KEY_FILE_GOOD || state == KEY_FILE_SEEN;
-    if (fault.what == NULL)
-        return 0;
-    snprintf(message, sizeof message, "key %s: %s%s%s; %s", file->key_path,
-             fault.what, reason == 0 ? "" : ": ",
-             reason == 0 ? "" : strerror(reason), fault.next);
-    if (!file->has_key)
-        return host_cube_wrong(file, where, error, message);
-    host_note("%s:%u: %s", file->path, config_setting_source_line(where),
-              message);
+    return host_link_named(first);
+}
+
+const struct host_cube_pin *host_cube_pin(const struct host_cube_file *file,
+                                          unsigned node,
+                                          enum host_line_kind kind) {
+    for (unsigned i = 0; i < file->pins; i++)
+        if (file->pin[i].node == node && file->pin[i].kind == kind)
+            return &file->pin[i];
+    return NULL;
+}
+
+const struct host_cube_ssh *host_cube_ssh(const struct host_cube_file *file,
+                                          unsigned node) {
+    return file->ssh != NULL && node < file->nodes &&
+                   file->ssh[node].to[0] != '\0'
+               ? &file->ssh[node]
+               : NULL;
+}
+
+/* --- links ------------------------------------------------------------------
+ */
+
+static int wrong(const struct host_cube_file *file, unsigned line,
+                 struct host_error *error, const char *what, ...) {
+    char text[300];
+    va_list arguments;
+    va_start(arguments, what);
+    vsnprintf(text, sizeof text, what, arguments);
+    va_end(arguments);
+    return host_fail(error, HOST_INPUT, "%s:%u: %s", file->path, line, text);
+}
+
+/* The host's machine has the ports of all nodes that it starts. */
+static unsigned owner(const struct host_cube_file *file, unsigned node) {
+    return node == CUBE_HOST || file->local[node] ? CUBE_HOST : node;
+}
+
+/* Whether both have an end on one machine, as far as that is known. */
+static bool meet(const struct host_cube_file *file,
+                 const struct host_cube_wire *a,
+                 const struct host_cube_wire *b) {
+    return owner(file, a->node) == owner(file, b->node) ||
+           owner(file, a->node) == owner(file, b->to) ||
+           owner(file, a->to) == owner(file, b->node) ||
+           owner(file, a->to) == owner(file, b->to);
+}
+
+/* Two that listen at one address: on one machine, or at one address of all. */
+static bool same_address(const struct host_cube_file *file,
+                         const struct host_cube_wire *a,
+                         const struct host_cube_wire *b) {
+    if (a->serial || b->serial || a->at.size != b->at.size ||
+        memcmp(&a->at.to, &b->at.to, a->at.size) != 0)
+        return false;
+    return tcp_address_path(&a->at) != NULL ? meet(file, a, b)
+           : tcp_address_is_any(&a->at)
+               ? owner(file, a->node) == owner(file, b->node)
+               : true;
+}
+
+/* The device at the ends of both that is the same one; NULL: none. */
+static const char *same_device(const struct host_cube_file *file,
+                               const struct host_cube_wire *a,
+                               const struct host_cube_wire *b) {
+    const char *found = NULL;
+    for (int i = 0; i < 4 && a->serial && b->serial; i++) {
+        unsigned left = i / 2 == 0 ? a->node : a->to;
+        unsigned right = i % 2 == 0 ? b->node : b->to;
+        if (owner(file, left) == owner(file, right) &&
+            strcmp(a->device[i / 2], b->device[i % 2]) == 0)
+            found = a->device[i / 2];
+    }
+    return found;
+}
+
+/* Whether no two links share an end. */
+static int check_ends(const struct host_cube_file *file,
+                      struct host_error *error) {
+    char address[HOST_NODE_OPTION_BYTES / 2], names[2][40];
+    for (unsigned i = 0; i < file->wires; i++) {
+        const struct host_cube_wire *w = &file->wire[i];
+        const char *what = w->serial &&
+                                   owner(file, w->node) == owner(file, w->to) &&
+                                   strcmp(w->device[0], w->device[1]) == 0
+                               ? w->device[0]
+                               : NULL;
+        unsigned other = i;
+        for (unsigned k = 0; k < i && what == NULL; k++) {
+            what = same_device(file, &file->wire[k], w);
+            if (what == NULL && same_address(file, &file->wire[k], w)) {
+                host_cube_print_address(&w->at, address, sizeof address);
+                what = address;
+            }
+            other = k;
+        }
+        if (what != NULL) {
+            name_wire(w, names[0]);
+            name_wire(&file->wire[other], names[1]);
+            return host_fail(error, HOST_INPUT,
+                             "%s:%u: the link between %s has %s, and so has "
+                             "that between %s in line %u; give each end of a "
+                             "link its own",
+                             file->path, w->line, names[0], what, names[1],
+                             file->wire[other].line);
+        }
+    }
     return 0;
 }
 
-/* The nodes that the host starts. */
-static int read_start(struct host_cube_file *file, const config_setting_t *root,
-                      struct host_error *error) {
-    const config_setting_t *start = config_setting_get_member(root, "start");
-    bool many = start != NULL && (config_setting_is_array(start) ||
-                                  config_setting_is_list(start));
-    bool good = start == NULL || many;
-    for (int i = 0; good && many && i < config_setting_length(start); i++) {
-        int node = 0;
-        good = host_cube_is_number(config_setting_get_elem(start, (unsigned)i),
-                                   0, (int)file->nodes - 1, &node);
-        if (good && file->local[node]) {
-            return host_cube_wrong(file, start, error,
-                                   "start: a node twice; name each once");
+/* Whether each wire of the cube is there once, and the host's. */
+static int check_wires(const struct host_cube_file *file,
+                       struct host_error *error) {
+    const struct host_cube_wire *first = host_cube_host_wire(file, 0);
+    const struct host_cube_wire *second = host_cube_host_wire(file, 1);
+    for (unsigned i = 0; i < file->nodes; i++) {
+        for (unsigned d = 0; d < file->dimension; d++) {
+            unsigned count = 0, other = i ^ 1u << d;
+            const struct host_cube_wire *w =
+                host_cube_between(file, i, other, &count);
+            if (count > 1) {
+                return host_fail(error, HOST_INPUT,
+                                 "%s:%u: a second link between nodes %u and "
+                                 "%u; leave one of them out",
+                                 file->path, w->line, i, other);
+            }
+            if (count == 0 && !(host_cube_is_bare(file, i) &&
+                                host_cube_is_bare(file, other))) {
+                return wrong(file, file->links_line, error,
+                             "no link between nodes %u and %u; add { node = "
+                             "%u; to = %u; .. }",
+                             i, other, i, other);
+            }
         }
-        file->local[node] |= good;
     }
-    return good ? 0
-                : host_cube_wrong(
-                      file, start, error,
-                      "start: not numbers of nodes; write [0, 1, 2]");
+    if (first == NULL || first->node != 0) {
+        return wrong(file, file->links_line, error,
+                     "the host's first link must be that of node 0; begin "
+                     "with { node = 0; to = \"host\"; .. }");
+    }
+    if (second != NULL &&
+        (second->node == 0 || host_cube_host_wire(file, 2) != NULL)) {
+        return wrong(file, file->links_line, error,
+                     "a second link of the host must be another node's, and "
+                     "there is no third; leave it out");
+    }
+    return 0;
 }
 
-static int read_memory(struct host_cube_file *file,
-                       const config_setting_t *root, struct host_error *error) {
-    const config_setting_t *memory = config_setting_get_member(root, "memory");
-    const char *text =
-        memory == NULL ? "4M" : config_setting_get_string(memory);
-    return text != NULL && host_parse_bytes(text, &file->memory) == 0 &&
-                   file->memory >= 256 * 1024 &&
-                   file->memory <= UINT64_C(1) << 30
-               ? 0
-               : host_cube_wrong(
-                     file, memory, error,
-                     "memory: not a size; write \"4M\", from 640K to "
-                     "1G, or less to a small cube");
-}
+/* --- boards -----------------------------------------------------------------
+ */
 
-static int read_nodes(struct host_cube_file *file, const config_setting_t *root,
+static int check_node(struct host_cube_file *file, unsigned node,
                       struct host_error *error) {
-    const config_setting_t *key = config_setting_get_member(root, "key");
-    int dimension = -1, window = 0, dead = 30;
-    if (!host_cube_take_number(root, "dimension", 0, CUBE_DIMENSION_MAX,
-                               &dimension) ||
-        dimension < 0) {
-        return host_cube_wrong(
-            file, config_setting_get_member(root, "dimension"), error,
-            "dimension: not given or not 0 to 10; a cube of 8 nodes "
-            "has dimension = 3;");
+    const struct host_board *board = file->board_of[node];
+    const struct host_cube_ssh *ssh = host_cube_ssh(file, node);
+    if (ssh != NULL && (file->local[node] || board->bare != NULL)) {
+        return wrong(file, ssh->line, error, "ssh: node %u %s", node,
+                     file->local[node]
+                         ? "is started by the host itself; take it out of "
+                           "start, or leave ssh out"
+                         : "has no system to log in to; leave ssh out");
     }
-    if (!host_cube_take_number(root, "window", 1, LINK_WINDOW_MAX, &window)) {
-        return host_cube_wrong(file, config_setting_get_member(root, "window"),
-                               error,
-                               "window: not a number of frames; give 1 to 64");
+    if (board->bare == NULL)
+        return 0;
+    if (file->serial_baud == 0 || board->bare->serial_baud < file->serial_baud)
+        file->serial_baud = board->bare->serial_baud;
+    if (file->nodes > host_bare_nodes_max(board->bare)) {
+        return wrong(file, file->dimension_line, error,
+                     "dimension: node %u (%s) has UARTs for dimension %u; give "
+                     "no more",
+                     node, board->name, board->bare->uarts - 1);
     }
-    if (!host_cube_take_number(root, "dead", 0, 3600, &dead)) {
-        return host_cube_wrong(
-            file, config_setting_get_member(root, "dead"), error,
-            "dead: not seconds of silence; give 0 (never) to "
-            "3600");
+    if (file->local[node]) {
+        return wrong(file, file->start_line, error,
+                     "start: node %u (%s) is no program of this machine; take "
+                     "it out, and start it with: incode emulate",
+                     node, board->name);
     }
-    file->dimension = (unsigned)dimension;
-    file->nodes = 1u << dimension;
-    file->window = (unsigned)window;
-    file->dead_s = (unsigned)dead;
-    if (read_memory(file, root, error) != 0 ||
-        host_cube_read_boards(file, root, error) != 0 ||
-        read_start(file, root, error) != 0)
+    if (file->memory != HOST_BOARD_MEMORY) {
+        return wrong(file, file->memory_line, error,
+                     "memory: node %u (%s) has 4M; leave it out", node,
+                     board->name);
+    }
+    return 0;
+}
+
+static int check_uart(const struct host_cube_file *file,
+                      const struct host_cube_wire *wire, unsigned node,
+                      struct host_error *error) {
+    const struct host_board *board = file->board_of[node];
+    const char *what = NULL;
+    char text[80];
+    if (!wire->serial && tcp_address_path(&wire->at) == NULL) {
+        what = "has no TCP; give unix or serial";
+    } else if (wire->serial && wire->baud != board->bare->serial_baud) {
+        snprintf(text, sizeof text, "has UARTs of baud = %u; give that",
+                 board->bare->serial_baud);
+        what = text;
+    } else if (!wire->serial && wire->node != node) {
+        what = "cannot call; give it as `node`, and the other as `to`";
+    }
+    return what == NULL ? 0
+                        : wrong(file, wire->line, error, "node %u (%s) %s",
+                                node, board->name, what);
+}
+
+static int check(struct host_cube_file *file, struct host_error *error) {
+    if (check_wires(file, error) != 0)
         return error->code;
-    return key == NULL ? 0 : read_key(file, key, error);
+    for (unsigned i = 0; i < file->nodes && error->code == 0; i++)
+        (void)check_node(file, i, error);
+    for (unsigned i = 0; i < file->wires && error->code == 0; i++) {
+        const struct host_cube_wire *wire = &file->wire[i];
+        const unsigned ends[] = {wire->node, wire->to};
+        for (int k = 0; k < 2; k++)
+            if (host_cube_is_bare(file, ends[k]))
+                (void)check_uart(file, wire, ends[k], error);
+    }
+    return error->code != 0 ? error->code : check_ends(file, error);
 }
 
-static int host_cube_check_ssh(const struct host_cube_file *file,
-                               struct host_error *error);
-
-static int read_settings(struct host_cube_file *file, const config_t *config,
-                         struct host_error *error) {
-    static const char *const names[] = {
-        "dimension", "board", "memory", "window", "key",
-        "start",     "dead",  "links",  "nodes",  NULL};
-    const config_setting_t *root = config_root_setting(config);
-    const config_setting_t *links = config_setting_get_member(root, "links");
-    if (host_cube_check_names(file, root, names, error) != 0 ||
-        read_nodes(file, root, error) != 0)
-        return error->code;
-    if (links == NULL || !config_setting_is_list(links)) {
-        return host_cube_wrong(
-            file, links, error,
-            "links: no list; write links = ( { node = 0; to = "
-            "\"host\"; .. }, .. );");
+void host_cube_print_address(const struct tcp_address *address, char *text,
+                             size_t size) {
+    if (tcp_address_path(address) != NULL) {
+        snprintf(text, size, "%s", tcp_address_path(address));
+        return;
     }
-    unsigned count = (unsigned)config_setting_length(links);
-    if (count > file->nodes * (file->dimension + 2) + 8) {
-        return host_cube_wrong(file, links, error,
-                               "links: many more than the cube has; name each "
-                               "once");
+    char host[NI_MAXHOST], port[NI_MAXSERV];
+    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
+                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
+        snprintf(text, size, "?");
+        return;
     }
-    file->wire = calloc(count + 1, sizeof *file->wire);
-    if (file->wire == NULL)
-        return host_fail_memory(error, "the cube file");
-    for (unsigned i = 0; i < count; i++) {
-        config_setting_t *group = config_setting_get_elem(links, i);
-        if (!config_setting_is_group(group)) {
-            return host_cube_wrong(file, links, error,
-                                   "links: not a list of groups in braces; "
-                                   "write links = ( { node = 0; to = "
-                                   "\"host\"; .. }, .. );");
-        }
-        if (host_cube_read_wire(file, group, error) != 0)
-            return error->code;
-    }
-    return host_cube_check_wires(file, links, error) != 0 ||
-                   host_cube_check_boards(file, root, error) != 0 ||
-                   host_cube_check_ssh(file, error) != 0
-               ? error->code
-               : host_cube_check_ends(file, error);
+    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
+             port);
 }
 
-/* Read here, as libconfig ends the program where it cannot.  The name may be
- * that of a pipe, which would be waited for. */
-static int open_text(const char *path, struct host_error *error) {
-    struct stat about;
-    int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd < 0 || fstat(fd, &about) != 0) {
-        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
-                  strerror(errno));
-    } else if (!S_ISREG(about.st_mode)) {
-        host_fail(error, HOST_INPUT, "%s: %s; give the cube's file", path,
-                  S_ISDIR(about.st_mode) ? "a directory" : "a pipe or device");
-    } else {
-        return fd;
-    }
-    if (fd >= 0)
-        close(fd);
-    return -1;
-}
+enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 
-/* NULL: as the error says. */
-static char *read_text(const char *path, struct host_error *error) {
-    int fd = open_text(path, error);
-    char *text = fd < 0 ? NULL : malloc(TEXT_MAX + 1);
-    size_t size = 0;
-    ssize_t got = text == NULL ? 0 : 1;
-    while (got > 0 && size <= TEXT_MAX) {
-        got = read(fd, text + size, TEXT_MAX + 1 - size);
-        size += got > 0 ? (size_t)got : 0;
-    }
-    if (fd < 0)
-        return NULL;
-    if (text == NULL) {
-        host_fail_memory(error, "the cube file");
-    } else if (got < 0) {
-        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
-                  strerror(errno));
-    } else if (size > TEXT_MAX || memchr(text, '\0', size) != NULL) {
-        host_fail(error, HOST_INPUT,
-                  "%s: not a text of at most %d MiB; give the cube's file",
-                  path, TEXT_MAX >> 20);
-    } else {
-        text[size] = '\0';
-    }
-    close(fd);
-    if (error->code != 0) {
-        free(text);
-        text = NULL;
-    }
-    return text;
-}
-
-static int host_cube_scan(const char *path, const char *text,
-                          struct host_error *error);
-
-int host_cube_file_parse(struct host_cube_file *file, const char *path,
-                         const char *text, struct host_error *error) {
-    config_t config;
-    int status;
-    memset(file, 0, sizeof *file);
-    file->path = path;
-    if (host_cube_scan(path, text, error) != 0)
-        return error->code;
-    config_init(&config);
-    if (config_read_string(&config, text) == CONFIG_TRUE) {
-        status = read_settings(file, &config, error);
-    } else {
-        status =
-            host_fail(error, HOST_INPUT,
-                      "%s:%d: %s; correct it as in boards/linux/examples", path,
-                      config_error_line(&config), config_error_text(&config));
-    }
-    config_destroy(&config);
-    if (status != 0)
-        host_cube_file_free(file);
-    return status;
-}
-
-int host_cube_file_read(struct host_cube_file *file, const char *path,
-                        struct host_error *error) {
-    char *text = read_text(path, error);
-    int status = text == NULL ? error->code
-                              : host_cube_file_parse(file, path, text, error);
-    free(text);
-    return status;
-}
-
-void host_cube_file_free(struct host_cube_file *file) {
-    free(file->wire);
-    free(file->pin);
-    free(file->ssh);
-    file->wire = NULL;
-    file->pin = NULL;
-    file->ssh = NULL;
-    secure_wipe(file->key, sizeof file->key);
-}
-
-/* --- cube scan ------------------------------------------------------------ */
+/* --- the text ---------------------------------------------------------------
+ */
 
 /* A cube file has three brackets in each other and nine settings side by side.
  * The library bounds neither, compares each setting's name with all beside it,
@@ -328,8 +373,8 @@ static const char *take(struct scan *s) {
 
 /* Whether the library can be given a text: HOST_INPUT with the line where it
  * asks for other files, or for more than any cube file has.  Work: a pass. */
-static int host_cube_scan(const char *path, const char *text,
-                          struct host_error *error) {
+static int look_through(const char *path, const char *text,
+                        struct host_error *error) {
     struct scan s = {.at = text, .line = 1};
     while (*s.at != '\0') {
         const char *end = skip(s.at);
@@ -343,237 +388,97 @@ static int host_cube_scan(const char *path, const char *text,
     return 0;
 }
 
-/* --- cube values ---------------------------------------------------------- */
-
-int host_cube_wrong(const struct host_cube_file *file,
-                    const config_setting_t *where, struct host_error *error,
-                    const char *what) {
-    return host_fail(error, HOST_INPUT, "%s:%u: %s", file->path,
-                     where == NULL ? 1 : config_setting_source_line(where),
-                     what);
-}
-
-int host_cube_check_names(const struct host_cube_file *file,
-                          const config_setting_t *group,
-                          const char *const names[], struct host_error *error) {
-    for (int i = 0; i < config_setting_length(group); i++) {
-        const config_setting_t *member =
-            config_setting_get_elem(group, (unsigned)i);
-        const char *name = config_setting_name(member);
-        bool known = false;
-        for (unsigned k = 0; names[k] != NULL; k++)
-            known = known || strcmp(names[k], name) == 0;
-        if (!known) {
-            char text[160];
-            snprintf(text, sizeof text,
-                     "%.60s: no such setting here; see host/nodes/README.md "
-                     "for those that there are",
-                     name);
-            return host_cube_wrong(file, member, error, text);
-        }
+/* Read here, as libconfig ends the program where it cannot.  The name may be
+ * that of a pipe, which would be waited for. */
+static int open_text(const char *path, struct host_error *error) {
+    struct stat about;
+    int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    if (fd < 0 || fstat(fd, &about) != 0) {
+        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
+                  strerror(errno));
+    } else if (!S_ISREG(about.st_mode)) {
+        host_fail(error, HOST_INPUT, "%s: %s; give the cube's file", path,
+                  S_ISDIR(about.st_mode) ? "a directory" : "a pipe or device");
+    } else {
+        return fd;
     }
-    return 0;
-}
-
-/* What libconfig reads of a setting of another
- * type, or of one beyond an int, is 0. */
-bool host_cube_is_number(const config_setting_t *setting, int lo, int hi,
-                         int *value) {
-    long long n = config_setting_get_int64(setting);
-    int type = config_setting_type(setting);
-    if ((type != CONFIG_TYPE_INT && type != CONFIG_TYPE_INT64) || n < lo ||
-        n > hi)
-        return false;
-    *value = (int)n;
-    return true;
-}
-
-bool host_cube_take_number(const config_setting_t *group, const char *name,
-                           int lo, int hi, int *value) {
-    const config_setting_t *member = config_setting_get_member(group, name);
-    return member == NULL || host_cube_is_number(member, lo, hi, value);
-}
-
-int host_cube_resolve(const struct host_cube_file *file,
-                      const config_setting_t *where,
-                      struct tcp_address *address, struct host_error *error) {
-    const char *text = config_setting_get_string(where);
-    char why[400];
-    int code = host_resolve(text == NULL ? "" : text, address, why, sizeof why);
-    return code == 0 ? 0
-                     : host_fail(error, code, "%s:%u: %s", file->path,
-                                 config_setting_source_line(where), why);
-}
-
-int host_cube_beside(const struct host_cube_file *file,
-                     const config_setting_t *where, char *path, size_t size) {
-    const char *name = config_setting_get_string(where);
-    const char *slash = strrchr(file->path, '/');
-    if (name == NULL || name[0] == '\0')
-        return -1;
-    int folder =
-        name[0] == '/' || slash == NULL ? 0 : (int)(slash - file->path) + 1;
-    int length = snprintf(path, size, "%.*s%s", folder, file->path, name);
-    return length < (int)size ? 0 : -1;
-}
-
-void host_cube_print_address(const struct tcp_address *address, char *text,
-                             size_t size) {
-    if (tcp_address_path(address) != NULL) {
-        snprintf(text, size, "%s", tcp_address_path(address));
-        return;
-    }
-    char host[NI_MAXHOST], port[NI_MAXSERV];
-    if (getnameinfo(&address->to.any, address->size, host, sizeof host, port,
-                    sizeof port, NI_NUMERICHOST | NI_NUMERICSERV) != 0) {
-        snprintf(text, size, "?");
-        return;
-    }
-    snprintf(text, size, strchr(host, ':') != NULL ? "[%s]:%s" : "%s:%s", host,
-             port);
-}
-
-/* Boards with Linux that the host reaches over ssh: `ssh` and `folder` of a
- * cube file's nodes. */
-
-/* A word that no shell, and no option of ssh, takes for anything else. */
-static bool is_destination(const char *text) {
-    bool good = text[0] != '\0' && text[0] != '-';
-    for (const char *at = text; *at != '\0'; at++) {
-        good =
-            good && *at > ' ' && *at < 0x7f && strchr("'\"\\`$", *at) == NULL;
-    }
-    return good;
-}
-
-/* A line feed would end a line of a unit of systemd. */
-static bool is_folder(const char *text) {
-    bool good = text[0] != '\0';
-    for (const char *at = text; *at != '\0'; at++)
-        good = good && (uint8_t)*at >= ' ' && *at != 0x7f;
-    return good;
-}
-
-int host_cube_read_ssh(struct host_cube_file *file,
-                       const config_setting_t *group, unsigned node,
-                       struct host_error *error) {
-    const config_setting_t *to = config_setting_get_member(group, "ssh");
-    const config_setting_t *folder = config_setting_get_member(group, "folder");
-    const char *text = to == NULL ? NULL : config_setting_get_string(to);
-    const char *path = folder == NULL ? "" : config_setting_get_string(folder);
-    if (to == NULL && folder == NULL)
-        return 0;
-    if (text == NULL || strlen(text) >= HOST_SSH_MAX || !is_destination(text)) {
-        return host_cube_wrong(file, to == NULL ? folder : to, error,
-                               "ssh: not who and where; write \"pi@10.0.0.11\" "
-                               "or \"ssh://pi@10.0.0.11:2222\"");
-    }
-    if (path == NULL || strlen(path) >= HOST_SSH_MAX ||
-        (folder != NULL && !is_folder(path))) {
-        return host_cube_wrong(file, folder, error,
-                               "folder: not a folder of the board; write "
-                               "\"/opt/incode\", or leave it out");
-    }
-    if (file->ssh == NULL)
-        file->ssh = calloc(file->nodes, sizeof *file->ssh);
-    if (file->ssh == NULL)
-        return host_fail_memory(error, "the cube file");
-    strcpy(file->ssh[node].to, text);
-    strcpy(file->ssh[node].folder, path);
-    file->ssh[node].line = config_setting_source_line(group);
-    return 0;
-}
-
-static int host_cube_check_ssh(const struct host_cube_file *file,
-                               struct host_error *error) {
-    for (unsigned i = 0; i < file->nodes && error->code == 0; i++) {
-        const struct host_cube_ssh *ssh = host_cube_ssh(file, i);
-        if (ssh != NULL && (file->local[i] || host_cube_is_bare(file, i))) {
-            host_fail(error, HOST_INPUT, "%s:%u: ssh: node %u %s", file->path,
-                      ssh->line, i,
-                      file->local[i]
-                          ? "is started by the host itself; take it out of "
-                            "start, or leave ssh out"
-                          : "has no system to log in to; leave ssh out");
-        }
-    }
-    return error->code;
-}
-
-const struct host_cube_ssh *host_cube_ssh(const struct host_cube_file *file,
-                                          unsigned node) {
-    return file->ssh != NULL && node < file->nodes &&
-                   file->ssh[node].to[0] != '\0'
-               ? &file->ssh[node]
-               : NULL;
-}
-
-/* --- cube key ------------------------------------------------------------- */
-
-enum { TEXT_BYTES = 2 * SECURE_KEY_BYTES + 1 };
-
-static bool draw_digits(char text[TEXT_BYTES]) {
-    static const char digits[] = "0123456789abcdef";
-    uint8_t key[SECURE_KEY_BYTES];
-    if (getrandom(key, sizeof key, 0) != (ssize_t)sizeof key)
-        return false;
-    for (unsigned i = 0; i < SECURE_KEY_BYTES; i++) {
-        text[2 * i] = digits[key[i] >> 4];
-        text[2 * i + 1] = digits[key[i] & 15];
-    }
-    text[TEXT_BYTES - 1] = '\n';
-    secure_wipe(key, sizeof key);
-    return true;
-}
-
-static bool write_all(int fd, const char *text, size_t size) {
-    while (size > 0) {
-        ssize_t written = write(fd, text, size);
-        if (written < 0 && errno != EINTR)
-            return false;
-        text += written > 0 ? written : 0;
-        size -= written > 0 ? (size_t)written : 0;
-    }
-    return true;
-}
-
-/* False: errno says why. */
-static bool fill(int fd, const char *text, size_t size, mode_t mode) {
-    return fchmod(fd, mode) == 0 && write_all(fd, text, size) && fsync(fd) == 0;
-}
-
-int host_key_write(const char *path, const char *text, size_t size, mode_t mode,
-                   struct host_error *error) {
-    int fd = host_create(path, mode & 0600);
-    if (fd < 0 && errno == EEXIST) {
-        return host_fail(error, HOST_INPUT,
-                         "%s: is there already, and may be a key in use; give "
-                         "another name",
-                         path);
-    }
-    bool good = fd >= 0 && fill(fd, text, size, mode);
-    int reason = errno;
-    if (fd >= 0 && close(fd) != 0 && good) {
-        reason = errno;
-        good = false;
-    }
-    if (good)
-        return 0;
     if (fd >= 0)
-        (void)unlink(path);
-    return host_fail(error, HOST_INPUT,
-                     "%s: %s; give a name where a file can be written", path,
-                     strerror(reason));
+        close(fd);
+    return -1;
 }
 
-int host_key_make(const char *path, struct host_error *error) {
-    char text[TEXT_BYTES];
-    int status =
-        draw_digits(text)
-            ? host_key_write(path, text, sizeof text, 0600, error)
-            : host_fail(error, HOST_BROKEN,
-                        "%s: %s; the kernel gives no random numbers, try again",
-                        path, strerror(errno));
-    secure_wipe(text, sizeof text);
+/* NULL: as the error says. */
+static char *read_text(const char *path, struct host_error *error) {
+    int fd = open_text(path, error);
+    char *text = fd < 0 ? NULL : malloc(TEXT_MAX + 1);
+    size_t size = 0;
+    ssize_t got = text == NULL ? 0 : 1;
+    while (got > 0 && size <= TEXT_MAX) {
+        got = read(fd, text + size, TEXT_MAX + 1 - size);
+        size += got > 0 ? (size_t)got : 0;
+    }
+    if (fd < 0)
+        return NULL;
+    if (text == NULL) {
+        host_fail_memory(error, "the cube file");
+    } else if (got < 0) {
+        host_fail(error, HOST_INPUT, "%s: %s; check name and rights", path,
+                  strerror(errno));
+    } else if (size > TEXT_MAX || memchr(text, '\0', size) != NULL) {
+        host_fail(error, HOST_INPUT,
+                  "%s: not a text of at most %d MiB; give the cube's file",
+                  path, TEXT_MAX >> 20);
+    } else {
+        text[size] = '\0';
+    }
+    close(fd);
+    if (error->code != 0) {
+        free(text);
+        text = NULL;
+    }
+    return text;
+}
+
+int host_cube_file_parse(struct host_cube_file *file, const char *path,
+                         const char *text, struct host_error *error) {
+    config_t config;
+    int status;
+    memset(file, 0, sizeof *file);
+    file->path = path;
+    if (look_through(path, text, error) != 0)
+        return error->code;
+    config_init(&config);
+    if (config_read_string(&config, text) == CONFIG_TRUE) {
+        status = host_cube_read_settings(file, &config, error) != 0
+                     ? error->code
+                     : check(file, error);
+    } else {
+        status =
+            host_fail(error, HOST_INPUT,
+                      "%s:%d: %s; correct it as in boards/linux/examples", path,
+                      config_error_line(&config), config_error_text(&config));
+    }
+    config_destroy(&config);
+    if (status != 0)
+        host_cube_file_free(file);
     return status;
+}
+
+int host_cube_file_read(struct host_cube_file *file, const char *path,
+                        struct host_error *error) {
+    char *text = read_text(path, error);
+    int status = text == NULL ? error->code
+                              : host_cube_file_parse(file, path, text, error);
+    free(text);
+    return status;
+}
+
+void host_cube_file_free(struct host_cube_file *file) {
+    free(file->wire);
+    free(file->pin);
+    free(file->ssh);
+    file->wire = NULL;
+    file->pin = NULL;
+    file->ssh = NULL;
+    secure_wipe(file->key, sizeof file->key);
 }

@@ -576,7 +576,7 @@ printf '%064d\n' 0 > "$in/seen.key"
 chmod 640 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"
 check 'cube/a key that others can read' "$(last "$scratch/errors")" \
-    grep -q "^incode: .*seen.cube:1: key .*/seen.key: can be read by others.*; " \
+    grep -q "^incode: .*seen.cube:1: key: .*/seen.key: can be read by others.*; " \
     "$scratch/errors"
 chmod 600 "$in/seen.key"
 cube "$in/seen.cube" > "$scratch/output" 2> "$scratch/errors"

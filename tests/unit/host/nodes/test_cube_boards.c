@@ -93,17 +93,16 @@ TEST(what_a_board_has_not) {
          ");",
          "a.cube:2: no link between nodes 0 and 1"},
         {"dimension = 0;\nnodes = [1]; links = (" HOST_WIRE ");",
-         "a.cube:2: nodes: no list; "},
+         "a.cube:2: nodes: not a list of groups"},
         {"dimension = 0;\nnodes = (1); links = (" HOST_WIRE ");",
          "nodes: not a list of groups"},
         {"dimension = 0;\nlinks = (7, " HOST_WIRE ");",
          "a.cube:2: links: not a list of groups"},
         {"dimension = 0;\nnodes = ( { node = 1; " M7 "} ); links = (" HOST_WIRE
          ");",
-         "a.cube:2: nodes: an entry without a node of this cube"},
+         "a.cube:2: node: not a node of this cube; give 0 to 0"},
         {"dimension = 0;\nnodes = ( { node = 0; } ); links = (" HOST_WIRE ");",
-         "a.cube:2: nodes: an entry without a node of this cube, or with "
-         "nothing"},
+         "a.cube:2: nodes: an entry with nothing of its node"},
         {"dimension = 0; nodes = ( { node = 0; " M7 "},\n{ node = 0; " M7
          "} ); links = (" HOST_WIRE ");",
          "a.cube:2: nodes: a node twice"},

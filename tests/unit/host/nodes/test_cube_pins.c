@@ -127,7 +127,7 @@ TEST(what_is_wrong_with_a_chips) {
         {"reset = { chip = \"c\"; line = 1; open_drain = true; };",
          "a.cube:2: reset: open_drain: such a line can only pull low; add"},
         {"reset = { chip = \"c\";\n line = 1; active_high = true; };",
-         "a.cube:3: active_high: no such setting"},
+         "a.cube:3: reset: active_high: no such setting"},
         {"reset = { chip = \"c\"; line = 1; };\nboot = { chip = \"c\"; line = "
          "1; };",
          "a.cube:3: boot: node 0 has that line as well, by line 2 of this "
