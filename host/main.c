@@ -34,85 +34,65 @@
 
 const char *argp_program_version = "incode " NODE_VERSION;
 
-enum { ARGUMENTS_MAX = 4, KEY_FORMAT_IN = 256, KEY_FORMAT_OUT, KEY_SIGN };
+enum { ARGUMENTS_MAX = 4 };
 
 /* What the small commands take: arguments, and a few options. */
 struct simple {
     const char *argument[ARGUMENTS_MAX];
-    unsigned count, least, most;
+    unsigned count, wants;
     const char *output;
     const char *format;
     uint64_t seed;
     bool sign;
     const char *wanted; /* names of the arguments */
-    struct host_error *error;
 };
 
-static error_t parse_simple(int key, char *value, struct argp_state *state) {
-    struct simple *s = state->input;
-    switch (key) {
-    case 'o':
-        s->output = value;
-        return 0;
-    case KEY_FORMAT_IN:
-    case KEY_FORMAT_OUT:
-        s->format = value;
-        return 0;
-    case KEY_SIGN:
-        s->sign = true;
-        return 0;
-    case 's':
-        (void)host_option_number("seed", value, 0, UINT64_MAX, &s->seed,
-                                 s->error);
-        return 0;
-    case ARGP_KEY_ARG:
-        if (s->count == s->most) {
-            host_fail(s->error, HOST_USAGE,
-                      "%s: one argument too many; give %s, and quote names "
-                      "with blanks",
-                      value, s->wanted);
-        } else {
-            s->argument[s->count++] = value;
-        }
-        return 0;
-    case ARGP_KEY_END:
-        if (s->count < s->least) {
-            const char *blank = strrchr(state->name, ' '); /* incode gen */
-            host_fail(s->error, HOST_USAGE,
-                      "%s: too few arguments; give %s, see %s --help",
-                      blank == NULL ? state->name : blank + 1, s->wanted,
-                      state->name);
-        }
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
+static void take_argument(void *into, const char *value,
+                          struct host_error *error) {
+    struct simple *s = into;
+    if (s->count == s->wants) {
+        host_fail(error, HOST_USAGE,
+                  "%s: one argument too many; give %s, and quote names with "
+                  "blanks",
+                  value, s->wanted);
+        return;
     }
+    s->argument[s->count++] = value;
 }
 
-/* As argp asks for it: `text` itself, or with the formats behind it, to be
- * freed. */
-static char *list_formats(int key, const char *text, void *input) {
+/* The text with the formats behind it, to be freed. */
+static char *list_formats(const char *text, enum host_use use) {
     char list[HOST_FORMAT_LIST_MAX], *whole = NULL;
-    (void)input;
-    if (key != KEY_FORMAT_IN && key != KEY_FORMAT_OUT)
-        return (char *)text;
-    host_format_list(key == KEY_FORMAT_IN ? HOST_READ_POINTS
-                                          : HOST_WRITE_POINTS,
-                     list, sizeof list);
+    host_format_list(use, list, sizeof list);
     return asprintf(&whole, "%s %s", text, list) < 0 ? NULL : whole;
 }
 
+static char *list_read(const char *text) {
+    return list_formats(text, HOST_READ_POINTS);
+}
+
+static char *list_written(const char *text) {
+    return list_formats(text, HOST_WRITE_POINTS);
+}
+
 /* Not 0: the command ends with error->code. */
-static int parse(int argc, char **argv, const struct argp_option *options,
+static int parse(int argc, char **argv, const struct host_option *rows,
                  const char *arguments, const char *about, unsigned count,
                  struct simple *simple, struct host_error *error) {
-    const struct argp argp = {options, parse_simple, arguments, about,
-                              NULL,    list_formats, NULL};
-    simple->least = count;
-    simple->most = count;
+    const struct host_options options = {.rows = rows,
+                                         .argument = take_argument,
+                                         .arguments = arguments,
+                                         .about = about};
+    const char *blank = strrchr(argv[0], ' '); /* incode gen */
+    simple->wants = count;
     simple->wanted = arguments;
-    simple->error = error;
-    return host_options_parse(&argp, argc, argv, 0, simple, error);
+    if (host_options_parse(&options, argc, argv, false, simple, NULL, error) !=
+            0 ||
+        simple->count == count)
+        return error->code;
+    return host_fail(error, HOST_USAGE,
+                     "%s: too few arguments; give %s, see %s --help",
+                     blank == NULL ? argv[0] : blank + 1, arguments, argv[0]);
 }
 
 static int command_run(int argc, char **argv, struct host_error *error) {
@@ -133,17 +113,17 @@ static int command_run(int argc, char **argv, struct host_error *error) {
 }
 
 static int command_gen(int argc, char **argv, struct host_error *error) {
-    static const struct argp_option options[] = {
-        {"seed", 's', "S", 0,
+    static const struct host_option options[] = {
+        {"seed", 's', "S",
          "Another seed makes other points; bluntfin, grid and rotated have no "
          "chance in them. Default: 1",
-         0},
-        {"output", 'o', "FILE", 0,
+         HOST_AT(struct simple, seed), .most = UINT64_MAX},
+        {"output", 'o', "FILE",
          "Write to FILE, by its extension; -, the default, is .xyz on standard "
          "output",
-         0},
-        {"format", KEY_FORMAT_OUT, "NAME", 0,
-         "What FILE is to be, where no extension tells:", 0},
+         HOST_AT(struct simple, output)},
+        {"format", 0, "NAME", "What FILE is to be, where no extension tells:",
+         HOST_AT(struct simple, format), .fill = list_written},
         {0}};
     struct host_points points = {0};
     struct simple s = {.seed = 1};
@@ -186,9 +166,9 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
 }
 
 static int command_verify(int argc, char **argv, struct host_error *error) {
-    static const struct argp_option options[] = {
-        {"format", KEY_FORMAT_IN, "NAME", 0,
-         "What POINTS holds, where no extension tells:", 0},
+    static const struct host_option options[] = {
+        {"format", 0, "NAME", "What POINTS holds, where no extension tells:",
+         HOST_AT(struct simple, format), .fill = list_read},
         {0}};
     static struct host_check_report report;
     struct host_points points = {0};
@@ -246,9 +226,10 @@ static int command_digest(int argc, char **argv, struct host_error *error) {
 }
 
 static int command_convert(int argc, char **argv, struct host_error *error) {
-    static const struct argp_option options[] = {
-        {"format", KEY_FORMAT_IN, "NAME", 0,
-         "IN holds points, and no extension tells of what format:", 0},
+    static const struct host_option options[] = {
+        {"format", 0, "NAME",
+         "IN holds points, and no extension tells of what format:",
+         HOST_AT(struct simple, format), .fill = list_read},
         {0}};
     struct simple s = {0};
     if (parse(argc, argv, options, "IN OUT",
@@ -267,11 +248,11 @@ static int command_draw(int argc, char **argv, struct host_error *error) {
 }
 
 static int command_key(int argc, char **argv, struct host_error *error) {
-    static const struct argp_option options[] = {
-        {"sign", KEY_SIGN, NULL, 0,
+    static const struct host_option options[] = {
+        {"sign", 0, NULL,
          "Makes a pair to sign images with instead: the secret half in FILE, "
          "the public one in FILE.pub",
-         0},
+         HOST_AT(struct simple, sign)},
         {0}};
     struct simple s = {0};
     if (parse(
@@ -356,13 +337,10 @@ static const char *command_names(void) {
     return names;
 }
 
-/* As argp asks for it: the commands, where its text has %s. */
-static char *list_commands(int key, const char *text, void *input) {
+/* The commands, where the text has %s. */
+static char *list_commands(const char *text) {
     char rows[TEXT_MAX] = "", usage[64], *whole = NULL;
     size_t used = 0;
-    (void)input;
-    if (key != ARGP_KEY_HELP_POST_DOC)
-        return (char *)text;
     for (size_t i = 0; i < COMMANDS; i++) {
         const struct command *c = &commands[i];
         const char *more = strchr(c->help, '\n');
@@ -383,28 +361,13 @@ static const char *command_name(const void *unused, unsigned i) {
     return i < COMMANDS ? commands[i].name : NULL;
 }
 
-/* Stops at the first word that is no option: the command. */
-/* NOLINTNEXTLINE(readability-non-const-parameter): argp's signature */
-static error_t parse_top(int key, char *value, struct argp_state *state) {
-    int *command = state->input;
-    if (key != ARGP_KEY_ARG)
-        return ARGP_ERR_UNKNOWN;
-    (void)value;
-    *command = state->next - 1;
-    state->next = state->argc;
-    return 0;
-}
-
-static const struct argp top = {
-    NULL,
-    parse_top,
-    "COMMAND ARGUMENT...",
-    "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
-    "Commands:\n%s\n"
-    "incode COMMAND --help says more of each, and README.md of all.",
-    NULL,
-    list_commands,
-    NULL};
+static const struct host_options top = {
+    .first = true, /* which is the command */
+    .arguments = "COMMAND ARGUMENT...",
+    .about = "Exact Delaunay tetrahedra on a hypercube of small nodes.\v"
+             "Commands:\n%s\n"
+             "incode COMMAND --help says more of each, and README.md of all.",
+    .fill = list_commands};
 
 /* No command: what was meant. */
 static int refuse_command(const char *word, struct host_error *error) {
@@ -450,7 +413,8 @@ static int command_help(int argc, char **argv, struct host_error *error) {
         return dispatch(2, words, error);
     }
     char *words[] = {program, option, NULL};
-    return host_options_parse(&top, 2, words, 0, NULL, error);
+    int none = 0;
+    return host_options_parse(&top, 2, words, false, &none, NULL, error);
 }
 
 /* What was printed, help included, has to arrive. */
@@ -464,8 +428,7 @@ static void finish_stdout(void) {
 
 static int run(int argc, char **argv, struct host_error *error) {
     int command = 0;
-    if (host_options_parse(&top, argc, argv, ARGP_IN_ORDER, &command, error) !=
-        0)
+    if (host_options_parse(&top, argc, argv, false, &command, NULL, error) != 0)
         return error->code;
     if (command == 0) {
         return host_fail(error, HOST_USAGE,

@@ -1,9 +1,9 @@
 #include "options.h"
 
+#include <argp.h>
 #include <assert.h>
 #include <getopt.h>
 #include <limits.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,45 +12,68 @@
 #include "text.h"
 
 enum {
-    KEY_ANSWER = 1,
-    KEY_LONG = 256, /* and beyond: getopt takes names of one key for one */
+    KEY_ANSWER = 1, /* by argp, which ends the program */
+    KEY_LONG = 256, /* and beyond, a row's */
     SHORT_MAX = 3 * HOST_OPTIONS_MAX + 8,
     NAMES_MAX = 160
 };
 
-/* A table as getopt has it. */
+/* The rows of a command, as getopt and argp have them. */
 struct table {
+    const struct host_option *row[HOST_OPTIONS_MAX];
+    unsigned rows, more; /* of them before the command's own */
     struct option name[HOST_OPTIONS_MAX + 4];
     char letters[SHORT_MAX];
+    struct argp_option help[HOST_OPTIONS_MAX + 1];
 };
 
-static void fill(struct table *t, const struct argp_option *options,
-                 unsigned flags) {
-    /* Those that argp answers, and ends the program. */
+static bool is_last(const struct host_option *row) {
+    return row->name == NULL && row->help == NULL;
+}
+
+/* Headings begin a group, and argp prints one after the other. */
+static void add_rows(struct table *t, const struct host_option *row) {
+    int group = t->rows == 0 ? 0 : t->help[t->rows - 1].group;
+    for (; row != NULL && !is_last(row); row++) {
+        unsigned i = t->rows++;
+        assert(i < HOST_OPTIONS_MAX);
+        group += row->name == NULL ? 1 : 0;
+        int key = row->name == NULL  ? 0
+                  : row->letter != 0 ? row->letter
+                                     : KEY_LONG + (int)i;
+        t->row[i] = row;
+        t->help[i] = (struct argp_option){
+            row->name,     key,
+            row->argument, row->omitted == NULL ? 0 : OPTION_ARG_OPTIONAL,
+            row->help,     group};
+    }
+}
+
+static void fill_table(struct table *t, const struct host_options *options) {
     static const char *const answered[] = {"help", "usage", "version"};
     size_t n = 0, letters = 0;
     memset(t, 0, sizeof *t);
-    if ((flags & ARGP_IN_ORDER) != 0)
+    add_rows(t, options->more);
+    t->more = t->rows;
+    add_rows(t, options->rows);
+    if (options->first)
         t->letters[letters++] = '+';
     t->letters[letters++] = ':';
     t->letters[letters++] = 'V';
     t->letters[letters++] = 'h';
     for (; n < sizeof answered / sizeof answered[0]; n++)
         t->name[n] = (struct option){answered[n], 0, NULL, KEY_ANSWER};
-    for (size_t i = 0; options != NULL; i++) {
-        const struct argp_option *o = &options[i];
-        if (o->name == NULL && o->key == 0 && o->doc == NULL)
-            break;
-        assert(i < HOST_OPTIONS_MAX - 1);
-        int value = o->arg == NULL                          ? no_argument
-                    : (o->flags & OPTION_ARG_OPTIONAL) != 0 ? optional_argument
-                                                            : required_argument;
-        if (o->name != NULL) {
-            t->name[n++] =
-                (struct option){o->name, value, NULL, KEY_LONG + (int)i};
-        }
-        if (o->key > ' ' && o->key < 0x7f) {
-            t->letters[letters++] = (char)o->key;
+    for (unsigned i = 0; i < t->rows; i++) {
+        const struct host_option *row = t->row[i];
+        int value = row->argument == NULL  ? no_argument
+                    : row->omitted != NULL ? optional_argument
+                                           : required_argument;
+        if (row->name == NULL)
+            continue;
+        t->name[n++] =
+            (struct option){row->name, value, NULL, KEY_LONG + (int)i};
+        if (row->letter != 0) {
+            t->letters[letters++] = row->letter;
             for (int colons = 0; colons < value; colons++) /* or two */
                 t->letters[letters++] = ':';
         }
@@ -144,15 +167,28 @@ static bool find_readme(char path[PATH_MAX]) {
     return path[0] != '\0';
 }
 
-static char *(*filter_of_table)(int key, const char *text, void *input);
+/* Whose help it is, and argp's filter of its texts. */
+static const struct host_options *helped;
+static const struct table *helped_table;
 
-/* A filter of argp's help text: gives the path of README.md. */
+/* Each text as it is, or longer, and to be freed. */
+static char *longer(int key, const char *text) {
+    if (key == ARGP_KEY_HELP_POST_DOC)
+        return helped->fill == NULL ? (char *)text : helped->fill(text);
+    for (unsigned i = 0; i < helped_table->rows; i++)
+        if (helped_table->help[i].key == key && key != 0 &&
+            helped_table->row[i]->fill != NULL)
+            return helped_table->row[i]->fill(text);
+    return (char *)text;
+}
+
+/* The same, with the path of README.md. */
 static char *name_readme(int key, const char *text, void *input) {
     static const char name[] = "README.md";
-    char *mine = filter_of_table == NULL ? (char *)text
-                                         : filter_of_table(key, text, input);
+    char *mine = longer(key, text);
     char path[PATH_MAX], *whole = NULL;
     char *at = mine == NULL ? NULL : strstr(mine, name);
+    (void)input;
     if (at == NULL || !find_readme(path) ||
         asprintf(&whole, "%.*s%s%s", (int)(at - mine), mine, path,
                  at + strlen(name)) < 0)
@@ -162,55 +198,144 @@ static char *name_readme(int key, const char *text, void *input) {
     return whole;
 }
 
-/* Ends the program, as --help does, unless argp is not to. */
-static void answer_help(const struct argp *argp, char *command, unsigned flags,
-                        void *input) {
-    static char help[] = "--help";
-    char *words[] = {command, help, NULL};
-    if ((flags & ARGP_NO_HELP) == 0)
-        (void)argp_parse(argp, 2, words, 0, NULL, input);
+/* --help and its kin, which argp answers: it ends the program. */
+static int answer(const struct host_options *options, const struct table *t,
+                  char **argv, const char *word, bool silent,
+                  struct host_error *error) {
+    const struct argp argp = {
+        t->help,     NULL, options->arguments, options->about, NULL,
+        name_readme, NULL};
+    char text[16];
+    char *words[] = {argv[0], text, NULL};
+    snprintf(text, sizeof text, "%s", word);
+    helped = options;
+    helped_table = t;
+    if (!silent)
+        (void)argp_parse(&argp, 2, words, 0, NULL, NULL);
+    return host_fail(error, HOST_USAGE,
+                     "%s: no help is given here; leave it "
+                     "out",
+                     word);
 }
 
-/* What getopt, which argp works with, would say of itself. */
-static int check(const struct argp *argp, int argc, char **argv, unsigned flags,
-                 void *input, struct host_error *error) {
+/* --- values -----------------------------------------------------------------
+ */
+
+static void take_row(const struct host_option *row, void *into,
+                     const char *value, struct host_error *error) {
+    char *member = (char *)into + row->at;
+    uint64_t n = 0;
+    int named = 0;
+    if (value == NULL)
+        value = row->omitted;
+    if (row->take != NULL) {
+        row->take(into, value, error);
+        return;
+    }
+    if (row->names != NULL) {
+        named = host_option_choose(row->name, value, row->names, error);
+        if (named < 0)
+            return;
+    } else if (row->kind == HOST_OPTION_NUMBER ||
+               row->kind == HOST_OPTION_UNSIGNED) {
+        if (host_option_number(row->name, value, row->least, row->most, &n,
+                               error) != 0)
+            return;
+        n *= row->unit == 0 ? 1 : row->unit;
+    }
+    switch (row->kind) {
+    case HOST_OPTION_FLAG:
+        *(bool *)(void *)member = true;
+        return;
+    case HOST_OPTION_TEXT:
+        *(const char **)(void *)member = value;
+        return;
+    case HOST_OPTION_NUMBER:
+        *(uint64_t *)(void *)member = n;
+        return;
+    case HOST_OPTION_UNSIGNED:
+        *(unsigned *)(void *)member =
+            row->names == NULL ? (unsigned)n : (unsigned)named;
+        return;
+    case HOST_OPTION_TAKEN:
+        assert(row->take != NULL);
+    }
+}
+
+static int take_arguments(const struct host_options *o, int argc, char **argv,
+                          void *into, struct host_error *error) {
+    const char **one = (const char **)(void *)((char *)into + o->one_at);
+    if (o->first && optind < argc)
+        *(int *)into = optind;
+    for (int i = optind; i < argc && !o->first && error->code == 0; i++) {
+        if (o->argument != NULL) {
+            o->argument(into, argv[i], error);
+        } else if (o->one == NULL) {
+            host_fail(error, HOST_USAGE, "%s: %s", argv[i], o->refusal);
+        } else if (*one != NULL) {
+            host_fail(error, HOST_USAGE,
+                      "%s: one argument too many; give %s alone", argv[i],
+                      o->one);
+        } else {
+            *one = argv[i];
+        }
+    }
+    if (error->code == 0 && o->needed && *one == NULL) {
+        host_fail(error, HOST_USAGE, "%s: not given; give its file, see --help",
+                  o->one);
+    }
+    return error->code;
+}
+
+int host_options_parse(const struct host_options *options, int argc,
+                       char **argv, bool silent, void *into, uint64_t *given,
+                       struct host_error *error) {
     struct table table;
+    uint64_t bits = 0;
     int found;
-    fill(&table, argp->options, flags);
+    fill_table(&table, options);
     optind = 0; /* GNU's way to begin anew */
     opterr = 0;
-    do {
-        optopt = 0;
-        found = getopt_long(argc, argv, table.letters, table.name, NULL);
+    while (optopt = 0, (found = getopt_long(argc, argv, table.letters,
+                                            table.name, NULL)) != -1) {
+        unsigned i = 0;
         if (found == ':') {
             return host_fail(error, HOST_USAGE,
                              "%s: wants a value; see %s --help",
                              argv[optind - 1], argv[0]);
         }
-        if (found == 'h') {
-            answer_help(argp, argv[0], flags, input);
-            return -1;
+        if (found == 'h' || (found == '?' && optopt == '?'))
+            return answer(options, &table, argv, "--help", silent, error);
+        if (found == KEY_ANSWER || found == 'V') {
+            return answer(options, &table, argv,
+                          found == 'V' ? "--version" : argv[optind - 1], silent,
+                          error);
         }
-        if (found == '?' && optopt == '?')
-            break;
         if (found == '?')
             return refuse(&table, argv, error);
-    } while (found != -1 && found != KEY_ANSWER && found != 'V');
-    return 0;
+        while (found != KEY_LONG + (int)i && found != table.row[i]->letter)
+            i++;
+        bool more = i < table.more;
+        take_row(table.row[i], (char *)into + (more ? options->more_at : 0),
+                 optarg, error);
+        if (error->code != 0)
+            return error->code;
+        bits |= more ? 0 : UINT64_C(1) << (i - table.more);
+    }
+    if (given != NULL)
+        *given = bits;
+    return error->code != 0 ? error->code
+                            : take_arguments(options, argc, argv, into, error);
 }
 
-int host_options_parse(const struct argp *argp, int argc, char **argv,
-                       unsigned flags, void *input, struct host_error *error) {
-    struct argp named = *argp;
-    filter_of_table = argp->help_filter;
-    named.help_filter = name_readme;
-    int status = check(&named, argc, argv, flags, input, error);
-    if (status == 0 &&
-        argp_parse(&named, argc, argv, flags, NULL, input) != 0) {
-        status = host_fail(error, HOST_USAGE, "%s: wrong usage; see %s --help",
-                           argv[0], argv[0]);
+bool host_option_given(const struct host_option *rows, uint64_t given,
+                       const char *name) {
+    unsigned i = 0;
+    while (rows[i].name == NULL || strcmp(rows[i].name, name) != 0) {
+        assert(!is_last(&rows[i]));
+        i++;
     }
-    return status != 0 ? status : error->code;
+    return (given >> i & 1) != 0;
 }
 
 int host_option_number(const char *option, const char *value, uint64_t least,
@@ -229,20 +354,26 @@ int host_option_number(const char *option, const char *value, uint64_t least,
                            (unsigned long long)most);
 }
 
-int host_option_argument(int key, const char *name, const char *value,
-                         const char **argument, struct host_error *error) {
-    if (key == ARGP_KEY_END) {
-        return *argument != NULL
-                   ? 0
-                   : host_fail(error, HOST_USAGE,
-                               "%s: not given; give its file, see --help",
-                               name);
+static const char *name_at(const void *context, unsigned i) {
+    return (*(host_row_name *const *)context)(i);
+}
+
+int host_option_choose(const char *option, const char *value,
+                       host_row_name *names, struct host_error *error) {
+    char allowed[sizeof error->text] = "";
+    size_t used = 0;
+    for (unsigned i = 0; names(i) != NULL; i++) {
+        if (strcmp(value, names(i)) == 0)
+            return (int)i;
+        if (used < sizeof allowed) { /* what the error has room for */
+            used += (size_t)snprintf(allowed + used, sizeof allowed - used,
+                                     "%s%s", i == 0 ? "" : ", ", names(i));
+        }
     }
-    if (*argument != NULL) {
-        return host_fail(error, HOST_USAGE,
-                         "%s: one argument too many; give %s alone", value,
-                         name);
-    }
-    *argument = value;
-    return 0;
+    const char *nearest = host_text_nearest(value, name_at, &names);
+    host_fail(error, HOST_USAGE, "--%s %s: no such name; %s%s%sallowed: %s",
+              option, value, nearest == NULL ? "" : "did you mean ",
+              nearest == NULL ? "" : nearest, nearest == NULL ? "" : "? ",
+              allowed);
+    return -1;
 }

@@ -1,37 +1,98 @@
-/* The options of a command, from its table for argp: what argp does, but that
- * whatever is wrong is a host_error, names the option that may have been meant,
- * and is printed as other errors are.
+/* The options of a command, from one table: where each value goes, and what
+ * --help says of it.  Whatever is wrong is a host_error, which names the option
+ * that may have been meant.
  *
- * Memory: 4 KB of stack. */
+ * Memory: 24 KB of stack. */
 #ifndef HOST_OPTIONS_H
 #define HOST_OPTIONS_H
 
-#include <argp.h>
+#include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "error.h"
 
-enum { HOST_OPTIONS_MAX = 96 }; /* rows of a table, groups and end included */
+enum { HOST_OPTIONS_MAX = 64 }; /* rows of a command, headings included */
 
-/* argv[0] is the name for messages ("incode run"); flags: of argp_parse; input:
- * what the parser of `argp` finds as state->input.  That parser tells its own
- * errors with host_fail and returns 0; of --help it hears nothing but what is
- * asked of it.  Not 0: the command ends now with error->code.  --help, -h and
- * --version end the program themselves.  If this program is installed, --help
- * names README.md by the path of the installed one. */
-int host_options_parse(const struct argp *argp, int argc, char **argv,
-                       unsigned flags, void *input, struct host_error *error);
+enum host_option_kind {
+    HOST_OPTION_TAKEN,   /* by `take` */
+    HOST_OPTION_FLAG,    /* bool: becomes true */
+    HOST_OPTION_TEXT,    /* const char * */
+    HOST_OPTION_NUMBER,  /* uint64_t, */
+    HOST_OPTION_UNSIGNED /* unsigned, or an enum: from least to most */
+};
 
-/* For such a parser: the value of --`option`, a whole number from least to most
- * as host_parse_number has it.  0, or HOST_USAGE: *number stays as it is. */
+/* Takes a value for `into`, the struct of a command's options; value: NULL
+ * where the option has none.  Tells what is wrong with host_fail. */
+typedef void host_take(void *into, const char *value, struct host_error *error);
+
+/* Row i of what an option may name; NULL past the last. */
+typedef const char *host_row_name(unsigned i);
+
+struct host_option {
+    const char *name;     /* NULL: a heading; a table ends with {0} */
+    char letter;          /* or 0 */
+    const char *argument; /* as --help names it; NULL: it takes none */
+    const char *help;
+    enum host_option_kind kind;
+    size_t at;            /* of the member, in the command's struct */
+    uint64_t least, most; /* of a number */
+    uint64_t unit;        /* it is multiplied by; 0: 1 */
+    host_row_name *names; /* the value is one of these: it becomes its index */
+    const char *omitted;  /* the argument, where it may be left out */
+    host_take *take;      /* instead of all that */
+    char *(*fill)(const char *text); /* makes `help` longer, by malloc */
+};
+
+/* Of a row: the member that its value goes to. */
+#define HOST_AT(type, member)                                                  \
+    .at = offsetof(type, member),                                              \
+    .kind = _Generic(((type *)0)->member, bool: HOST_OPTION_FLAG,              \
+                     const char *: HOST_OPTION_TEXT,                           \
+                     uint64_t: HOST_OPTION_NUMBER,                             \
+                     unsigned: HOST_OPTION_UNSIGNED)
+
+struct host_options {
+    const struct host_option *rows; /* NULL: none */
+    const struct host_option
+        *more;             /* rows before them, or NULL: their struct */
+    size_t more_at;        /* is there in the command's */
+    const char *arguments; /* as --help names them */
+    const char *about;     /* behind \v: below the options */
+    char *(*fill)(const char *text); /* makes that part longer, by malloc */
+    /* What becomes of arguments, one of: */
+    const char *one;     /* there is one, of this name, a const char *, */
+    size_t one_at;       /* there, */
+    bool needed;         /* which may not be left out; */
+    host_take *argument; /* each is taken, in order; */
+    bool first;          /* the first one ends the options: its index goes to
+                            the struct, an int; */
+    const char *refusal; /* or none is: "ARGUMENT: REFUSAL" */
+};
+
+/* argv[0] is the name for messages ("incode run"), and argv is put in order:
+ * options before arguments.  silent: --help prints nothing, and is an error.
+ * given: NULL, or bits of the rows that were given.  Not 0: the command ends
+ * now with error->code.  --help, -h, --usage and --version end the program
+ * themselves.  If this program is installed, --help names README.md by the path
+ * of the installed one. */
+int host_options_parse(const struct host_options *options, int argc,
+                       char **argv, bool silent, void *into, uint64_t *given,
+                       struct host_error *error);
+
+/* Whether the row of that name was. */
+bool host_option_given(const struct host_option *rows, uint64_t given,
+                       const char *name);
+
+/* For `take`: the value of --`option`, a whole number from least to most as
+ * host_parse_number has it.  0, or HOST_USAGE: *number stays as it is. */
 int host_option_number(const char *option, const char *value, uint64_t least,
                        uint64_t most, uint64_t *number,
                        struct host_error *error);
 
-/* The one argument of a command, which its help calls `name`, at ARGP_KEY_ARG;
- * where the command needs it, at ARGP_KEY_END too.  0, or HOST_USAGE: there is
- * one too many, or none. */
-int host_option_argument(int key, const char *name, const char *value,
-                         const char **argument, struct host_error *error);
+/* For `take`: which of the rows the value is, or -1 with the error: what is
+ * allowed, and what may have been meant. */
+int host_option_choose(const char *option, const char *value,
+                       host_row_name *names, struct host_error *error);
 
 #endif

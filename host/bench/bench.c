@@ -205,18 +205,6 @@ struct link_config host_bench_serial(uint32_t baud) {
 /* --- bench arguments ------------------------------------------------------ */
 
 enum {
-    KEY_ROUNDS = 256,
-    KEY_CLASS,
-    KEY_PEERS,
-    KEY_LARGE,
-    KEY_LIMIT,
-    KEY_QUICK,
-    KEY_CSV,
-    KEY_SVG,
-    KEY_TABLE,
-    KEY_STRATEGY,
-    KEY_BLUNTFIN,
-    KEY_MILLION,
     NODES = 256,
     NODES_QUICK = 64,
     SCALING_NODES = 64,
@@ -226,177 +214,109 @@ enum {
 struct arguments {
     const char *what; /* the benchmark */
     struct host_paper_options paper;
-    /* Options given that they alone have: of_runs paper and scaling, of_rows
-     * these and boards. */
-    const char *of_paper, *of_peers, *of_runs, *of_rows;
     struct host_bench_peers_options peers;
-    struct host_error *error;
+    uint64_t given;
 };
 
-static const struct argp_option options[] = {
-    {NULL, 0, NULL, 0, "Of paper:", 1},
-    {"table", KEY_TABLE, "LIST", 0,
-     "Some tables alone, with commas between: 1 to 7, 11 (the figure), "
-     "relation, goals, check (of the model)",
-     1},
-    {"strategy", KEY_STRATEGY, "NAME", 0, "One strategy alone", 1},
-    {"bluntfin", KEY_BLUNTFIN, "FILE", 0,
-     "The grid of NASA's Blunt Fin. Default: one like it", 1},
-    {"million", KEY_MILLION, NULL, 0,
-     "The goal for 1,000,000 points on 1,024 nodes, too", 1},
-    {NULL, 0, NULL, 0, "Of paper and scaling:", 3},
-    {"quick", KEY_QUICK, NULL, 0,
-     "A tenth of the points, up to 64 nodes; or 30,000 points, up to 8", 3},
-    {"nodes", 'n', "N", 0, "Up to N nodes. Default: 256; or 64", 3},
-    {NULL, 0, NULL, 0, "Of paper, scaling and boards:", 4},
-    {"csv", KEY_CSV, "FILE", 0, "All rows, as CSV", 4},
-    {"svg", KEY_SVG, "FILE", 0,
-     "Figure 11 or both curves, by gnuplot; or each board's instructions as a "
-     "bar",
-     4},
-    {NULL, 0, NULL, 0, "Of peers:", 2},
-    {"rounds", KEY_ROUNDS, "N", 0, "Medians of N rounds. Default: 3", 2},
-    {"class", KEY_CLASS, "NAME", 0,
-     "One class alone: uniform, files, volumes, real, small, thin, growth, "
-     "extremes "
-     "or cube; real, small and cube are of the files given",
-     2},
-    {"peers", KEY_PEERS, "LIST", 0,
-     "Some peers alone, with commas between: cgal, tetgen, qhull", 2},
-    {"large", KEY_LARGE, NULL, 0, "Sets of a million points too", 2},
-    {"limit", KEY_LIMIT, "S", 0,
-     "End a run after S seconds, and go on without. Default: 60", 2},
-    {0}};
-
-static void parse_whole(struct arguments *a, const char *name,
-                        const char *value, unsigned most, unsigned *number) {
-    uint64_t n = 0;
-    (void)host_option_number(name, value, 1, most, &n, a->error);
-    *number = (unsigned)n;
+static void take_nodes(void *into, const char *value,
+                       struct host_error *error) {
+    (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
+                           &((struct arguments *)into)->paper.nodes_max, error);
 }
 
-static void parse_argument(struct arguments *a, const char *value) {
+static void take_class(void *into, const char *value,
+                       struct host_error *error) {
+    ((struct arguments *)into)->peers.class = value;
+    if (host_bench_class_named(value) == NULL) {
+        host_fail(error, HOST_USAGE,
+                  "--class %s: not in this version; allowed: %s", value,
+                  host_bench_class_names());
+    }
+}
+
+static void take_argument(void *into, const char *value,
+                          struct host_error *error) {
+    struct arguments *a = into;
     if (a->what == NULL) {
         a->what = value;
     } else if (a->peers.names == HOST_BENCH_NAMES_MAX) {
-        host_fail(a->error, HOST_USAGE,
-                  "%s: more than %d names; give directories", value,
-                  HOST_BENCH_NAMES_MAX);
+        host_fail(error, HOST_USAGE, "%s: more than %d names; give directories",
+                  value, HOST_BENCH_NAMES_MAX);
     } else {
         a->peers.name[a->peers.names++] = value;
     }
 }
 
-/* False: it is not one of its options. */
-static bool parse_paper(int key, const char *value, struct arguments *a) {
-    struct host_paper_options *paper = &a->paper;
-    switch (key) {
-    case 'n':
-        a->of_runs = "--nodes";
-        (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
-                               &paper->nodes_max, a->error);
-        return true;
-    case KEY_QUICK:
-        a->of_runs = "--quick";
-        paper->quick = true;
-        return true;
-    case KEY_TABLE:
-        a->of_paper = "--table";
-        paper->tables = value;
-        return true;
-    case KEY_STRATEGY:
-        a->of_paper = "--strategy";
-        paper->strategy = value;
-        return true;
-    case KEY_BLUNTFIN:
-        a->of_paper = "--bluntfin";
-        paper->bluntfin = value;
-        return true;
-    case KEY_MILLION:
-        a->of_paper = "--million";
-        paper->large = true;
-        return true;
-    case KEY_CSV:
-        a->of_rows = "--csv";
-        paper->csv = value;
-        return true;
-    case KEY_SVG:
-        a->of_rows = "--svg";
-        paper->svg = value;
-        return true;
-    default:
-        return false;
-    }
-}
+/* Under each heading, which names the benchmarks that have them. */
+static const struct host_option rows[] = {
+    {.help = "Of paper:"},
+    {"table", 0, "LIST",
+     "Some tables alone, with commas between: 1 to 7, 11 (the figure), "
+     "relation, goals, check (of the model)",
+     HOST_AT(struct arguments, paper.tables)},
+    {"strategy", 0, "NAME", "One strategy alone",
+     HOST_AT(struct arguments, paper.strategy)},
+    {"bluntfin", 0, "FILE",
+     "The grid of NASA's Blunt Fin. Default: one like it",
+     HOST_AT(struct arguments, paper.bluntfin)},
+    {"million", 0, NULL, "The goal for 1,000,000 points on 1,024 nodes, too",
+     HOST_AT(struct arguments, paper.large)},
+    {.help = "Of peers:"},
+    {"rounds", 0, "N", "Medians of N rounds. Default: 3",
+     HOST_AT(struct arguments, peers.rounds), .least = 1,
+     .most = HOST_BENCH_ROUNDS_MAX},
+    {"class", 0, "NAME",
+     "One class alone: uniform, files, volumes, real, small, thin, growth, "
+     "extremes or cube; real, small and cube are of the files given",
+     .take = take_class},
+    {"peers", 0, "LIST",
+     "Some peers alone, with commas between: cgal, tetgen, qhull",
+     HOST_AT(struct arguments, peers.peers)},
+    {"large", 0, NULL, "Sets of a million points too",
+     HOST_AT(struct arguments, peers.large)},
+    {"limit", 0, "S",
+     "End a run after S seconds, and go on without. Default: 60",
+     HOST_AT(struct arguments, peers.limit_s), .least = 1, .most = 1000000},
+    {.help = "Of paper and scaling:"},
+    {"quick", 0, NULL,
+     "A tenth of the points, up to 64 nodes; or 30,000 points, up to 8",
+     HOST_AT(struct arguments, paper.quick)},
+    {"nodes", 'n', "N", "Up to N nodes. Default: 256; or 64",
+     .take = take_nodes},
+    {.help = "Of paper, scaling and boards:"},
+    {"csv", 0, "FILE", "All rows, as CSV",
+     HOST_AT(struct arguments, paper.csv)},
+    {"svg", 0, "FILE",
+     "Figure 11 or both curves, by gnuplot; or each board's instructions as a "
+     "bar",
+     HOST_AT(struct arguments, paper.svg)},
+    {0}};
 
-static error_t parse_bench(int key, char *value, struct argp_state *state) {
-    struct arguments *a = state->input;
-    if (parse_paper(key, value, a))
-        return 0;
-    switch (key) {
-    case KEY_ROUNDS:
-        a->of_peers = "--rounds";
-        parse_whole(a, "rounds", value, HOST_BENCH_ROUNDS_MAX,
-                    &a->peers.rounds);
-        return 0;
-    case KEY_LIMIT:
-        a->of_peers = "--limit";
-        parse_whole(a, "limit", value, 1000000, &a->peers.limit_s);
-        return 0;
-    case KEY_CLASS:
-        a->of_peers = "--class";
-        a->peers.class = value;
-        if (host_bench_class_named(value) == NULL) {
-            host_fail(a->error, HOST_USAGE,
-                      "--class %s: not in this version; allowed: %s", value,
-                      host_bench_class_names());
-        }
-        return 0;
-    case KEY_PEERS:
-        a->of_peers = "--peers";
-        a->peers.peers = value;
-        return 0;
-    case KEY_LARGE:
-        a->of_peers = "--large";
-        a->peers.large = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        parse_argument(a, value);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
-
-static const struct argp argp_of_bench = {
-    options,
-    parse_bench,
-    "paper\nlinks\nboards\nscaling\npeers [DIRECTORY|FILE]...",
-    "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
-    "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
-    "paper's figures, for up to 256 nodes in virtual time; links prints what a "
-    "link does over each driver; boards, in the source tree, what a "
-    "tetrahedron costs each bare board, emulated, in instructions and bytes, "
-    "and where they go; scaling, what a point costs from 1,000 to 10,000,000 "
-    "points, measured, and from 1 to 64 nodes, in virtual time; peers, in the "
-    "source tree, runs CGAL, TetGen and "
-    "Qhull in turn with this program on points that it makes and on those "
-    "given, and prints times, ratios and the goals of each class.",
-    NULL,
-    NULL,
-    NULL};
+static const struct host_options options = {
+    .rows = rows,
+    .argument = take_argument,
+    .arguments = "paper\nlinks\nboards\nscaling\npeers [DIRECTORY|FILE]...",
+    .about =
+        "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
+        "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
+        "paper's figures, for up to 256 nodes in virtual time; links prints "
+        "what a link does over each driver; boards, in the source tree, what a "
+        "tetrahedron costs each bare board, emulated, in instructions and "
+        "bytes, and where they go; scaling, what a point costs from 1,000 to "
+        "10,000,000 points, measured, and from 1 to 64 nodes, in virtual time; "
+        "peers, in the source tree, runs CGAL, TetGen and Qhull in turn with "
+        "this program on points that it makes and on those given, and prints "
+        "times, ratios and the goals of each class."};
 
 /* An option that the benchmark has not, or NULL. */
 static const char *other_option(const struct arguments *a) {
-    bool paper = strcmp(a->what, "paper") == 0;
-    bool runs = paper || strcmp(a->what, "scaling") == 0;
-    bool rows = runs || strcmp(a->what, "boards") == 0;
-    bool peers = strcmp(a->what, "peers") == 0;
-    return a->of_paper != NULL && !paper   ? a->of_paper
-           : a->of_runs != NULL && !runs   ? a->of_runs
-           : a->of_rows != NULL && !rows   ? a->of_rows
-           : a->of_peers != NULL && !peers ? a->of_peers
-                                           : NULL;
+    const char *heading = "";
+    for (unsigned i = 0; rows[i].help != NULL; i++) {
+        heading = rows[i].name == NULL ? rows[i].help : heading;
+        if ((a->given >> i & 1) != 0 && strstr(heading, a->what) == NULL)
+            return rows[i].name;
+    }
+    return NULL;
 }
 
 /* Options and arguments that the benchmark has not. */
@@ -415,7 +335,7 @@ static int check(const struct arguments *a, struct host_error *error) {
     const char *other = other_option(a);
     if (other != NULL) {
         return host_fail(error, HOST_USAGE,
-                         "%s: no option of bench %s; see "
+                         "--%s: no option of bench %s; see "
                          "incode bench --help",
                          other, a->what);
     }
@@ -428,9 +348,9 @@ static int check(const struct arguments *a, struct host_error *error) {
 }
 
 int host_bench(int argc, char **argv, struct host_error *error) {
-    struct arguments a = {.peers = {.rounds = 3, .limit_s = 60},
-                          .error = error};
-    if (host_options_parse(&argp_of_bench, argc, argv, 0, &a, error) != 0)
+    struct arguments a = {.peers = {.rounds = 3, .limit_s = 60}};
+    if (host_options_parse(&options, argc, argv, false, &a, &a.given, error) !=
+        0)
         return error->code;
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,

@@ -122,7 +122,7 @@ static int host_script_read(struct host_shell *shell, const char *name,
 
 /* --- console -------------------------------------------------------------- */
 
-enum { LINES = 64, KEY_FILE = 512, KEY_JSON };
+enum { LINES = 64 };
 
 struct options {
     struct host_site_options site;
@@ -130,44 +130,18 @@ struct options {
     unsigned lines;
     const char *file;
     bool json;
-    struct host_error *error;
 };
 
-static const struct argp_option own_rows[] = {
-    {NULL, 0, NULL, 0, "What is done:", 3},
-    {"command", 'c', "LINE", 0,
-     "Do this line, and the next, and leave; may be given several times", 3},
-    {"file", KEY_FILE, "FILE", 0, "Do the lines of FILE, and leave", 3},
-    {"json", KEY_JSON, NULL, 0, "Answer with an object of JSON a command", 3},
-    {0}};
-
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct options *o = state->input;
-    switch (key) {
-    case 'c':
-        if (o->lines == LINES) {
-            host_fail(o->error, HOST_USAGE,
-                      "-c: more than %d lines; put them in a file, and give "
-                      "--file FILE",
-                      LINES);
-        } else {
-            o->line[o->lines++] = value;
-        }
-        return 0;
-    case KEY_FILE:
-        o->file = value;
-        return 0;
-    case KEY_JSON:
-        o->json = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        host_fail(o->error, HOST_USAGE,
-                  "%s: no argument of console; to do a command, write -c",
-                  value);
-        return 0;
-    default:
-        return host_site_option(&o->site, key, value, o->error);
+static void take_line(void *into, const char *value, struct host_error *error) {
+    struct options *o = into;
+    if (o->lines == LINES) {
+        host_fail(error, HOST_USAGE,
+                  "-c: more than %d lines; put them in a file, and give "
+                  "--file FILE",
+                  LINES);
+        return;
     }
+    o->line[o->lines++] = value;
 }
 
 static int read_file(struct host_shell *shell, const char *path,
@@ -197,20 +171,28 @@ static int do_script(struct host_shell *shell, const struct options *o,
 int host_console_command(int argc, char **argv, struct host_error *error) {
     static struct host_console_place place;
     static struct host_shell shell;
-    struct options options = {.error = error};
-    struct argp_option rows[HOST_OPTIONS_MAX];
-    host_site_table(rows, own_rows);
-    const struct argp argp = {
-        rows,
-        parse,
-        "",
-        "Looks at a cube, and tells its nodes what to do: help lists the "
-        "commands. Without a terminal, lines come from standard input, and the "
-        "status is that of the first that failed.",
-        NULL,
-        NULL,
-        NULL};
-    if (host_options_parse(&argp, argc, argv, 0, &options, error) != 0)
+    static const struct host_option rows[] = {
+        {.help = "What is done:"},
+        {"command", 'c', "LINE",
+         "Do this line, and the next, and leave; may be given several times",
+         .take = take_line},
+        {"file", 0, "FILE", "Do the lines of FILE, and leave",
+         HOST_AT(struct options, file)},
+        {"json", 0, NULL, "Answer with an object of JSON a command",
+         HOST_AT(struct options, json)},
+        {0}};
+    static const struct host_options mine = {
+        .rows = rows,
+        .more = host_site_rows,
+        .more_at = offsetof(struct options, site),
+        .refusal = "no argument of console; to do a command, write -c",
+        .arguments = "",
+        .about = "Looks at a cube, and tells its nodes what to do: help lists "
+                 "the commands. Without a terminal, lines come from standard "
+                 "input, and the status is that of the first that failed."};
+    struct options options = {0};
+    if (host_options_parse(&mine, argc, argv, false, &options, NULL, error) !=
+        0)
         return error->code;
     bool person = options.lines == 0 && options.file == NULL &&
                   isatty(STDIN_FILENO) && isatty(STDOUT_FILENO) &&
@@ -243,34 +225,12 @@ int host_console_command(int argc, char **argv, struct host_error *error) {
 
 /* --- nodes ---------------------------------------------------------------- */
 
-enum { NODES_KEY_JSON = 512, SETTLE_US = 12000000 };
+enum { SETTLE_US = 12000000 };
 
 struct nodes_options {
     struct host_site_options site;
     bool json;
-    struct host_error *error;
 };
-
-static const struct argp_option nodes_own_rows[] = {
-    {NULL, 0, NULL, 0, "What is printed:", 3},
-    {"json", NODES_KEY_JSON, NULL, 0, "Print an object of JSON", 3},
-    {0}};
-
-static error_t nodes_parse(int key, char *value, struct argp_state *state) {
-    struct nodes_options *o = state->input;
-    switch (key) {
-    case NODES_KEY_JSON:
-        o->json = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        host_fail(o->error, HOST_USAGE,
-                  "%s: no argument of nodes; to name a cube file, write --cube",
-                  value);
-        return 0;
-    default:
-        return host_site_option(&o->site, key, value, o->error);
-    }
-}
 
 /* Those that begin may need a moment. */
 static int wait_for_all(struct host_shell *shell, struct host_error *error) {
@@ -295,20 +255,23 @@ static int reach(struct host_shell *shell, struct host_error *error) {
 int host_nodes_command(int argc, char **argv, struct host_error *error) {
     static struct host_console_place place;
     static struct host_shell shell;
-    struct nodes_options nodes_options = {.error = error};
-    struct argp_option rows[HOST_OPTIONS_MAX];
-    host_site_table(rows, nodes_own_rows);
-    const struct argp argp = {
-        rows,
-        nodes_parse,
-        "",
-        "Tells which nodes of a cube are there, what is missing, what is wired "
-        "wrongly, and what to do next. Exit status: 0 all nodes and wires are "
-        "there, 4 not.",
-        NULL,
-        NULL,
-        NULL};
-    if (host_options_parse(&argp, argc, argv, 0, &nodes_options, error) != 0)
+    static const struct host_option rows[] = {
+        {.help = "What is printed:"},
+        {"json", 0, NULL, "Print an object of JSON",
+         HOST_AT(struct nodes_options, json)},
+        {0}};
+    static const struct host_options mine = {
+        .rows = rows,
+        .more = host_site_rows,
+        .more_at = offsetof(struct nodes_options, site),
+        .refusal = "no argument of nodes; to name a cube file, write --cube",
+        .arguments = "",
+        .about = "Tells which nodes of a cube are there, what is missing, what "
+                 "is wired wrongly, and what to do next. Exit status: 0 all "
+                 "nodes and wires are there, 4 not."};
+    struct nodes_options nodes_options = {0};
+    if (host_options_parse(&mine, argc, argv, false, &nodes_options, NULL,
+                           error) != 0)
         return error->code;
     host_console_place_init(&place, &nodes_options.site);
     host_shell_init(&shell, &place.place, host_script_sink(),

@@ -109,81 +109,40 @@ static void host_greeting_wait(struct host_greeting *greeting,
 /* --- site ----------------------------------------------------------------- */
 
 enum {
-    KEY_CUBE = 1000, /* beside those that commands have */
-    KEY_PORT,
-    KEY_TCP,
-    KEY_UNIX,
-    KEY_NODES,
-    KEY_BAUD,
-    KEY_KEY,
-    KEY_INSECURE,
     BAUD = 115200,
     GREETING_US = 3000000,
     DIMENSION_UNKNOWN = 0xff /* as SECURE_PORT_UNKNOWN */
 };
 
-static const struct argp_option site_rows[] = {
-    {NULL, 0, NULL, 0, "Where the cube is, one of:", 1},
-    {"cube", KEY_CUBE, "FILE", 0, "As the cube file says; see README.md", 1},
-    {"port", KEY_PORT, "DEVICE", 0,
-     "Node 0 is at this serial port: a name, or usb:SERIAL of an adapter", 1},
-    {"tcp", KEY_TCP, "HOST:PORT", 0, "Node 0 listens there", 1},
-    {"unix", KEY_UNIX, "PATH", 0,
-     "Node 0 is at this socket of the same machine", 1},
-    {NULL, 0, NULL, 0, "Without a cube file:", 2},
-    {"cube-nodes", KEY_NODES, "N", 0,
+static void take_nodes(void *into, const char *value,
+                       struct host_error *error) {
+    (void)host_parse_nodes("--cube-nodes", value, HOST_NODES_MAX, "",
+                           &((struct host_site_options *)into)->nodes, error);
+}
+
+const struct host_option host_site_rows[] = {
+    {.help = "Where the cube is, one of:"},
+    {"cube", 0, "FILE", "As the cube file says; see README.md",
+     HOST_AT(struct host_site_options, cube)},
+    {"port", 0, "DEVICE",
+     "Node 0 is at this serial port: a name, or usb:SERIAL of an adapter",
+     HOST_AT(struct host_site_options, port)},
+    {"tcp", 0, "HOST:PORT", "Node 0 listens there",
+     HOST_AT(struct host_site_options, tcp)},
+    {"unix", 0, "PATH", "Node 0 is at this socket of the same machine",
+     HOST_AT(struct host_site_options, unix_path)},
+    {.help = "Without a cube file:"},
+    {"cube-nodes", 0, "N",
      "Nodes of the cube, a power of two. Default: as node 0 says; a board that "
      "nobody has told yet who it is does not say",
-     2},
-    {"baud", KEY_BAUD, "RATE", 0, "Of the serial port. Default: 115200", 2},
-    {"key", KEY_KEY, "FILE", 0, "The cube's key, for --tcp", 2},
-    {"insecure", KEY_INSECURE, NULL, 0, "--tcp without a key", 2},
+     .take = take_nodes},
+    {"baud", 0, "RATE", "Of the serial port. Default: 115200",
+     HOST_AT(struct host_site_options, baud), .least = 300, .most = 4000000},
+    {"key", 0, "FILE", "The cube's key, for --tcp",
+     HOST_AT(struct host_site_options, key)},
+    {"insecure", 0, NULL, "--tcp without a key",
+     HOST_AT(struct host_site_options, insecure)},
     {0}};
-
-void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
-                     const struct argp_option *own) {
-    unsigned count = sizeof site_rows / sizeof site_rows[0] - 1;
-    memcpy(rows, site_rows, sizeof site_rows);
-    for (; own->name != NULL || own->doc != NULL; own++) {
-        assert(count < HOST_OPTIONS_MAX - 1);
-        rows[count++] = *own;
-    }
-    memset(&rows[count], 0, sizeof rows[count]);
-}
-
-error_t host_site_option(struct host_site_options *options, int key,
-                         char *value, struct host_error *error) {
-    switch (key) {
-    case KEY_CUBE:
-        options->cube = value;
-        return 0;
-    case KEY_PORT:
-        options->port = value;
-        return 0;
-    case KEY_TCP:
-        options->tcp = value;
-        return 0;
-    case KEY_UNIX:
-        options->unix_path = value;
-        return 0;
-    case KEY_NODES:
-        (void)host_parse_nodes("--cube-nodes", value, HOST_NODES_MAX, "",
-                               &options->nodes, error);
-        return 0;
-    case KEY_BAUD:
-        (void)host_option_number("baud", value, 300, 4000000, &options->baud,
-                                 error);
-        return 0;
-    case KEY_KEY:
-        options->key = value;
-        return 0;
-    case KEY_INSECURE:
-        options->insecure = true;
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
 
 int host_site_check(const struct host_site_options *options,
                     struct host_error *error) {

@@ -5,8 +5,6 @@
 #ifndef HOST_SITE_H
 #define HOST_SITE_H
 
-#include <argp.h>
-
 #include "host/base/options.h"
 #include "host/nodes/remote.h"
 #include "host/service/machine.h"
@@ -28,13 +26,8 @@ struct host_site {
     struct host_machine machine;
 };
 
-/* A command's table: the rows of those options, and its own, which end as such
- * a table does.  And what takes them: 0 where the key is one of them, and
- * *error where its value is wrong. */
-void host_site_table(struct argp_option rows[HOST_OPTIONS_MAX],
-                     const struct argp_option *own);
-error_t host_site_option(struct host_site_options *options, int key,
-                         char *value, struct host_error *error);
+/* The rows of those options, for host_options.more. */
+extern const struct host_option host_site_rows[];
 
 /* The words of a command that name the same place, quoted for a shell, as in
  * "--port /dev/ttyUSB0 --baud 9600".  Where they do not fit: what to put there.

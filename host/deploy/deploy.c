@@ -1,6 +1,5 @@
 #include "deploy.h"
 
-#include <argp.h>
 #include <errno.h>
 #include <nettle/sha2.h>
 #include <signal.h>
@@ -157,37 +156,7 @@ const struct host_program *host_programs_take(struct host_programs *programs,
 
 /* --- deploy --------------------------------------------------------------- */
 
-enum {
-    KEY_CUBE = 256,
-    KEY_NODES,
-    KEY_STATUS,
-    KEY_UPDATE,
-    KEY_REMOVE,
-    KEY_DRY_RUN,
-    KEY_PROGRAMS,
-    KEY_SSH_CONFIG,
-    DEPLOY_AT_ONCE = 64
-};
-
-static const struct argp_option options_of_deploy[] = {
-    {"cube", KEY_CUBE, "FILE", 0,
-     "The cube; its nodes that have ssh = \"USER@ADDRESS\" are those meant", 0},
-    {"nodes", KEY_NODES, "SET", 0, "Only these, as in 0-3,7", 0},
-    {"update", KEY_UPDATE, NULL, 0,
-     "Copy what differs from here, and start the node anew where anything did: "
-     "the default",
-     0},
-    {"status", KEY_STATUS, NULL, 0, "Say what is there and whether it runs", 0},
-    {"remove", KEY_REMOVE, NULL, 0, "Stop the node and take all of it away", 0},
-    {"dry-run", KEY_DRY_RUN, NULL, 0,
-     "Look, and say what would be done; nothing changes", 0},
-    {"programs", KEY_PROGRAMS, "FOLDER", 0,
-     "Where the programs of make nodes are, incode-node-aarch64 and the like",
-     0},
-    {"ssh-config", KEY_SSH_CONFIG, "FILE", 0,
-     "Have ssh read this file, as with its -F", 0},
-    {"quiet", 'q', NULL, 0, "Say only what is wrong", 0},
-    {0}};
+enum { DEPLOY_AT_ONCE = 64 };
 
 struct deploy {
     struct host_deploy_job job;
@@ -196,9 +165,10 @@ struct deploy {
     struct host_error *error;
 };
 
-static void take_order(struct deploy *d, enum host_deploy_order order) {
+static void take_order(struct deploy *d, enum host_deploy_order order,
+                       struct host_error *error) {
     if (d->ordered && d->job.order != order) {
-        host_fail(d->error, HOST_USAGE,
+        host_fail(error, HOST_USAGE,
                   "deploy: --status, --update and --remove are different "
                   "orders; give one of them");
     }
@@ -206,51 +176,48 @@ static void take_order(struct deploy *d, enum host_deploy_order order) {
     d->job.order = order;
 }
 
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct deploy *d = state->input;
-    switch (key) {
-    case KEY_CUBE:
-        d->cube = value;
-        return 0;
-    case KEY_NODES:
-        d->nodes = value;
-        return 0;
-    case KEY_STATUS:
-        take_order(d, HOST_STATUS);
-        return 0;
-    case KEY_UPDATE:
-        take_order(d, HOST_DEPLOY);
-        return 0;
-    case KEY_REMOVE:
-        take_order(d, HOST_REMOVE);
-        return 0;
-    case KEY_DRY_RUN:
-        d->job.dry_run = true;
-        return 0;
-    case KEY_PROGRAMS:
-        d->programs = value;
-        return 0;
-    case KEY_SSH_CONFIG:
-        d->job.ssh_config = value;
-        return 0;
-    case 'q':
-        d->quiet = true;
-        return 0;
-    case ARGP_KEY_ARG:
-        host_fail(d->error, HOST_USAGE,
-                  "%s: one argument too many; give --cube FILE", value);
-        return 0;
-    case ARGP_KEY_END:
-        if (d->cube == NULL) {
-            host_fail(d->error, HOST_USAGE,
-                      "deploy: --cube FILE is missing; write one with: incode "
-                      "cube --new");
-        }
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+static void take_status(void *into, const char *value,
+                        struct host_error *error) {
+    (void)value;
+    take_order(into, HOST_STATUS, error);
 }
+
+static void take_update(void *into, const char *value,
+                        struct host_error *error) {
+    (void)value;
+    take_order(into, HOST_DEPLOY, error);
+}
+
+static void take_remove(void *into, const char *value,
+                        struct host_error *error) {
+    (void)value;
+    take_order(into, HOST_REMOVE, error);
+}
+
+static const struct host_option rows[] = {
+    {"cube", 0, "FILE",
+     "The cube; its nodes that have ssh = \"USER@ADDRESS\" are those meant",
+     HOST_AT(struct deploy, cube)},
+    {"nodes", 0, "SET", "Only these, as in 0-3,7",
+     HOST_AT(struct deploy, nodes)},
+    {"update", 0, NULL,
+     "Copy what differs from here, and start the node anew where anything did: "
+     "the default",
+     .take = take_update},
+    {"status", 0, NULL, "Say what is there and whether it runs",
+     .take = take_status},
+    {"remove", 0, NULL, "Stop the node and take all of it away",
+     .take = take_remove},
+    {"dry-run", 0, NULL, "Look, and say what would be done; nothing changes",
+     HOST_AT(struct deploy, job.dry_run)},
+    {"programs", 0, "FOLDER",
+     "Where the programs of make nodes are, incode-node-aarch64 and the like",
+     HOST_AT(struct deploy, programs)},
+    {"ssh-config", 0, "FILE", "Have ssh read this file, as with its -F",
+     HOST_AT(struct deploy, job.ssh_config)},
+    {"quiet", 'q', NULL, "Say only what is wrong",
+     HOST_AT(struct deploy, quiet)},
+    {0}};
 
 /* --- which ---------------------------------------------------------------- */
 
@@ -398,28 +365,33 @@ static int deploy(struct deploy *d, const struct host_node_set *chosen) {
 }
 
 int host_deploy(int argc, char **argv, struct host_error *error) {
-    static const struct argp argp = {
-        options_of_deploy,
-        parse,
-        "",
-        "Puts the node program on boards with Linux, over ssh, and starts it "
-        "there: under systemd, at every boot, where that runs.\v"
-        "A cube file says where a node's board is:\n"
-        "  nodes = ( { node = 0; ssh = \"pi@10.0.0.11\"; }, .. );\n"
-        "ssh must be able to log in without a question: see ssh-copy-id(1).\n\n"
-        "Example:\n"
-        "  incode deploy --cube lab.cube --dry-run\n"
-        "  incode deploy --cube lab.cube\n"
-        "  incode run points.xyz --cube lab.cube",
-        NULL,
-        NULL,
-        NULL};
+    static const struct host_options options = {
+        .rows = rows,
+        .refusal = "one argument too many; give --cube FILE",
+        .arguments = "",
+        .about =
+            "Puts the node program on boards with Linux, over ssh, and starts "
+            "it there: under systemd, at every boot, where that runs.\v"
+            "A cube file says where a node's board is:\n"
+            "  nodes = ( { node = 0; ssh = \"pi@10.0.0.11\"; }, .. );\n"
+            "ssh must be able to log in without a question: see "
+            "ssh-copy-id(1).\n\n"
+            "Example:\n"
+            "  incode deploy --cube lab.cube --dry-run\n"
+            "  incode deploy --cube lab.cube\n"
+            "  incode run points.xyz --cube lab.cube"};
     static struct host_cube_file file;
     static struct host_programs programs;
     struct deploy d = {.error = error};
     struct host_node_set chosen;
-    if (host_options_parse(&argp, argc, argv, 0, &d, error) != 0 ||
-        check_ssh(error) != 0 || host_cube_file_read(&file, d.cube, error) != 0)
+    if (host_options_parse(&options, argc, argv, false, &d, NULL, error) != 0)
+        return error->code;
+    if (d.cube == NULL) {
+        return host_fail(error, HOST_USAGE,
+                         "deploy: --cube FILE is missing; write one with: "
+                         "incode cube --new");
+    }
+    if (check_ssh(error) != 0 || host_cube_file_read(&file, d.cube, error) != 0)
         return error->code;
     d.job.file = &file;
     d.job.programs = &programs;

@@ -87,77 +87,41 @@ int host_draw(const struct host_draw_options *options,
 
 /* --- arguments ------------------------------------------------------------ */
 
-enum { KEY_AXIS = 256, KEY_AT, KEY_WIDTH, WIDTH = 640 };
+enum { WIDTH = 640 };
 
-struct parse_draw {
-    struct host_draw_options *options;
-    struct host_error *error;
-};
-
-static void parse_axis(struct parse_draw *p, const char *value) {
+static void take_axis(void *into, const char *value, struct host_error *error) {
+    struct host_draw_options *o = into;
     const char *axis = strlen(value) == 1 ? strchr("xyz", value[0]) : NULL;
     if (axis == NULL) {
-        host_fail(p->error, HOST_USAGE,
-                  "--axis %s: not an axis; allowed: x, y, z", value);
+        host_fail(error, HOST_USAGE, "--axis %s: not an axis; allowed: x, y, z",
+                  value);
         return;
     }
-    p->options->axis = value[0] - 'x';
+    o->axis = value[0] - 'x';
 }
 
-static void parse_at(struct parse_draw *p, const char *value) {
+static void take_at(void *into, const char *value, struct host_error *error) {
+    struct host_draw_options *o = into;
     char *end = NULL;
-    p->options->at = strtod(value, &end);
-    p->options->has_at = true;
-    if (end == value || *end != '\0' || !isfinite(p->options->at)) {
-        host_fail(p->error, HOST_USAGE,
+    o->at = strtod(value, &end);
+    o->has_at = true;
+    if (end == value || *end != '\0' || !isfinite(o->at)) {
+        host_fail(error, HOST_USAGE,
                   "--at %s: not a coordinate; give a number, as in 0.5", value);
     }
 }
 
-static void parse_width(struct parse_draw *p, const char *value) {
-    uint64_t n = 0;
-    (void)host_option_number("width", value, HOST_PICTURE_MIN, HOST_PICTURE_MAX,
-                             &n, p->error);
-    p->options->width = (unsigned)n;
-}
-
-static void parse_argument(struct parse_draw *p, const char *value) {
-    struct host_draw_options *o = p->options;
+static void take_argument(void *into, const char *value,
+                          struct host_error *error) {
+    struct host_draw_options *o = into;
     if (o->points == NULL) {
         o->points = value;
     } else if (o->tets == NULL) {
         o->tets = value;
     } else {
-        host_fail(p->error, HOST_USAGE,
+        host_fail(error, HOST_USAGE,
                   "%s: one argument too many; give POINTS, TETS and -o FILE",
                   value);
-    }
-}
-
-static error_t parse_draw_option(int key, char *value,
-                                 struct argp_state *state) {
-    struct parse_draw *p = state->input;
-    switch (key) {
-    case 'o':
-        p->options->output = value;
-        return 0;
-    case 'q':
-        p->options->quiet = true;
-        return 0;
-    case KEY_AXIS:
-        parse_axis(p, value);
-        return 0;
-    case KEY_AT:
-        parse_at(p, value);
-        return 0;
-    case KEY_WIDTH:
-        parse_width(p, value);
-        return 0;
-    case ARGP_KEY_ARG:
-        parse_argument(p, value);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
     }
 }
 
@@ -187,37 +151,39 @@ static int check(const struct host_draw_options *options,
 int host_draw_arguments(int argc, char **argv,
                         struct host_draw_options *options,
                         struct host_error *error) {
-    static const struct argp_option options_of_draw[] = {
-        {"output", 'o', "FILE", 0,
+    static const struct host_option rows[] = {
+        {"output", 'o', "FILE",
          "Write the picture to FILE, .svg or .png; - is .svg on standard "
          "output",
-         0},
-        {"axis", KEY_AXIS, "x|y|z", 0,
+         HOST_AT(struct host_draw_options, output)},
+        {"axis", 0, "x|y|z",
          "The plane is at right angles to this axis. Default: the one along "
          "which the points extend least, or z",
-         0},
-        {"at", KEY_AT, "COORDINATE", 0,
-         "Where on that axis the plane is. Default: the middle", 0},
-        {"width", KEY_WIDTH, "PIXELS", 0,
-         "Of the picture, 16 to 8192. Default: 640", 0},
-        {"quiet", 'q', NULL, 0, "Print nothing but errors", 0},
+         .take = take_axis},
+        {"at", 0, "COORDINATE",
+         "Where on that axis the plane is. Default: the middle",
+         .take = take_at},
+        {"width", 0, "PIXELS", "Of the picture, 16 to 8192. Default: 640",
+         HOST_AT(struct host_draw_options, width), .least = HOST_PICTURE_MIN,
+         .most = HOST_PICTURE_MAX},
+        {"quiet", 'q', NULL, "Print nothing but errors",
+         HOST_AT(struct host_draw_options, quiet)},
         {0}};
-    static const struct argp argp = {
-        options_of_draw,
-        parse_draw_option,
-        "POINTS TETS",
-        "Draws a plane section through the triangulation TETS of POINTS: each "
-        "tetrahedron that the plane cuts, the smaller the bluer.  Points on "
-        "the plane count as above it.  An .svg has one path a colour, and "
-        "tetrahedra below a pixel share one.\v"
-        "Examples:\n"
-        "  incode draw a.xyz a.ele -o a.svg\n"
-        "  incode draw a.xyz a.vtu -o a.png --axis x --at 0.25 --width 1600",
-        NULL,
-        NULL,
-        NULL};
-    struct parse_draw parse = {options, error};
+    static const struct host_options mine = {
+        .rows = rows,
+        .argument = take_argument,
+        .arguments = "POINTS TETS",
+        .about =
+            "Draws a plane section through the triangulation TETS of POINTS: "
+            "each tetrahedron that the plane cuts, the smaller the bluer.  "
+            "Points on the plane count as above it.  An .svg has one path a "
+            "colour, and tetrahedra below a pixel share one.\v"
+            "Examples:\n"
+            "  incode draw a.xyz a.ele -o a.svg\n"
+            "  incode draw a.xyz a.vtu -o a.png --axis x --at 0.25 --width "
+            "1600"};
     *options = (struct host_draw_options){.axis = -1, .width = WIDTH};
-    int status = host_options_parse(&argp, argc, argv, 0, &parse, error);
+    int status =
+        host_options_parse(&mine, argc, argv, false, options, NULL, error);
     return status != 0 ? status : check(options, error);
 }

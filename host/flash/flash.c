@@ -1,6 +1,5 @@
 #include "flash.h"
 
-#include <argp.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -267,15 +266,7 @@ void host_flash_show_plan(const struct host_flash_show *show) {
 
 /* --- flash ---------------------------------------------------------------- */
 
-enum {
-    KEY_NODES = 1024,
-    KEY_DRY_RUN,
-    KEY_RESET,
-    KEY_FORCE,
-    KEY_PATIENCE,
-    PATIENCE_S = 60,
-    STEP_US = 50000
-};
+enum { PATIENCE_S = 60, STEP_US = 50000 };
 
 struct flash {
     struct host_site_options where;
@@ -295,72 +286,45 @@ struct flash {
 
 /* --- the arguments -------------------------------------------------------- */
 
-static const struct argp_option options_of_flash[] = {
-    {NULL, 0, NULL, 0, "What is done:", 3},
-    {"nodes", KEY_NODES, "SET", 0, "These alone, as in 0-3,7. Default: all", 3},
-    {"dry-run", KEY_DRY_RUN, NULL, 0,
-     "Says what would be done with each, and does nothing", 3},
-    {"reset", KEY_RESET, NULL, 0,
-     "Resets the boards first, by the lines that the cube file gives them", 3},
-    {"force", KEY_FORCE, NULL, 0,
-     "Boards that run this image as well: they prove its signature, verify "
-     "what they have of it, and start it anew",
-     3},
-    {"patience", KEY_PATIENCE, "SECONDS", 0,
-     "Gives a node up that gets no further for so long. Default: 60", 3},
-    {"quiet", 'q', NULL, 0, "Says nothing but what is wrong", 3},
-    {0}};
-
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct flash *f = state->input;
-    switch (key) {
-    case KEY_NODES:
-        f->nodes = value;
-        return 0;
-    case KEY_DRY_RUN:
-        f->dry_run = true;
-        return 0;
-    case KEY_RESET:
-        f->reset = true;
-        return 0;
-    case KEY_FORCE:
-        f->force = true;
-        return 0;
-    case 'q':
-        f->quiet = true;
-        return 0;
-    case KEY_PATIENCE:
-        (void)host_option_number("patience", value, 1, 86400, &f->patience_s,
-                                 f->error);
-        return 0;
-    case ARGP_KEY_ARG:
-    case ARGP_KEY_END:
-        (void)host_option_argument(key, "IMAGE", value, &f->path, f->error);
-        return 0;
-    default:
-        return host_site_option(&f->where, key, value, f->error);
-    }
-}
-
 static int parse_all(struct flash *f, int argc, char **argv) {
-    static struct argp_option options[HOST_OPTIONS_MAX];
-    static const struct argp argp = {
-        options,
-        parse,
-        "IMAGE",
-        "Brings an image to the boards of a cube, all at once: node 0 takes it "
-        "from the host, and it spreads over the cube's links. A board that has "
-        "it already is left alone; what a transfer that broke has left on one "
-        "is not sent again.\v"
-        "Where no image is good, or one does not come up, a board keeps or "
-        "takes the one before.\n\n"
-        "Example:\n"
-        "  incode flash --cube lab.cube build/firmware/mps2-an500.img",
-        NULL,
-        NULL,
-        NULL};
-    host_site_table(options, options_of_flash);
-    return host_options_parse(&argp, argc, argv, 0, f, f->error);
+    static const struct host_option rows[] = {
+        {.help = "What is done:"},
+        {"nodes", 0, "SET", "These alone, as in 0-3,7. Default: all",
+         HOST_AT(struct flash, nodes)},
+        {"dry-run", 0, NULL,
+         "Says what would be done with each, and does nothing",
+         HOST_AT(struct flash, dry_run)},
+        {"reset", 0, NULL,
+         "Resets the boards first, by the lines that the cube file gives them",
+         HOST_AT(struct flash, reset)},
+        {"force", 0, NULL,
+         "Boards that run this image as well: they prove its signature, verify "
+         "what they have of it, and start it anew",
+         HOST_AT(struct flash, force)},
+        {"patience", 0, "SECONDS",
+         "Gives a node up that gets no further for so long. Default: 60",
+         HOST_AT(struct flash, patience_s), .least = 1, .most = 86400},
+        {"quiet", 'q', NULL, "Says nothing but what is wrong",
+         HOST_AT(struct flash, quiet)},
+        {0}};
+    static const struct host_options options = {
+        .rows = rows,
+        .more = host_site_rows,
+        .more_at = offsetof(struct flash, where),
+        .one = "IMAGE",
+        .one_at = offsetof(struct flash, path),
+        .needed = true,
+        .arguments = "IMAGE",
+        .about =
+            "Brings an image to the boards of a cube, all at once: node 0 "
+            "takes it from the host, and it spreads over the cube's links. A "
+            "board that has it already is left alone; what a transfer that "
+            "broke has left on one is not sent again.\v"
+            "Where no image is good, or one does not come up, a board keeps or "
+            "takes the one before.\n\n"
+            "Example:\n"
+            "  incode flash --cube lab.cube build/firmware/mps2-an500.img"};
+    return host_options_parse(&options, argc, argv, false, f, NULL, f->error);
 }
 
 /* --- before --------------------------------------------------------------- */

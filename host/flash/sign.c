@@ -1,6 +1,5 @@
 #include "sign.h"
 
-#include <argp.h>
 #include <assert.h>
 #include <errno.h>
 #include <limits.h>
@@ -239,15 +238,7 @@ static void host_sign_key_sign(const struct host_sign_key *pair,
 
 /* --- sign ----------------------------------------------------------------- */
 
-enum {
-    KEY_KEY = 256,
-    KEY_BOARD,
-    KEY_VERSION,
-    KEY_NUMBER,
-    KEY_ADDRESS,
-    KEY_NO_WAY_BACK,
-    ADDRESS = 0x10000 /* that boards' images are linked for */
-};
+enum { ADDRESS = 0x10000 }; /* that boards' images are linked for */
 
 struct sign {
     const char *path, *key, *board, *version, *output;
@@ -258,89 +249,73 @@ struct sign {
 
 /* --- the arguments -------------------------------------------------------- */
 
-static const struct argp_option options_of_sign[] = {
-    {"key", KEY_KEY, "FILE", 0,
-     "The secret half of a pair, as incode key --sign makes it", 0},
-    {"board", KEY_BOARD, "NAME", 0,
-     "IMAGE is a board's binary, and of this one: it becomes an image", 0},
-    {"version", KEY_VERSION, "TEXT", 0,
-     "For people. Default: the image's, or that of this program", 0},
-    {"number", KEY_NUMBER, "N", 0,
-     "How you count your images: a later one is larger. Default: the image's, "
-     "or 1",
-     0},
-    {"no-way-back", KEY_NO_WAY_BACK, NULL, 0,
-     "A board that has run this image takes none with a lower number", 0},
-    {"address", KEY_ADDRESS, "A", 0,
-     "That the binary is linked for. Default: the image's, or 0x10000", 0},
-    {"output", 'o', "FILE", 0, "Write it there. Default: to IMAGE itself", 0},
-    {0}};
-
-static const struct argp_option options_of_image[] = {
-    {"key", KEY_KEY, "FILE.pub", 0,
-     "Is it signed with this pair? The exit status is 5 if not", 0},
-    {0}};
-
-static void parse_value(struct sign *s, const char *option, const char *value,
-                        uint64_t *number, bool *given) {
+static void take_value(const char *option, const char *value, uint64_t *number,
+                       bool *given, struct host_error *error) {
     char *end = NULL;
     bool hex = strncmp(value, "0x", 2) == 0 && value[2] != '\0';
     unsigned long long all = hex ? strtoull(value, &end, 16) : 0;
     *given = true;
-    if (hex && *end == '\0' && all <= UINT32_MAX) {
+    if (hex && *end == '\0' && all <= UINT32_MAX)
         *number = all;
-    } else {
-        (void)host_option_number(option, value, 0, UINT32_MAX, number,
-                                 s->error);
-    }
+    else
+        (void)host_option_number(option, value, 0, UINT32_MAX, number, error);
 }
 
-static void parse_text(struct sign *s, const char *option, const char *value,
-                       size_t most, const char **text) {
+static void take_number(void *into, const char *value,
+                        struct host_error *error) {
+    struct sign *s = into;
+    take_value("number", value, &s->number, &s->has_number, error);
+}
+
+static void take_address(void *into, const char *value,
+                         struct host_error *error) {
+    struct sign *s = into;
+    take_value("address", value, &s->address, &s->has_address, error);
+}
+
+static void take_version(void *into, const char *value,
+                         struct host_error *error) {
     bool printable = *value != '\0';
     for (const char *at = value; *at != '\0'; at++)
         printable = *at > ' ' && *at < 0x7f && printable;
-    *text = value;
-    if (!printable || strlen(value) > most) {
-        host_fail(s->error, HOST_USAGE,
-                  "--%s %s: not a word of 1 to %zu letters, digits and signs; "
-                  "give such a one",
-                  option, value, most);
+    ((struct sign *)into)->version = value;
+    if (!printable || strlen(value) > LOADER_VERSION_BYTES) {
+        host_fail(error, HOST_USAGE,
+                  "--version %s: not a word of 1 to %d letters, digits and "
+                  "signs; give such a one",
+                  value, (int)LOADER_VERSION_BYTES);
     }
 }
 
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct sign *s = state->input;
-    switch (key) {
-    case KEY_KEY:
-        s->key = value;
-        return 0;
-    case KEY_BOARD:
-        s->board = value;
-        return 0;
-    case KEY_VERSION:
-        parse_text(s, "version", value, LOADER_VERSION_BYTES, &s->version);
-        return 0;
-    case KEY_NUMBER:
-        parse_value(s, "number", value, &s->number, &s->has_number);
-        return 0;
-    case KEY_ADDRESS:
-        parse_value(s, "address", value, &s->address, &s->has_address);
-        return 0;
-    case KEY_NO_WAY_BACK:
-        s->no_way_back = true;
-        return 0;
-    case 'o':
-        s->output = value;
-        return 0;
-    case ARGP_KEY_ARG:
-    case ARGP_KEY_END:
-        (void)host_option_argument(key, "IMAGE", value, &s->path, s->error);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
-}
+static const struct host_option sign_rows[] = {
+    {"key", 0, "FILE",
+     "The secret half of a pair, as incode key --sign makes it",
+     HOST_AT(struct sign, key)},
+    {"board", 0, "NAME",
+     "IMAGE is a board's binary, and of this one: it becomes an image",
+     HOST_AT(struct sign, board)},
+    {"version", 0, "TEXT",
+     "For people. Default: the image's, or that of this program",
+     .take = take_version},
+    {"number", 0, "N",
+     "How you count your images: a later one is larger. Default: the image's, "
+     "or 1",
+     .take = take_number},
+    {"no-way-back", 0, NULL,
+     "A board that has run this image takes none with a lower number",
+     HOST_AT(struct sign, no_way_back)},
+    {"address", 0, "A",
+     "That the binary is linked for. Default: the image's, or 0x10000",
+     .take = take_address},
+    {"output", 'o', "FILE", "Write it there. Default: to IMAGE itself",
+     HOST_AT(struct sign, output)},
+    {0}};
+
+static const struct host_option image_rows[] = {
+    {"key", 0, "FILE.pub",
+     "Is it signed with this pair? The exit status is 5 if not",
+     HOST_AT(struct sign, key)},
+    {0}};
 
 static int check_board(const struct sign *s) {
     char allowed[120] = "";
@@ -470,25 +445,26 @@ static int write_image(const struct sign *s, const struct host_source *source,
 }
 
 int host_sign(int argc, char **argv, struct host_error *error) {
-    static const struct argp argp = {
-        options_of_sign,
-        parse,
-        "IMAGE --key FILE",
-        "Makes an image of a board's binary, or takes one as it is, and signs "
-        "it: boards take what is signed with the pair whose public half their "
-        "loader has.\v"
-        "Example:\n"
-        "  incode key --sign lab.sign\n"
-        "  incode sign build/firmware/mps2-an500.img --key lab.sign --number 2",
-        NULL,
-        NULL,
-        NULL};
+    static const struct host_options options = {
+        .rows = sign_rows,
+        .one = "IMAGE",
+        .one_at = offsetof(struct sign, path),
+        .needed = true,
+        .arguments = "IMAGE --key FILE",
+        .about =
+            "Makes an image of a board's binary, or takes one as it is, and "
+            "signs it: boards take what is signed with the pair whose public "
+            "half their loader has.\v"
+            "Example:\n"
+            "  incode key --sign lab.sign\n"
+            "  incode sign build/firmware/mps2-an500.img --key lab.sign "
+            "--number 2"};
     struct sign s = {.error = error};
     struct host_source source;
     struct host_sign_key pair;
     uint8_t header[LOADER_HEADER_BYTES];
     size_t code;
-    if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
+    if (host_options_parse(&options, argc, argv, false, &s, NULL, error) != 0 ||
         (s.board != NULL && check_board(&s) != 0))
         return error->code;
     if (s.key == NULL) {
@@ -553,19 +529,19 @@ static int judge(const struct sign *s, const struct host_image *file,
 }
 
 int host_image_show(int argc, char **argv, struct host_error *error) {
-    static const struct argp argp = {
-        options_of_image,
-        parse,
-        "IMAGE",
-        "Says what is in an image: board, version, number, digest, and by whom "
-        "it is signed. One that is damaged, or falsely signed, is a failure.",
-        NULL,
-        NULL,
-        NULL};
+    static const struct host_options options = {
+        .rows = image_rows,
+        .one = "IMAGE",
+        .one_at = offsetof(struct sign, path),
+        .needed = true,
+        .arguments = "IMAGE",
+        .about = "Says what is in an image: board, version, number, digest, "
+                 "and by whom it is signed. One that is damaged, or falsely "
+                 "signed, is a failure."};
     struct sign s = {.error = error};
     struct host_image file;
     uint8_t wanted[SIGN_PUBLIC_BYTES];
-    if (host_options_parse(&argp, argc, argv, 0, &s, error) != 0 ||
+    if (host_options_parse(&options, argc, argv, false, &s, NULL, error) != 0 ||
         (s.key != NULL && host_sign_public_read(wanted, s.key, error) != 0) ||
         host_image_open(&file, s.path, error) != 0)
         return error->code;

@@ -1,6 +1,5 @@
 #include "cube_new.h"
 
-#include <argp.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -167,27 +166,9 @@ static int host_cube_print(const char *path, struct host_error *error) {
 /* --- cube new ------------------------------------------------------------- */
 
 enum {
-    KEY_NEW = 256,
-    KEY_SERIAL,
-    KEY_TCP,
-    KEY_BOARD,
     FIRST_PORT = 7400,
     HOST_BYTES = 128 /* of one of a list */
 };
-
-static const struct argp_option options_of_cube[] = {
-    {"new", KEY_NEW, "N", 0, "Write a cube file of N nodes to start from", 0},
-    {"serial", KEY_SERIAL, "DEVICE", OPTION_ARG_OPTIONAL,
-     "Of it: serial wires, and the host's is DEVICE (/dev/ttyUSB0)", 0},
-    {"tcp", KEY_TCP, "HOST,HOST,..", 0,
-     "Of it: a machine for each node, wires over TCP, a key for them; "
-     "USER@HOST where incode deploy is to log in so",
-     0},
-    {"board", KEY_BOARD, "NAME", 0,
-     "Of it: what the nodes run on, linux or a board without a system", 0},
-    {"output", 'o', "FILE", 0, "Of it: the file, which must not be there yet",
-     0},
-    {0}};
 
 struct cube_new {
     const char *file;   /* to check */
@@ -198,42 +179,38 @@ struct cube_new {
     struct host_error *error;
 };
 
-static void take_board(struct cube_new *c, const char *name) {
+static void take_board(void *into, const char *name, struct host_error *error) {
+    struct cube_new *c = into;
     c->board = host_board_named(name);
     if (c->board == NULL) {
-        host_fail(c->error, HOST_USAGE,
+        host_fail(error, HOST_USAGE,
                   "--board %s: not one that there is; incode run --help lists "
                   "them",
                   name);
     }
 }
 
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct cube_new *c = state->input;
-    switch (key) {
-    case KEY_NEW:
-        (void)host_parse_nodes("--new", value, HOST_NODES_MAX, "", &c->nodes,
-                               c->error);
-        return 0;
-    case KEY_SERIAL:
-        c->device = value == NULL ? "/dev/ttyUSB0" : value;
-        return 0;
-    case KEY_TCP:
-        c->hosts = value;
-        return 0;
-    case KEY_BOARD:
-        take_board(c, value);
-        return 0;
-    case 'o':
-        c->output = value;
-        return 0;
-    case ARGP_KEY_ARG:
-        (void)host_option_argument(key, "FILE", value, &c->file, c->error);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+static void take_new(void *into, const char *value, struct host_error *error) {
+    (void)host_parse_nodes("--new", value, HOST_NODES_MAX, "",
+                           &((struct cube_new *)into)->nodes, error);
 }
+
+static const struct host_option rows[] = {
+    {"new", 0, "N", "Write a cube file of N nodes to start from",
+     .take = take_new},
+    {"serial", 0, "DEVICE",
+     "Of it: serial wires, and the host's is DEVICE (/dev/ttyUSB0)",
+     HOST_AT(struct cube_new, device), .omitted = "/dev/ttyUSB0"},
+    {"tcp", 0, "HOST,HOST,..",
+     "Of it: a machine for each node, wires over TCP, a key for them; "
+     "USER@HOST where incode deploy is to log in so",
+     HOST_AT(struct cube_new, hosts)},
+    {"board", 0, "NAME",
+     "Of it: what the nodes run on, linux or a board without a system",
+     .take = take_board},
+    {"output", 'o', "FILE", "Of it: the file, which must not be there yet",
+     HOST_AT(struct cube_new, output)},
+    {0}};
 
 /* "pi@10.0.0.11": the k-th of the list; "": there are fewer. */
 static void host_of(const struct cube_new *c, unsigned k,
@@ -482,22 +459,20 @@ static int write_new(const struct cube_new *c) {
 }
 
 int host_cube_command(int argc, char **argv, struct host_error *error) {
-    static const struct argp argp = {
-        options_of_cube,
-        parse,
-        "FILE\n--new N -o FILE",
-        "Checks a cube file, and prints how each of its nodes is started. Or "
-        "writes one to start from.\v"
-        "Example:\n"
-        "  incode cube --new 4 --tcp pi@10.0.0.10,pi@10.0.0.11,pi@10.0.0.12,"
-        "pi@10.0.0.13 -o lab.cube\n"
-        "  incode cube --new 8 --board mps2-an500 --serial=/dev/ttyUSB0 -o "
-        "lab.cube",
-        NULL,
-        NULL,
-        NULL};
+    static const struct host_options options = {
+        .rows = rows,
+        .one = "FILE",
+        .one_at = offsetof(struct cube_new, file),
+        .arguments = "FILE\n--new N -o FILE",
+        .about = "Checks a cube file, and prints how each of its nodes is "
+                 "started. Or writes one to start from.\v"
+                 "Example:\n"
+                 "  incode cube --new 4 --tcp pi@10.0.0.10,pi@10.0.0.11,"
+                 "pi@10.0.0.12,pi@10.0.0.13 -o lab.cube\n"
+                 "  incode cube --new 8 --board mps2-an500 "
+                 "--serial=/dev/ttyUSB0 -o lab.cube"};
     struct cube_new c = {.error = error};
-    if (host_options_parse(&argp, argc, argv, 0, &c, error) != 0 ||
+    if (host_options_parse(&options, argc, argv, false, &c, NULL, error) != 0 ||
         check(&c) != 0)
         return error->code;
     return c.nodes > 0 ? write_new(&c) : host_cube_print(c.file, error);

@@ -1,6 +1,5 @@
 #include "emulate.h"
 
-#include <argp.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -20,35 +19,7 @@
 #include "host/nodes/board_emulated.h"
 #include "transport/drivers/tcp.h"
 
-enum {
-    KEY_BOARD = 256,
-    KEY_NODES,
-    KEY_LINUX,
-    KEY_OPEN,
-    KEY_EMPTY,
-    LOOK_US = 20000
-};
-
-static const struct argp_option options_of_emulate[] = {
-    {"board", KEY_BOARD, "NAME", 0, "mps2-an500, mps2-an385 or raspi3b", 0},
-    {"nodes", KEY_NODES, "N", 0, "Nodes of the cube", 0},
-    {"linux", KEY_LINUX, "N,N", 0,
-     "These nodes are no boards, but processes that each run on the cube "
-     "starts "
-     "for itself",
-     0},
-    {"open", KEY_OPEN, NULL, 0,
-     "Joins no boards: between node 1 and node 3 each listens at its end, "
-     "FILE.d/1-3.socket and FILE.d/3-1.socket, for what is put between them",
-     0},
-    {"empty", KEY_EMPTY, NULL, 0,
-     "Puts no image into new flash chips: boards have their loaders alone, as "
-     "when they are bought, and wait for incode flash",
-     0},
-    {"output", 'o', "FILE", 0,
-     "The cube file to write. Sockets, consoles and flash chips are in FILE.d",
-     0},
-    {0}};
+enum { LOOK_US = 20000 };
 
 struct emulate {
     const struct host_board *board;
@@ -65,7 +36,9 @@ struct emulate {
 
 /* --- the arguments -------------------------------------------------------- */
 
-static void parse_board(struct emulate *e, const char *value) {
+static void take_board(void *into, const char *value,
+                       struct host_error *error) {
+    struct emulate *e = into;
     char allowed[120] = "";
     e->board = NULL;
     for (unsigned i = 0; host_board_name(i) != NULL; i++) {
@@ -80,13 +53,15 @@ static void parse_board(struct emulate *e, const char *value) {
             return;
         }
     }
-    host_fail(e->error, HOST_USAGE,
+    host_fail(error, HOST_USAGE,
               "--board %s: no board that is emulated; allowed: %s", value,
               allowed);
 }
 
 /* "2,3" */
-static void parse_linux(struct emulate *e, const char *value) {
+static void take_linux(void *into, const char *value,
+                       struct host_error *error) {
+    struct emulate *e = into;
     const char *at = value;
     char *end = NULL;
     e->list = value;
@@ -96,7 +71,7 @@ static void parse_linux(struct emulate *e, const char *value) {
         bool good = *at >= '0' && *at <= '9' && node < HOST_EMULATED_MAX &&
                     (*end == ',' || *end == '\0');
         if (!good) {
-            host_fail(e->error, HOST_USAGE,
+            host_fail(error, HOST_USAGE,
                       "--linux %s: no list of nodes; give their numbers, as in "
                       "2,3",
                       value);
@@ -107,37 +82,32 @@ static void parse_linux(struct emulate *e, const char *value) {
     } while (*end == ',');
 }
 
-static error_t parse(int key, char *value, struct argp_state *state) {
-    struct emulate *e = state->input;
-    switch (key) {
-    case KEY_BOARD:
-        parse_board(e, value);
-        return 0;
-    case KEY_NODES:
-        (void)host_parse_nodes("--nodes", value, HOST_EMULATED_MAX, "",
-                               &e->nodes, e->error);
-        return 0;
-    case KEY_LINUX:
-        parse_linux(e, value);
-        return 0;
-    case KEY_OPEN:
-        e->open = true;
-        return 0;
-    case KEY_EMPTY:
-        e->empty = true;
-        return 0;
-    case 'o':
-        e->file = value;
-        return 0;
-    case ARGP_KEY_ARG:
-        host_fail(e->error, HOST_USAGE,
-                  "%s: one argument too many; give --board, --nodes and -o",
-                  value);
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+static void take_nodes(void *into, const char *value,
+                       struct host_error *error) {
+    (void)host_parse_nodes("--nodes", value, HOST_EMULATED_MAX, "",
+                           &((struct emulate *)into)->nodes, error);
 }
+
+static const struct host_option rows[] = {
+    {"board", 0, "NAME", "mps2-an500, mps2-an385 or raspi3b",
+     .take = take_board},
+    {"nodes", 0, "N", "Nodes of the cube", .take = take_nodes},
+    {"linux", 0, "N,N",
+     "These nodes are no boards, but processes that each run on the cube "
+     "starts for itself",
+     .take = take_linux},
+    {"open", 0, NULL,
+     "Joins no boards: between node 1 and node 3 each listens at its end, "
+     "FILE.d/1-3.socket and FILE.d/3-1.socket, for what is put between them",
+     HOST_AT(struct emulate, open)},
+    {"empty", 0, NULL,
+     "Puts no image into new flash chips: boards have their loaders alone, as "
+     "when they are bought, and wait for incode flash",
+     HOST_AT(struct emulate, empty)},
+    {"output", 'o', "FILE",
+     "The cube file to write. Sockets, consoles and flash chips are in FILE.d",
+     HOST_AT(struct emulate, file)},
+    {0}};
 
 static int check(const struct emulate *e) {
     uint64_t all = (UINT64_C(1) << e->nodes) - 1;
@@ -362,25 +332,23 @@ static void say_next(const struct emulate *e) {
 }
 
 int host_emulate(int argc, char **argv, struct host_error *error) {
-    static const struct argp argp = {
-        options_of_emulate,
-        parse,
-        "",
-        "Starts emulated boards without an operating system, wired as a cube, "
-        "and writes the cube file that leads to them. They stay until this is "
-        "interrupted, which removes the file.\v"
-        "The boards' flash chips stay in FILE.d: who starts them again on the "
-        "same FILE has turned them all off and on.\n\n"
-        "Example:\n"
-        "  incode emulate --board mps2-an500 --nodes 4 -o lab.cube &\n"
-        "  incode run points.xyz --cube lab.cube",
-        NULL,
-        NULL,
-        NULL};
+    static const struct host_options options = {
+        .rows = rows,
+        .refusal = "one argument too many; give --board, --nodes and -o",
+        .arguments = "",
+        .about =
+            "Starts emulated boards without an operating system, wired as a "
+            "cube, and writes the cube file that leads to them. They stay "
+            "until this is interrupted, which removes the file.\v"
+            "The boards' flash chips stay in FILE.d: who starts them again on "
+            "the same FILE has turned them all off and on.\n\n"
+            "Example:\n"
+            "  incode emulate --board mps2-an500 --nodes 4 -o lab.cube &\n"
+            "  incode run points.xyz --cube lab.cube"};
     static struct emulate e = {.folder = -1};
     struct host_started started = {0};
     e.error = error;
-    if (host_options_parse(&argp, argc, argv, 0, &e, error) != 0 ||
+    if (host_options_parse(&options, argc, argv, false, &e, NULL, error) != 0 ||
         check(&e) != 0 || check_file(&e) != 0 || take_directory(&e) != 0)
         return error->code;
     expect_end();

@@ -28,6 +28,7 @@ struct host_run_options {
     bool direct;      /* on threads of this process, without nodes */
     unsigned threads; /* then: so many; 0: one a processor */
     const struct host_strategy *strategy; /* NULL: auto */
+    unsigned linda; /* the row of --linda; `strategy` is that one then */
     struct host_sharing sharing;
     enum host_partition partition;
     enum incode_index index;

@@ -6,47 +6,57 @@
 enum { WORDS_MAX = 6 };
 
 struct seen {
-    unsigned quiet, words, dry;
-    char seed[8], window[8];
+    unsigned quiet, words, dry, colour, count;
+    const char *seed, *sieve;
+    uint64_t window, given;
+    bool windows;
 };
 
-static error_t take(int key, char *value, struct argp_state *state) {
-    struct seen *seen = state->input;
-    switch (key) {
-    case 'q':
-        seen->quiet++;
-        return 0;
-    case 's':
-        snprintf(seen->seed, sizeof seen->seed, "%s", value);
-        return 0;
-    case 'd':
-        seen->dry += value == NULL ? 1 : 10;
-        return 0;
-    case 300:
-        snprintf(seen->window, sizeof seen->window, "%s", value);
-        return 0;
-    case ARGP_KEY_ARG:
-        seen->words++;
-        return 0;
-    default:
-        return ARGP_ERR_UNKNOWN;
-    }
+static void take_dry(void *into, const char *value, struct host_error *error) {
+    (void)error;
+    ((struct seen *)into)->dry += strcmp(value, "none") == 0 ? 1 : 10;
 }
 
-static const struct argp_option options[] = {
-    {NULL, 0, NULL, 0, "A group:", 1},
-    {"seed", 's', "S", 0, "a value", 1},
-    {"sieve", 302, "S", 0, "another, which begins alike", 1},
-    {"window", 300, "N", 0, "no letter", 1},
-    {"windows", 301, NULL, 0, "begins like another", 2},
-    {"dry", 'd', "D", OPTION_ARG_OPTIONAL, "a value, or none", 2},
-    {"quiet", 'q', NULL, 0, "no value, and the last letter", 2},
+static void take_quiet(void *into, const char *value,
+                       struct host_error *error) {
+    (void)error;
+    assert_null(value);
+    ((struct seen *)into)->quiet++;
+}
+
+static void take_word(void *into, const char *value, struct host_error *error) {
+    (void)value;
+    (void)error;
+    ((struct seen *)into)->words++;
+}
+
+static const char *colour(unsigned i) {
+    static const char *const names[] = {"red", "green", NULL};
+    return names[i];
+}
+
+static const struct host_option rows[] = {
+    {.help = "A group:"},
+    {"seed", 's', "S", "a value", HOST_AT(struct seen, seed)},
+    {"sieve", 0, "S", "another, which begins alike",
+     HOST_AT(struct seen, sieve)},
+    {"window", 0, "N", "no letter", HOST_AT(struct seen, window), .least = 1,
+     .most = 64, .unit = 1000},
+    {"windows", 0, NULL, "begins like another", HOST_AT(struct seen, windows)},
+    {.help = "Another:"},
+    {"colour", 0, "NAME", "of a list", HOST_AT(struct seen, colour),
+     .names = colour},
+    {"count", 0, "N", "no more than fits", HOST_AT(struct seen, count),
+     .most = 9},
+    {"dry", 'd', "D", "a value, or none", .omitted = "none", .take = take_dry},
+    {"quiet", 'q', NULL, "no value, and the last letter", .take = take_quiet},
     {0}};
-static const struct argp argp = {options, take, "", "", NULL, NULL, NULL};
+static const struct host_options options = {
+    .rows = rows, .argument = take_word, .arguments = "", .about = ""};
 
 static int parse(const char *const words[], struct seen *seen,
                  struct host_error *error) {
-    char text[WORDS_MAX + 2][40] = {"incode try"};
+    static char text[WORDS_MAX + 2][40] = {"incode try"};
     char *argv[WORDS_MAX + 2] = {text[0]};
     int argc = 1;
     memset(seen, 0, sizeof *seen);
@@ -55,7 +65,8 @@ static int parse(const char *const words[], struct seen *seen,
         snprintf(text[argc], sizeof text[argc], "%s", words[argc - 1]);
         argv[argc] = text[argc];
     }
-    return host_options_parse(&argp, argc, argv, ARGP_NO_HELP, seen, error);
+    return host_options_parse(&options, argc, argv, true, seen, &seen->given,
+                              error);
 }
 
 TEST(test_taken) {
@@ -68,7 +79,9 @@ TEST(test_taken) {
     assert_int_equal(seen.words, 2);
     assert_int_equal(seen.quiet, 1);
     assert_string_equal(seen.seed, "4");
-    assert_string_equal(seen.window, "9");
+    assert_int_equal(seen.window, 9000);
+    assert_true(host_option_given(rows, seen.given, "window"));
+    assert_false(host_option_given(rows, seen.given, "windows"));
     assert_int_equal(parse(dashes, &seen, &error), 0);
     assert_int_equal(seen.words, 1);
 }
@@ -140,32 +153,87 @@ TEST(test_numbers) {
     assert_string_equal(error.text, "--seed -1: not a number; give 1 or more");
 }
 
-TEST(test_the_one_argument) {
-    const char *argument = NULL;
-    struct host_error error = {0};
-    assert_int_equal(
-        host_option_argument(ARGP_KEY_END, "IMAGE", NULL, &argument, &error),
-        HOST_USAGE);
-    assert_non_null(strstr(error.text, "IMAGE: not given; "));
-    error.code = 0;
-    assert_int_equal(
-        host_option_argument(ARGP_KEY_ARG, "IMAGE", "a", &argument, &error), 0);
-    assert_int_equal(
-        host_option_argument(ARGP_KEY_END, "IMAGE", NULL, &argument, &error),
-        0);
-    assert_int_equal(
-        host_option_argument(ARGP_KEY_ARG, "IMAGE", "b", &argument, &error),
-        HOST_USAGE);
-    assert_string_equal(error.text,
-                        "b: one argument too many; give IMAGE alone");
-    assert_string_equal(argument, "a");
+/* Rows before a command's own go to a struct in its struct. */
+struct outer {
+    const char *image;
+    bool deep;
+    struct seen inner;
+};
+
+static const struct host_option outer_rows[] = {
+    {"deep", 0, NULL, "of the outer", HOST_AT(struct outer, deep)}, {0}};
+
+static int parse_outer(const char *first, const char *second,
+                       struct outer *outer, struct host_error *error) {
+    static const struct host_options outer_options = {
+        .rows = outer_rows,
+        .more = rows,
+        .more_at = offsetof(struct outer, inner),
+        .one = "IMAGE",
+        .one_at = offsetof(struct outer, image),
+        .needed = true,
+        .arguments = "",
+        .about = ""};
+    char text[3][20] = {"incode try"};
+    char *argv[] = {text[0], text[1], text[2], NULL};
+    int argc = first == NULL ? 1 : second == NULL ? 2 : 3;
+    memset(error, 0, sizeof *error);
+    memset(outer, 0, sizeof *outer);
+    snprintf(text[1], sizeof text[1], "%s", argc > 1 ? first : "");
+    snprintf(text[2], sizeof text[2], "%s", argc > 2 ? second : "");
+    argv[argc] = NULL;
+    return host_options_parse(&outer_options, argc, argv, true, outer, NULL,
+                              error);
 }
 
-/* -h ends a command that has done nothing, and is no error. */
+TEST(test_the_one_argument) {
+    struct outer outer;
+    struct host_error error;
+    assert_int_equal(parse_outer(NULL, NULL, &outer, &error), HOST_USAGE);
+    assert_non_null(strstr(error.text, "IMAGE: not given; "));
+    assert_int_equal(parse_outer("a", NULL, &outer, &error), 0);
+    assert_int_equal(parse_outer("a", "b", &outer, &error), HOST_USAGE);
+    assert_string_equal(error.text,
+                        "b: one argument too many; give IMAGE alone");
+}
+
+TEST(test_rows_of_another_struct) {
+    struct outer outer;
+    struct host_error error;
+    assert_int_equal(parse_outer("--window=3", "a", &outer, &error), 0);
+    assert_int_equal(outer.inner.window, 3000);
+    assert_false(outer.deep);
+    assert_int_equal(parse_outer("--deep", "a", &outer, &error), 0);
+    assert_true(outer.deep);
+    assert_false(outer.inner.windows);
+}
+
+TEST(test_values) {
+    struct seen seen;
+    struct host_error error;
+    static const char *const good[] = {"--colour=green", "--count=9",
+                                       "--windows", NULL};
+    static const char *const much[] = {"--count=10", NULL};
+    static const char *const blue[] = {"--colour", "gren", NULL};
+    assert_int_equal(parse(good, &seen, &error), 0);
+    assert_int_equal(seen.colour, 1);
+    assert_int_equal(seen.count, 9);
+    assert_true(seen.windows);
+    assert_int_equal(parse(much, &seen, &error), HOST_USAGE);
+    assert_string_equal(error.text, "--count 10: not a number that is allowed; "
+                                    "give 0 to 9");
+    assert_int_equal(parse(blue, &seen, &error), HOST_USAGE);
+    assert_string_equal(error.text,
+                        "--colour gren: no such name; did you mean green? "
+                        "allowed: red, green");
+}
+
+/* Where help is not to be printed, -h is an error. */
 TEST(test_help) {
     static const char *const words[] = {"-h", "--zzz", NULL};
     struct seen seen;
     struct host_error error;
-    assert_int_not_equal(parse(words, &seen, &error), 0);
-    assert_int_equal(error.code, 0);
+    assert_int_equal(parse(words, &seen, &error), HOST_USAGE);
+    assert_string_equal(error.text,
+                        "--help: no help is given here; leave it out");
 }
