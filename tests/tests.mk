@@ -68,8 +68,8 @@ $(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 
 # The tools that the system tests change point sets with, and bytes on a wire,
 # and call listeners with.
-tools := $(patsubst tests/system/%.c,$(BUILD)/tests/%,$(wildcard \
-	tests/system/*.c))
+tools := $(patsubst tests/system/%.c,$(BUILD)/tests/%,$(filter-out \
+	%/testing.c,$(wildcard tests/system/*.c)))
 points: $(tools)
 relay := $(patsubst %.c,$(obj)/%.o,$(wildcard tests/system/relay/*.c))
 $(BUILD)/tests/relay $(BUILD)/tests/test_relay: $(relay)
@@ -82,6 +82,20 @@ $(tools): $(BUILD)/tests/%: $(obj)/tests/system/%.o
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(tool_libs) -lm -o $@
+# The program once more, with faults to choose: tests/system/testing.c.
+testing := $(BUILD)/incode-testing
+points: $(testing) $(testing)-mpi
+$(BUILD)/renamed/%.o: $(obj)/host/%.o
+	@mkdir -p $(@D)
+	$(Q)objcopy --redefine-sym main=incode_main $< $@
+$(testing): $(BUILD)/renamed/main.o
+$(testing)-mpi: $(BUILD)/renamed/main_mpi.o $(filter-out %/main_mpi.o,$(mpi_host))
+$(testing)-mpi: private HOST_LIBS += $(MPI_LIBS)
+$(testing) $(testing)-mpi: $(obj)/tests/system/testing.o $(BUILD)/libhost.a \
+		$(BUILD)/libcore.a
+	$(say) LINK $@
+	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(HOST_LIBS) -o $@
+
 # A node program of Linux that lies: tests/system/liar/liar.c.
 liar := $(patsubst %.c,$(BUILD)/node/%.o,host/sim/liar.c \
 	tests/system/liar/liar.c $(wildcard boards/linux/*.c))

@@ -203,7 +203,6 @@ static void take_points(void *into, const char *value,
 }
 
 #define CUBE_HEADING "A cube of nodes instead of threads:"
-#define TEST_HEADING "Testing:"
 
 static const struct host_option rows[] = {
     {.help = "What to compute, and where:"},
@@ -292,6 +291,12 @@ static const struct host_option rows[] = {
     {"explain", 0, NULL,
      "Say why --strategy auto took the strategy that it took",
      HOST_AT(struct host_run_options, explain)},
+    {"window", 0, "FRAMES",
+     "Frames a link and direction, 1 .. 64. Default: by memory",
+     HOST_AT(struct host_run_options, window), .least = 1,
+     .most = LINK_WINDOW_MAX},
+    {"node-program", 0, "FILE", "Start FILE for a node instead of incode-node",
+     HOST_AT(struct host_run_options, node_program)},
     {.help = "What to report:"},
     {"verify", 0, NULL,
      "Check exactly that the result is the Delaunay triangulation; without it "
@@ -307,41 +312,6 @@ static const struct host_option rows[] = {
      .take = take_progress},
     {"no-progress", 0, NULL, "No line of progress on a terminal",
      .take = take_no_progress},
-    {.help = TEST_HEADING},
-    {"window", 0, "FRAMES",
-     "Frames a link and direction, 1 .. 64. Default: by memory",
-     HOST_AT(struct host_run_options, window), .least = 1,
-     .most = LINK_WINDOW_MAX},
-    {"shuffle-seed", 0, "N", "Make arriving pages ready in a random order",
-     HOST_AT(struct host_run_options, shuffle_seed), .most = UINT64_MAX},
-    {"host-stall", 0, "MS", "The host sleeps up to MS milliseconds at random",
-     HOST_AT(struct host_run_options, throttle.stall_us_max), .most = 60000,
-     .unit = 1000},
-    {"host-rate", 0, "BYTES", "The host reads BYTES a second ..",
-     HOST_AT(struct host_run_options, throttle.bytes_a_second), .least = 1,
-     .most = 1000000000},
-    {"host-rate-time", 0, "S", ".. for its first S seconds. Default: 30",
-     HOST_AT(struct host_run_options, throttle.slow_us), .most = 86400,
-     .unit = 1000000},
-    {"host-unplug", 0, "MS",
-     "The host closes its serial wire every MS milliseconds, for half a second",
-     HOST_AT(struct host_run_options, unplug_us), .least = 50, .most = 86400000,
-     .unit = 1000},
-    {"board-reset", 0, "MS",
-     "One emulated board after the other, each once, is reset every MS "
-     "milliseconds,",
-     HOST_AT(struct host_run_options, trouble.every_us[0]), .least = 10,
-     .most = 86400000, .unit = 1000},
-    {"board-stop", 0, "MS", "stopped for half of them,",
-     HOST_AT(struct host_run_options, trouble.every_us[1]), .least = 10,
-     .most = 86400000, .unit = 1000},
-    {"board-kill", 0, "MS", "or killed",
-     HOST_AT(struct host_run_options, trouble.every_us[2]), .least = 10,
-     .most = 86400000, .unit = 1000},
-    {"seed", 0, "N", "Seed of --host-stall",
-     HOST_AT(struct host_run_options, throttle.seed), .most = UINT64_MAX},
-    {"node-program", 0, "FILE", "Start FILE for a node instead of incode-node",
-     HOST_AT(struct host_run_options, node_program)},
     {0}};
 
 /* --- what goes together
@@ -352,8 +322,7 @@ static const char *option_of_cube(uint64_t given) {
     bool of_cube = false;
     for (unsigned i = 0; rows[i].help != NULL; i++) {
         if (rows[i].name == NULL)
-            of_cube = strcmp(rows[i].help, CUBE_HEADING) == 0 ||
-                      strcmp(rows[i].help, TEST_HEADING) == 0;
+            of_cube = strcmp(rows[i].help, CUBE_HEADING) == 0;
         if (of_cube && (given >> i & 1) != 0)
             return rows[i].name;
     }
@@ -399,16 +368,7 @@ static int check_together(struct host_run_options *o, uint64_t given,
         {"link", bare, "this board's wires are its UARTs"},
         {"window", bare, "this board's firmware settles it"},
         {"node-program", bare, "this board has firmware"},
-        {"board-reset", !bare, "goes with emulated boards"},
-        {"board-stop", !bare, "goes with emulated boards"},
-        {"board-kill", !bare, "goes with emulated boards"},
-        {"host-unplug", cube || !o->link->terminals,
-         "goes with --link serial alone"},
         {"node-program", ranks, "not with --link mpi"},
-        {"host-rate-time", !host_option_given(rows, given, "host-rate"),
-         "goes with --host-rate alone"},
-        {"seed", !host_option_given(rows, given, "host-stall"),
-         "goes with --host-stall alone"},
         {"progress", o->quiet, "-q prints none"},
         {"explain", o->quiet, "-q prints nothing"},
         {"explain", o->strategy != NULL, "goes with --strategy auto alone"},
@@ -435,12 +395,29 @@ static int check_together(struct host_run_options *o, uint64_t given,
 /* --- the whole --------------------------------------------------------------
  */
 
+static const struct host_option *added;
+
+void host_arguments_add(const struct host_option *more) {
+    added = more;
+}
+
+/* Faults of nodes and wires, which threads do not have. */
+static bool has_faults(const struct host_run_options *o) {
+    const struct host_throttle *t = &o->throttle;
+    uint64_t any =
+        t->stall_us_max | t->bytes_a_second | o->unplug_us | o->shuffle_seed;
+    for (unsigned i = 0; i < HOST_TROUBLES; i++)
+        any |= o->trouble.every_us[i];
+    return any != 0;
+}
+
 /* silent: see host_options_parse. */
 static int parse_run(int argc, char **argv, bool silent,
                      struct host_run_options *options,
                      struct host_error *error) {
-    static const struct host_options mine = {
+    const struct host_options mine = {
         .rows = rows,
+        .more = added,
         .argument = take_points,
         .arguments = "POINTS",
         .fill = list_points,
@@ -484,7 +461,7 @@ static int parse_run(int argc, char **argv, bool silent,
         host_option_given(rows, given, "linda"))
         options->strategy = host_strategy_linda(options->linda);
     const char *of_cube = option_of_cube(given);
-    options->direct = of_cube == NULL;
+    options->direct = of_cube == NULL && !has_faults(options);
     if (of_cube != NULL && host_option_given(rows, given, "threads")) {
         return host_fail(error, HOST_USAGE,
                          "--threads: are of this process, and --%s speaks of "

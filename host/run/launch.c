@@ -90,7 +90,8 @@ int host_launch_rank(void) {
     return -1;
 }
 
-/* The file of another program of this project, beside this one. */
+/* The file of another program of this project, beside this one; NULL: this
+ * one's name and "-mpi". */
 static int beside(const char *name, char *path, size_t size,
                   struct host_error *error) {
     ssize_t length = readlink("/proc/self/exe", path, size - 32);
@@ -101,7 +102,10 @@ static int beside(const char *name, char *path, size_t size,
     }
     path[length] = '\0';
     char *slash = strrchr(path, '/');
-    strcpy(slash == NULL ? path : slash + 1, name);
+    if (name == NULL)
+        strcat(path, "-mpi");
+    else
+        strcpy(slash == NULL ? path : slash + 1, name);
     return 0;
 }
 
@@ -166,7 +170,7 @@ static void take_streams(void) {
 
 int host_launch_become(int rank, char **argv, struct host_error *error) {
     char path[4096];
-    const char *name = rank == 0 ? "incode-mpi" : "incode-node-mpi";
+    const char *name = rank == 0 ? NULL : "incode-node-mpi";
     if (beside(name, path, sizeof path, error) != 0)
         return error->code;
     if (rank == 0)

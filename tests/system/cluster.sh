@@ -3,6 +3,7 @@
 # stopped or slow to read, and that none outlives the host.  survival.sh kills
 # them.
 . tests/system/lib.sh
+with_faults
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null

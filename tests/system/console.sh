@@ -3,6 +3,7 @@
 # script has it: completion, resizing, Ctrl-C, a paste of 10,000 lines, a board
 # that talks garbage, runs beside it, exit statuses.
 . tests/system/lib.sh
+with_faults
 program=$(readlink -f "$INCODE")
 tool=$(readlink -f "${BABBLE:-$BUILD/tests/babble}")
 here=$scratch/here
@@ -88,7 +89,7 @@ await lets_look $run
 await looks
 check console-looks-beside-a-run "$(last errors)" looks
 answers console-touches-nothing 4 '^1-2:' -c 'memory 1-2' -c 'reset all'
-check console-tells-who "$(last errors)" grep -q "incode run .* has the cube" errors
+check console-tells-who "$(last errors)" grep -q "incode-testing run .* has the cube" errors
 kill $run
 wait $run 2> /dev/null
 

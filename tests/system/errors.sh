@@ -217,7 +217,7 @@ contained=(unshare ${user:+"$user"} -m bash -c 'mount -t devpts -o \
 if ! has_terminals "$name"; then
     :
 elif "${contained[@]}" true 2> /dev/null; then
-    "${contained[@]}" "$INCODE" run "$in/many.xyz" -q --nodes 16 \
+    "${contained[@]}" "$INCODE-testing" run "$in/many.xyz" -q --nodes 16 \
         --link serial --host-rate 2000 &
     all_there() { [ "$(pgrep -c -P $! incode-node)" = 16 ]; }
     await all_there

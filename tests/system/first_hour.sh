@@ -4,6 +4,7 @@
 # port of the host's whose adapter can be pulled out, wires that can be pulled.
 # first_hour.sh all: also what takes longer.
 . tests/system/wires/boards.bash
+with_faults
 umask 077 # for keys
 board=mps2-an500
 need_boards first_hour $board

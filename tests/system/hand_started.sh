@@ -4,6 +4,7 @@
 # which and what next, before its consequence; how soon, the tests of
 # host/service measure in virtual time.
 . tests/system/lib.sh
+with_faults
 umask 077 # for keys
 took=$SECONDS
 
@@ -122,7 +123,7 @@ kill -STOP $host
 held=$host
 begin --patience 600
 told 'held by an earlier host' \
-    "127.0.0.1:$base: in use by incode run .*, process $held of .*; waits "
+    "127.0.0.1:$base: in use by incode-testing run .*, process $held of .*; waits "
 kill -KILL $held $host
 wait $held $host 2> /dev/null
 

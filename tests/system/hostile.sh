@@ -2,6 +2,7 @@
 # A hostile process on this machine that calls whatever the program listens on,
 # for a whole run and between runs, changes neither result nor status.
 . tests/system/lib.sh
+with_faults
 umask 077 # for keys
 chmod 711 "$scratch" # the unix sockets in it are for others to find
 

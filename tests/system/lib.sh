@@ -119,6 +119,9 @@ hang=${SECONDS_MAX:-900}
 within() { timeout -k 5 "$hang" "$@"; }
 incode() { within "$INCODE" "$@"; }
 
+# The script's program has options for faults from now on: system/testing.c.
+with_faults() { INCODE=$INCODE-testing; }
+
 # await COMMAND...: waits until it succeeds.  clock: false after ten minutes, when
 # no machine is too slow for it; or where all awaits of the script have tried
 # AWAIT_TRIES times together (tests/planted).

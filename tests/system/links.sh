@@ -2,6 +2,7 @@
 # The same bytes over every kind of wire, also where the wire suffers.  What
 # waits more than it works goes on beside the rest.
 . tests/system/lib.sh
+with_faults
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null
@@ -320,7 +321,7 @@ END
     check 'links/a second host: exit 4' "exit $status" \
         test $status = 4 -a $((SECONDS - began)) -lt $soon
     check 'links/a second host: it is told' "$(last "$scratch/errors")" \
-        grep -q "^incode: 127.0.0.1:$((base + 80)): in use by incode run .*, \
+        grep -q "^incode: 127.0.0.1:$((base + 80)): in use by incode-testing run .*, \
 process $host of .*; " \
         "$scratch/errors"
     check 'links/a second host comes while the first is at work' 'it is not' \

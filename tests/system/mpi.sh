@@ -2,6 +2,7 @@
 # Nodes as ranks of Open MPI: started by incode, by mpirun, with a hostfile, with
 # a wrong number of ranks, and with a rank that is lost.
 . tests/system/lib.sh
+with_faults
 
 need() { command -v "$1" > /dev/null || { skip mpi "there is no $1"; exit 0; }; }
 need mpirun

@@ -7,6 +7,7 @@
 # past `grid_max` with `grid`; those past `kd_max` are for digests.sh, and for
 # `make test-full`; so are `grid` and `naive` on many nodes of little memory.
 . tests/system/lib.sh
+with_faults
 need_data pairs
 naive_max=${NAIVE_MAX:-5000}
 grid_max=${GRID_MAX:-10000}

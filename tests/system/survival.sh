@@ -3,6 +3,7 @@
 # digest is that of the undisturbed run, or the run ends with status 4 and
 # leaves nothing.
 . tests/system/lib.sh
+with_faults
 
 points=$scratch/points.npy
 "$INCODE" gen uniform "${CLUSTER_POINTS:-100000}" --seed 2 -o "$points" 2> /dev/null

@@ -2,6 +2,7 @@
 # Bare boards, emulated, with sets whose digests are known and with more points
 # and nodes: each within its time, which is stated.
 . tests/system/lib.sh
+with_faults
 
 if [ ! -r "$BUILD/firmware/mps2-an500.img" ]; then
     fail boards "there is no $BUILD/firmware: make firmware"

@@ -75,9 +75,7 @@ TEST(test_options) {
                                         "--nodes=8",
                                         "--memory=512K",
                                         "--window=1",
-                                        "--shuffle-seed=9",
                                         "--verify",
-                                        "--host-rate=1024",
                                         "--patience=7",
                                         "a.xyz",
                                         NULL};
@@ -90,10 +88,7 @@ TEST(test_options) {
     assert_int_equal(o.nodes, 8);
     assert_int_equal(o.memory, 524288);
     assert_int_equal(o.window, 1);
-    assert_int_equal(o.shuffle_seed, 9);
     assert_int_equal(o.verifying, HOST_VERIFY_ALWAYS);
-    assert_int_equal(o.throttle.bytes_a_second, 1024);
-    assert_int_equal(o.throttle.slow_us, 30000000);
     assert_int_equal(o.patience_s, 7);
 }
 
@@ -129,7 +124,7 @@ TEST(test_refused) {
         {"--link=a-name-longer-than-any-other-name-that-there-is",
          "no such name; allowed: tcp"},
         {"--board=mps2", "no such name; "},
-        {"--board-kill=100", "--board-kill: goes with emulated boards"},
+        {"--board-kill=100", "--board-kill: no such option of "},
         {"--cluster=1", "2 to 1024"},
         {"--cluster=4", "--cluster: goes with"},
         {"--builders=0", "1 to 1023"},
@@ -165,11 +160,7 @@ TEST(test_in_vain) {
                  {"--link=mpi", "--cube=lab.cube", "--nodes=2"},
                  {"--board=linux", "--cube=lab.cube", "--nodes=2"},
                  {"--window=4", "--cube=lab.cube", "--nodes=2"},
-                 {"--host-unplug=99", "--link=tcp", "--link=serial"},
-                 {"--host-unplug=99", "--cube=lab.cube", "--link=serial"},
                  {"--node-program=node", "--link=mpi", "--cube=lab.cube"},
-                 {"--host-rate-time=4", "--nodes=2", "--host-rate=9"},
-                 {"--seed=4", "--nodes=2", "--host-stall=9"},
                  {"--progress", "-q", "--nodes=2"},
                  {"--explain", "-q", "--nodes=2"},
                  {"--explain", "--strategy=spatial", "--strategy=auto"}};
@@ -244,6 +235,28 @@ TEST(test_rows) {
     }
 }
 
+/* Options that a program adds, which make a cube of the run. */
+TEST(test_added) {
+    static const struct host_option rows[] = {
+        {"host-rate", 0, "BYTES", "",
+         HOST_AT(struct host_run_options, throttle.bytes_a_second), .least = 1,
+         .most = 9999},
+        {0}};
+    static const char *const words[] = {"a.xyz", "--host-rate=1024", NULL};
+    static const char *const none[] = {"a.xyz", NULL};
+    struct host_run_options o;
+    struct host_error error;
+    assert_int_equal(parse(words, &o, &error), HOST_USAGE);
+    host_arguments_add(rows);
+    assert_int_equal(parse(words, &o, &error), 0);
+    assert_int_equal(o.throttle.bytes_a_second, 1024);
+    assert_int_equal(o.throttle.slow_us, 30000000);
+    assert_false(o.direct);
+    assert_int_equal(parse(none, &o, &error), 0);
+    assert_true(o.direct);
+    host_arguments_add(NULL);
+}
+
 /* What a bare board has settles what else may be asked for. */
 TEST(test_bare_boards) {
     static const struct {
@@ -256,10 +269,8 @@ TEST(test_bare_boards) {
         {{"--link=mpi", "--board=mps2-an385"}, "--link: "},
         {{"--window=4", "--board=mps2-an385"}, "--window: "},
         {{"--node-program=x", "--board=raspi3b"}, "--node-program: "}};
-    static const char *const right[] = {"a.xyz",           "--board=mps2-an500",
-                                        "--nodes=16",      "--memory=4M",
-                                        "--board-stop=9",  "--board-reset=70",
-                                        "--board-kill=80", NULL};
+    static const char *const right[] = {"a.xyz", "--board=mps2-an500",
+                                        "--nodes=16", "--memory=4M", NULL};
     struct host_run_options o;
     struct host_error error;
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
@@ -268,16 +279,9 @@ TEST(test_bare_boards) {
         assert_int_equal(parse(words, &o, &error), HOST_USAGE);
         assert_non_null(strstr(error.text, wrong[i].said));
     }
-    const char *words[8];
-    memcpy(words, right, sizeof right);
-    assert_int_equal(parse(words, &o, &error), HOST_USAGE); /* 9 is too few */
-    words[4] = "--board-stop=60";
-    assert_int_equal(parse(words, &o, &error), 0);
+    assert_int_equal(parse(right, &o, &error), 0);
     assert_string_equal(o.link->name, "uart");
     assert_int_equal(o.nodes, 16);
-    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_RESET], 70000);
-    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_STOP], 60000);
-    assert_int_equal(o.trouble.every_us[HOST_TROUBLE_KILL], 80000);
 }
 
 /* What `incode run` prints with this word, blanks squeezed. */
