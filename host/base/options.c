@@ -218,8 +218,7 @@ static int answer(const struct host_options *options, const struct table *t,
                      word);
 }
 
-/* --- values -----------------------------------------------------------------
- */
+/* --- values --------------------------------------------------------------- */
 
 static void take_row(const struct host_option *row, void *into,
                      const char *value, struct host_error *error) {

@@ -210,8 +210,7 @@ unsigned host_session_faults(const struct host_session *session,
     return count;
 }
 
-/* --- session wiring ---------------------------------------------------------
- */
+/* --- session wiring ------------------------------------------------------- */
 
 enum {
     NEWS_US = 300000,    /* after the last: more may come at once */

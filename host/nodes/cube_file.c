@@ -14,8 +14,7 @@
 #include "transport/cube.h"
 #include "transport/secure_wipe.h"
 
-/* --- what is there ----------------------------------------------------------
- */
+/* --- what is there -------------------------------------------------------- */
 
 const struct host_cube_wire *
 host_cube_between(const struct host_cube_file *file, unsigned a, unsigned b,
@@ -90,8 +89,7 @@ const struct host_cube_ssh *host_cube_ssh(const struct host_cube_file *file,
                : NULL;
 }
 
-/* --- links ------------------------------------------------------------------
- */
+/* --- links ---------------------------------------------------------------- */
 
 static int wrong(const struct host_cube_file *file, unsigned line,
                  struct host_error *error, const char *what, ...) {
@@ -219,8 +217,7 @@ static int check_wires(const struct host_cube_file *file,
     return 0;
 }
 
-/* --- boards -----------------------------------------------------------------
- */
+/* --- boards --------------------------------------------------------------- */
 
 static int check_node(struct host_cube_file *file, unsigned node,
                       struct host_error *error) {
@@ -310,8 +307,7 @@ void host_cube_print_address(const struct tcp_address *address, char *text,
 
 enum { TEXT_MAX = 4 << 20 }; /* that of 1,024 nodes has half a MiB */
 
-/* --- the text ---------------------------------------------------------------
- */
+/* --- the text ------------------------------------------------------------- */
 
 /* A cube file has three brackets in each other and nine settings side by side.
  * The library bounds neither, compares each setting's name with all beside it,

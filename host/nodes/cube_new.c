@@ -478,8 +478,7 @@ int host_cube_command(int argc, char **argv, struct host_error *error) {
     return c.nodes > 0 ? write_new(&c) : host_cube_print(c.file, error);
 }
 
-/* --- keys -------------------------------------------------------------------
- */
+/* --- keys ----------------------------------------------------------------- */
 
 enum { TEXT_BYTES = 2 * SECURE_KEY_BYTES + 1 };
 

@@ -192,8 +192,7 @@ static unsigned line_of(const struct value *v) {
     return v->at == NULL ? 1 : config_setting_source_line(v->at);
 }
 
-/* --- lines to boards --------------------------------------------------------
- */
+/* --- lines to boards ------------------------------------------------------ */
 
 static const char *const line_names[HOST_LINES] = {
     [HOST_LINE_RESET] = "reset", [HOST_LINE_BOOT] = "boot"};
@@ -307,8 +306,7 @@ static int read_modem_line(const struct reader *r, const struct value *v,
     return add_pin(r, v->at, &pin);
 }
 
-/* --- links ------------------------------------------------------------------
- */
+/* --- links ---------------------------------------------------------------- */
 
 enum {
     LINK_NODE,
@@ -456,8 +454,7 @@ static int read_links(const struct reader *r, const struct value *v) {
     return r->error->code;
 }
 
-/* --- nodes ------------------------------------------------------------------
- */
+/* --- nodes ---------------------------------------------------------------- */
 
 static const struct host_board *take_board(const struct reader *r,
                                            const struct value *v) {
@@ -575,8 +572,7 @@ static int read_nodes(const struct reader *r, const struct value *all,
     return r->error->code;
 }
 
-/* --- the whole --------------------------------------------------------------
- */
+/* --- the whole ------------------------------------------------------------ */
 
 static int read_key(const struct reader *r, const struct value *v) {
     struct host_cube_file *file = r->file;

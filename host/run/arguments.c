@@ -11,8 +11,7 @@
 #include "host/service/strategies/strategies.h"
 #include "incode/paper/builder.h"
 
-/* --- help -------------------------------------------------------------------
- */
+/* --- help ----------------------------------------------------------------- */
 
 static const char *link_help(unsigned i) {
     return host_link_row(i)->help;
@@ -81,8 +80,7 @@ static char *list_boards(const char *text) {
     return list_rows(text, host_board_name, board_help, host_board_name(0));
 }
 
-/* --- values -----------------------------------------------------------------
- */
+/* --- values --------------------------------------------------------------- */
 
 static const char *partition_name(unsigned i) {
     return host_partitions[i];
@@ -392,8 +390,7 @@ static int check_together(struct host_run_options *o, uint64_t given,
     return bare ? settle_bare(o, error) : 0;
 }
 
-/* --- the whole --------------------------------------------------------------
- */
+/* --- the whole ------------------------------------------------------------ */
 
 static const struct host_option *added;
 

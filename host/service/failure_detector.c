@@ -366,8 +366,7 @@ int host_detector_check(struct host_service *service, uint64_t now_us,
     return host_bring_up_check(s, now_us, elapsed, error);
 }
 
-/* --- suspects ---------------------------------------------------------------
- */
+/* --- suspects ------------------------------------------------------------- */
 
 enum {
     DOUBT_US = 1300000,

@@ -206,8 +206,7 @@ static void deliver(unsigned i, uint8_t type, const uint8_t *data,
     }
 }
 
-/* --- the session ------------------------------------------------------------
- */
+/* --- the session ---------------------------------------------------------- */
 
 static uint64_t tell_time(void *unused) {
     (void)unused;
