@@ -5,12 +5,213 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <zlib.h>
 
 #include "format.h"
+#include "host/base/memory.h"
 #include "rows.h"
 #include "scan.h"
 #include "read.h"
-#include "vtk_array.h"
+
+/* --- packed arrays -------------------------------------------------------- */
+
+/* Base64 or raw, in blocks by zlib or plain. */
+struct coding {
+    bool base64;      /* else raw */
+    bool compressed;  /* vtkZLibDataCompressor */
+    bool big;         /* byte order, of headers too */
+    bool wide_header; /* UInt64, else UInt32 */
+};
+
+struct bytes {
+    uint8_t *data;
+    size_t bytes;
+    size_t capacity;
+};
+
+/* A deflated byte holds at most 1,032 (zlib's own figure). */
+enum { INFLATION_MAX = 1032 };
+
+static void free_array(struct bytes *array) {
+    host_unmap(array->data, array->capacity);
+    *array = (struct bytes){0};
+}
+
+static int reserve(struct bytes *array, size_t bytes,
+                   struct host_error *error) {
+    array->data = host_map(bytes);
+    array->capacity = bytes;
+    array->bytes = 0;
+    return array->data == NULL ? host_fail_memory(error, "an array") : 0;
+}
+
+static int value_of(uint8_t c) {
+    return c >= 'A' && c <= 'Z'   ? c - 'A'
+           : c >= 'a' && c <= 'z' ? c - 'a' + 26
+           : c >= '0' && c <= '9' ? c - '0' + 52
+           : c == '+'             ? 62
+           : c == '/'             ? 63
+                                  : -1;
+}
+
+/* Decodes until `most` bytes are out or something that is not base64 comes.
+ * Padding may stand in the middle: writers encode headers by themselves. */
+static size_t decode(const uint8_t *from, size_t bytes, uint8_t *to,
+                     size_t most) {
+    size_t done = 0;
+    uint32_t bits = 0;
+    int count = 0, padding = 0;
+    for (size_t i = 0; i < bytes && done < most; i++) {
+        uint8_t c = from[i];
+        int value = value_of(c);
+        if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
+            continue;
+        if (value < 0 && (c != '=' || count < 2))
+            break;
+        padding += c == '=';
+        bits = bits << 6 | (uint32_t)(value < 0 ? 0 : value);
+        if (++count == 4) {
+            for (int k = 0; k < 3 - padding && done < most; k++)
+                to[done++] = (uint8_t)(bits >> (16 - 8 * k));
+            bits = 0;
+            count = padding = 0;
+        }
+    }
+    return done;
+}
+
+struct packed {
+    const struct host_source *source;
+    const struct coding *coding;
+    const uint8_t *from;
+    size_t bytes;
+};
+
+/* The first `most` bytes of what is packed, decoded. */
+static int plain(struct bytes *out, const struct packed *p, size_t most,
+                 struct host_error *error) {
+    size_t limit = p->bytes;
+    if (reserve(out, most < limit ? most : limit, error) != 0)
+        return error->code;
+    if (p->coding->base64) {
+        out->bytes = decode(p->from, p->bytes, out->data, out->capacity);
+    } else {
+        memcpy(out->data, p->from, out->capacity);
+        out->bytes = out->capacity;
+    }
+    if (out->bytes < most) {
+        return host_source_fail(p->source, error,
+                                "an array ends before its stated length; the "
+                                "file is cut short, get it whole");
+    }
+    return 0;
+}
+
+static uint64_t header_word(const struct bytes *a, size_t i,
+                            const struct coding *coding) {
+    enum host_number type = coding->wide_header ? HOST_U64 : HOST_U32;
+    return host_whole_at(a->data + i * host_number_bytes(type), type,
+                         coding->big);
+}
+
+static int damaged(const struct packed *p, struct host_error *error) {
+    return host_source_fail(p->source, error,
+                            "a packed array is damaged; get the file again");
+}
+
+static int inflate_blocks(struct bytes *out, const struct packed *p,
+                          const struct bytes *head, const struct bytes *in,
+                          uint64_t blocks, struct host_error *error) {
+    uint64_t size = header_word(head, 1, p->coding);
+    uint64_t last = header_word(head, 2, p->coding);
+    size_t at = head->bytes;
+    for (uint64_t b = 0; b < blocks; b++) {
+        uint64_t packed = header_word(head, 3 + (size_t)b, p->coding);
+        uLongf n = (uLongf)(b + 1 == blocks && last != 0 ? last : size);
+        uLongf expected = n;
+        if (packed > in->bytes - at || n > out->capacity - out->bytes ||
+            uncompress(out->data + out->bytes, &n, in->data + at,
+                       (uLong)packed) != Z_OK ||
+            n != expected)
+            return damaged(p, error);
+        at += (size_t)packed;
+        out->bytes += n;
+    }
+    return 0;
+}
+
+/* Header: blocks, bytes a block, bytes of a last partial block, then the
+ * packed bytes of each. */
+static int unpack_blocks(struct bytes *out, const struct packed *p,
+                         struct host_error *error) {
+    size_t word = p->coding->wide_header ? 8 : 4;
+    struct bytes head = {0}, in = {0};
+    uint64_t blocks = 0, packed = 0;
+    if (plain(&head, p, word, error) == 0) {
+        blocks = header_word(&head, 0, p->coding);
+        if (blocks > p->bytes / word)
+            damaged(p, error);
+    }
+    free_array(&head);
+    if (error->code == 0 && blocks > 0 &&
+        plain(&head, p, word * (3 + (size_t)blocks), error) == 0) {
+        for (uint64_t b = 0; b < blocks && packed <= p->bytes; b++) {
+            uint64_t n = header_word(&head, 3 + (size_t)b, p->coding);
+            packed = n > p->bytes ? n : packed + n;
+        }
+        uint64_t size = header_word(&head, 1, p->coding);
+        if (packed > p->bytes || size > packed * INFLATION_MAX + 1024 ||
+            size * blocks > packed * INFLATION_MAX * 2 + 1024 * blocks)
+            damaged(p, error);
+        else if (host_source_unpacks(p->source, packed, size * blocks, error) ==
+                     0 &&
+                 plain(&in, p, head.bytes + (size_t)packed, error) == 0 &&
+                 reserve(out, (size_t)(size * blocks), error) == 0)
+            inflate_blocks(out, p, &head, &in, blocks, error);
+    }
+    free_array(&head);
+    free_array(&in);
+    return error->code;
+}
+
+static int unpack_plain(struct bytes *out, const struct packed *p,
+                        struct host_error *error) {
+    size_t word = p->coding->wide_header ? 8 : 4;
+    struct bytes head = {0};
+    uint64_t bytes = 0;
+    if (plain(&head, p, word, error) == 0) {
+        bytes = header_word(&head, 0, p->coding);
+        if (bytes > p->bytes)
+            damaged(p, error);
+    }
+    free_array(&head);
+    if (error->code == 0 && plain(out, p, word + (size_t)bytes, error) == 0) {
+        memmove(out->data, out->data + word, (size_t)bytes);
+        out->bytes = (size_t)bytes;
+    }
+    return error->code;
+}
+
+/* from: where the header of an array begins; bytes: to the end of what may
+ * belong to it. */
+static int unpack_array(struct bytes *array, const struct host_source *source,
+                        const struct coding *coding, const uint8_t *from,
+                        size_t bytes, struct host_error *error) {
+    struct packed p = {source, coding, from, bytes};
+    if (coding->base64) { /* leading blanks of inline data */
+        while (p.bytes > 0 && (*p.from == ' ' || *p.from == '\n' ||
+                               *p.from == '\r' || *p.from == '\t')) {
+            p.from++;
+            p.bytes--;
+        }
+    }
+    *array = (struct bytes){0};
+    if (coding->compressed)
+        return unpack_blocks(array, &p, error);
+    return unpack_plain(array, &p, error);
+}
+
+/* --- elements ------------------------------------------------------------- */
 
 enum want { POINTS, CONNECTIVITY, OFFSETS, TYPES, WANTS };
 
@@ -18,8 +219,8 @@ enum want { POINTS, CONNECTIVITY, OFFSETS, TYPES, WANTS };
 struct array {
     bool there, text;
     enum host_number type;
-    struct vtk_array bytes; /* of numbers, or of text */
-    uint64_t lines_before;  /* of the file, before the text */
+    struct bytes bytes;    /* of numbers, or of text */
+    uint64_t lines_before; /* of the file, before the text */
 };
 
 struct xml {
@@ -27,7 +228,7 @@ struct xml {
     struct host_mesh *mesh;
     struct host_error *error;
     XML_Parser parser;
-    struct vtk_coding coding;
+    struct coding coding;
     const uint8_t *appended; /* just past its underscore, or NULL */
     size_t appended_bytes;
     bool appended_base64;
@@ -72,11 +273,11 @@ static void start_file(struct xml *x, const char **attributes) {
 
 static void unpack(struct xml *x, enum want want, bool base64,
                    const uint8_t *from, size_t bytes) {
-    struct vtk_coding coding = x->coding;
+    struct coding coding = x->coding;
     coding.base64 = base64;
     if (x->error->code == 0) {
-        vtk_array_unpack(&x->array[want].bytes, x->source, &coding, from, bytes,
-                         x->error);
+        unpack_array(&x->array[want].bytes, x->source, &coding, from, bytes,
+                     x->error);
     }
 }
 
@@ -272,7 +473,7 @@ static void end_piece(struct xml *x) {
         if (x->array[i].text)
             free(x->array[i].bytes.data);
         else
-            vtk_array_free(&x->array[i].bytes);
+            free_array(&x->array[i].bytes);
         x->array[i] = (struct array){0};
     }
 }
