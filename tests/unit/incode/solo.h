@@ -148,8 +148,17 @@ static inline void solo_deliver_page(struct solo *s, uint32_t i) {
     assert_int_equal(incode_triangulator_page(s->t, number, page, bytes), 0);
 }
 
+typedef int solo_take_faces(struct solo *s, const struct incode_face *faces,
+                            uint32_t count, bool last);
+
+static inline int solo_unspilled(struct solo *s,
+                                 const struct incode_face *faces,
+                                 uint32_t count, bool last) {
+    return incode_triangulator_unspill(s->t, s->wanted, faces, count, last);
+}
+
 /* Gives the faces of the wanted brick back, in portions and in their order. */
-static inline void solo_deliver_faces(struct solo *s) {
+static inline void solo_deliver_faces(struct solo *s, solo_take_faces *take) {
     uint32_t brick = s->wanted;
     size_t kept = 0, portion = s->chance == 0 ? SIZE_MAX : solo_draw(s, 64), i;
     for (i = 0; i < s->face_count && portion > 0; i++) {
@@ -158,8 +167,7 @@ static inline void solo_deliver_faces(struct solo *s) {
             continue;
         }
         portion--;
-        assert_int_equal(
-            incode_triangulator_unspill(s->t, brick, s->face + i, 1, false), 0);
+        assert_int_equal(take(s, s->face + i, 1, false), 0);
     }
     bool all = i == s->face_count;
     if (s->face_count > i)
@@ -168,15 +176,14 @@ static inline void solo_deliver_faces(struct solo *s) {
     s->face_count -= i - kept;
     if (!all)
         return;
+    assert_int_equal(take(s, NULL, 0, true), 0);
     s->wanted = INCODE_NONE;
-    assert_int_equal(incode_triangulator_unspill(s->t, brick, NULL, 0, true),
-                     0);
 }
 
 /* Something of what is under way arrives; false: nothing is. */
 static inline bool solo_deliver(struct solo *s) {
     if (s->wanted != INCODE_NONE && !solo_refuses(s)) {
-        solo_deliver_faces(s);
+        solo_deliver_faces(s, solo_unspilled);
         return true;
     }
     if (s->page_count == 0)
@@ -228,6 +235,16 @@ static inline bool solo_step(struct solo *s, uint64_t steps) {
     return false;
 }
 
+/* All bricks of the job, and no others, are. */
+static inline void solo_check_commits(struct solo *s) {
+    for (uint32_t b = 0; b < s->order.bricks; b++) {
+        bool own = b >= s->job.first && b < s->job.last;
+        assert_int_equal(s->committed[b], own);
+        s->committed[b] = 0;
+    }
+    assert_int_equal(s->face_count, 0);
+}
+
 static inline void solo_region(struct solo *s, uint32_t region) {
     solo_start(s, region);
     if (s->false_start) {
@@ -238,25 +255,14 @@ static inline void solo_region(struct solo *s, uint32_t region) {
         solo_start(s, region);
     }
     assert_true(solo_step(s, SOLO_STEPS));
-    for (uint32_t b = 0; b < s->order.bricks; b++) {
-        bool own = b >= s->job.first && b < s->job.last;
-        assert_int_equal(s->committed[b], own);
-        s->committed[b] = 0;
-    }
-    assert_int_equal(s->face_count, 0);
+    solo_check_commits(s);
     assert_int_equal(s->t->front.afl.count, 0);
 }
-
 static inline void solo_order(struct solo *s, const double *xyz, uint64_t n) {
     struct host_error error = {0};
     if (host_order_make(&s->order, "set", xyz, n, s->partition, s->regions,
                         s->index == INCODE_GRID, &error) != 0)
         fail_msg("%s", error.text);
-}
-
-/* The triangulator, with the order that is there. */
-static inline void solo_make(struct solo *s,
-                             const struct incode_front_peers *peers) {
     s->setup = (struct incode_setup){.bricks = s->order.bricks,
                                      .index = s->index,
                                      .face_rule = s->face_rule,
@@ -266,13 +272,18 @@ static inline void solo_make(struct solo *s,
     memcpy(s->setup.lo, s->order.lo, sizeof s->setup.lo);
     memcpy(s->setup.hi, s->order.hi, sizeof s->setup.hi);
     memcpy(s->setup.cells, s->order.cells, sizeof s->setup.cells);
+    s->committed = calloc(s->order.bricks, 1);
+    assert_non_null(s->committed);
+}
+
+/* The triangulator, with the order that is there. */
+static inline void solo_make(struct solo *s,
+                             const struct incode_front_peers *peers) {
     if (s->memory == 0)
         s->memory = incode_arena_min(&s->setup);
     s->memory = (s->memory + 63) / 64 * 64;
     s->arena = aligned_alloc(64, s->memory + SOLO_GUARD);
-    s->committed = calloc(s->order.bricks, 1);
     assert_non_null(s->arena);
-    assert_non_null(s->committed);
     memset(s->arena, 0xa5, s->memory + SOLO_GUARD);
     const struct incode_outside outside = {.pages = {s, solo_request},
                                            .front = {s, solo_emit_room,

@@ -17,7 +17,7 @@ static void expect(const double *xyz, uint64_t n, struct host_digest *digest) {
 static void run(struct lend *lend, const struct host_points *set,
                 const struct host_digest *digest) {
     lend_run(lend, set->xyz, set->count);
-    assert_string_equal(lend->digest.text, digest->text);
+    assert_string_equal(lend->world.digest.text, digest->text);
 }
 
 static void make(const char *kind, uint64_t n, struct host_points *set) {
@@ -43,9 +43,9 @@ TEST(kinds) {
                 struct lend lend = {.builders = shapes[k][0],
                                     .faces = shapes[k][1],
                                     .jobs = shapes[k][2],
-                                    .chance = chance * (i + k + 1),
-                                    .shuffle = chance,
-                                    .units = chance == 2 ? 3 : 0};
+                                    .world.chance = chance * (i + k + 1),
+                                    .world.shuffle = chance,
+                                    .world.units = chance == 2 ? 3 : 0};
                 run(&lend, &set, &digest);
                 lend_close(&lend);
             }
@@ -64,8 +64,8 @@ TEST(indexes) {
         struct lend lend = {.builders = 3,
                             .faces = 4,
                             .jobs = 2,
-                            .index = indexes_in_turn[i],
-                            .chance = 5};
+                            .world.index = indexes_in_turn[i],
+                            .world.chance = 5};
         run(&lend, &set, &digest);
         lend_close(&lend);
     }
@@ -83,8 +83,8 @@ TEST(spilled) {
         struct lend lend = {.builders = 1 + 2 * k,
                             .faces = 1 + 30 * k,
                             .jobs = 2,
-                            .chance = k + 1,
-                            .pressure = 500};
+                            .world.chance = k + 1,
+                            .world.pressure = 500};
         run(&lend, &set, &digest);
         assert_true(lend.all.afl_spilled > 0);
         lend_close(&lend);
@@ -117,7 +117,7 @@ TEST(all_faces_on_the_hull) {
     for (uint32_t builders = 1; builders <= 3; builders++) {
         struct lend lend = {.builders = builders, .faces = 4, .jobs = 2};
         lend_run(&lend, set.xyz, set.count);
-        assert_int_equal(lend.tets.count, 1);
+        assert_int_equal(lend.world.tets.count, 1);
         assert_int_equal(lend.all.hull_facets, 4);
         assert_int_equal(lend.empty_faces, 4);
         assert_int_equal(lend.all.seeds, 1);
@@ -217,8 +217,8 @@ static const char *fault_of(enum incode_list_kind kind, uint32_t least,
     const char *fault;
     make("uniform", 300, &set);
     lend_open(&lend, set.xyz, set.count);
-    lend.job = (struct incode_job){.last = lend.order.bricks};
-    incode_manager_start(&lend.manager, &lend.job);
+    lend.world.job = (struct incode_job){.last = lend.world.order.bricks};
+    incode_manager_start(&lend.manager, &lend.world.job);
     b = &lend.builder[0].builder;
     for (uint32_t i = 0;; i++) {
         assert_in_range(i, 0, 100000); /* or it waits for ever */
