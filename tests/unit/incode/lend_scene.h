@@ -159,6 +159,7 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
     world->regions = world->regions == 0 ? 1 : world->regions;
     world->owner_rule = INCODE_OWNER_LOWEST;
     solo_order(world, xyz, n);
+    solo_set_up(world);
     const struct incode_front_outside outside = {world,      solo_emit_room,
                                                  solo_emit,  solo_commit,
                                                  solo_spill, solo_unspill};

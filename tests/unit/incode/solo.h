@@ -263,6 +263,9 @@ static inline void solo_order(struct solo *s, const double *xyz, uint64_t n) {
     if (host_order_make(&s->order, "set", xyz, n, s->partition, s->regions,
                         s->index == INCODE_GRID, &error) != 0)
         fail_msg("%s", error.text);
+}
+
+static inline void solo_set_up(struct solo *s) {
     s->setup = (struct incode_setup){.bricks = s->order.bricks,
                                      .index = s->index,
                                      .face_rule = s->face_rule,
@@ -279,6 +282,7 @@ static inline void solo_order(struct solo *s, const double *xyz, uint64_t n) {
 /* The triangulator, with the order that is there. */
 static inline void solo_make(struct solo *s,
                              const struct incode_front_peers *peers) {
+    solo_set_up(s);
     if (s->memory == 0)
         s->memory = incode_arena_min(&s->setup);
     s->memory = (s->memory + 63) / 64 * 64;

@@ -103,19 +103,30 @@ TEST(little_in_vain) {
     host_points_free(&points);
 }
 
+/* Two nodes that have a half each of uniform points. */
+static struct several two;
+static struct host_points points_of_two;
+
+static void begin(uint64_t points, uint64_t seed) {
+    struct host_error error = {0};
+    two = (struct several){.seed = seed,
+                           .solo = {.index = INCODE_KD, .regions = 2}};
+    if (host_gen("uniform", points, seed, &points_of_two, &error) != 0)
+        fail_msg("%s", error.text);
+    several_open(&two, points_of_two.xyz, points);
+}
+
+static void end(void) {
+    several_close(&two);
+    host_points_free(&points_of_two);
+}
+
 /* What cannot come of another is told so, and changes nothing. */
 TEST(refusals) {
-    struct host_points points = {0};
-    struct host_error error = {0};
-    static struct several all;
-    all =
-        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
-    if (host_gen("uniform", 500, 5, &points, &error) != 0)
-        fail_msg("%s", error.text);
-    several_open(&all, points.xyz, points.count);
-    struct incode_triangulator *t = all.node[1].solo.t;
-    uint32_t first = all.node[1].solo.job.first * INCODE_BRICK_POINTS;
-    uint32_t past = all.solo.order.bricks * INCODE_BRICK_POINTS;
+    begin(500, 5);
+    struct incode_triangulator *t = two.node[1].solo.t;
+    uint32_t first = two.node[1].solo.job.first * INCODE_BRICK_POINTS;
+    uint32_t past = two.solo.order.bricks * INCODE_BRICK_POINTS;
     const uint32_t wrong[][4] = {
         {first, first + 1, first + 2, first + 3}, /* its own */
         {0, 1, 2, 3},                             /* nothing to it */
@@ -125,34 +136,25 @@ TEST(refusals) {
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++)
         assert_int_equal(incode_triangulator_take(t, wrong[i]), -1);
     assert_int_equal(t->front.afl.count, 0);
-    several_work(&all);
-    several_gather(&all);
+    several_work(&two);
+    several_gather(&two);
     assert_int_equal(incode_triangulator_take(t, wrong[0]), -1);
-    several_close(&all);
-    host_points_free(&points);
+    end();
 }
 
 /* A tetrahedron that comes twice is noticed. */
 TEST(twice) {
-    struct host_points points = {0};
-    struct host_error error = {0};
-    static struct several all;
-    all =
-        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
-    if (host_gen("uniform", 500, 5, &points, &error) != 0)
-        fail_msg("%s", error.text);
-    several_open(&all, points.xyz, points.count);
-    while (all.share_count == 0)
-        (void)solo_step(&all.node[0].solo, 1);
-    struct incode_triangulator *t = all.node[1].solo.t;
-    const struct several_share share = all.share[0];
+    begin(500, 5);
+    while (two.share_count == 0)
+        (void)solo_step(&two.node[0].solo, 1);
+    struct incode_triangulator *t = two.node[1].solo.t;
+    const struct several_share share = two.share[0];
     assert_int_equal(share.to, 1);
     assert_int_equal(incode_triangulator_take(t, share.v), 0);
     assert_null(incode_triangulator_fault(t));
     (void)incode_triangulator_take(t, share.v);
     assert_non_null(incode_triangulator_fault(t));
-    several_close(&all);
-    host_points_free(&points);
+    end();
 }
 
 static bool no_room(void *context, const struct incode_face *faces,
@@ -165,17 +167,10 @@ static bool no_room(void *context, const struct incode_face *faces,
  * may come later, and who sends it all the same is told that memory is not what
  * is wanting. */
 TEST(waits_for_room) {
-    struct host_points points = {0};
-    struct host_error error = {0};
-    static struct several all;
-    all =
-        (struct several){.seed = 5, .solo = {.index = INCODE_KD, .regions = 2}};
-    if (host_gen("uniform", 500, 5, &points, &error) != 0)
-        fail_msg("%s", error.text);
-    several_open(&all, points.xyz, points.count);
-    while (all.share_count == 0)
-        (void)solo_step(&all.node[0].solo, 1);
-    struct incode_triangulator *t = all.node[1].solo.t;
+    begin(500, 5);
+    while (two.share_count == 0)
+        (void)solo_step(&two.node[0].solo, 1);
+    struct incode_triangulator *t = two.node[1].solo.t;
     struct incode_front *front = &t->front;
     const struct incode_front_outside outside = front->outside;
     assert_true(incode_triangulator_may_take(t, INCODE_TAKEN_MAX));
@@ -185,16 +180,15 @@ TEST(waits_for_room) {
     assert_false(incode_triangulator_may_take(t, 3));
     front->spill_count = INCODE_SPILL_FACES - 6;
     assert_false(incode_triangulator_may_take(t, 1));
-    assert_int_equal(incode_triangulator_take(t, all.share[0].v), 0);
+    assert_int_equal(incode_triangulator_take(t, two.share[0].v), 0);
     assert_non_null(strstr(incode_triangulator_fault(t), "no room"));
     assert_null(strstr(incode_triangulator_fault(t), "more memory"));
     front->fault = NULL;
     front->spill_count = 0;
     front->outside = outside;
-    several_work(&all);
-    several_gather(&all);
-    several_close(&all);
-    host_points_free(&points);
+    several_work(&two);
+    several_gather(&two);
+    end();
 }
 
 static bool not_now(void *context, uint32_t brick) {
@@ -204,15 +198,8 @@ static bool not_now(void *context, uint32_t brick) {
 
 /* A node that cannot ask for what is spilled, however long, is not quiet. */
 TEST(waits_to_ask) {
-    struct host_points points = {0};
-    struct host_error error = {0};
-    static struct several all;
-    all =
-        (struct several){.seed = 7, .solo = {.index = INCODE_KD, .regions = 2}};
-    if (host_gen("uniform", 900, 7, &points, &error) != 0)
-        fail_msg("%s", error.text);
-    several_open(&all, points.xyz, points.count);
-    struct solo *solo = &all.node[1].solo;
+    begin(900, 7);
+    struct solo *solo = &two.node[1].solo;
     struct incode_front *front = &solo->t->front;
     const struct incode_front_outside outside = front->outside;
     while (!incode_triangulator_is_quiet(solo->t))
@@ -226,10 +213,9 @@ TEST(waits_to_ask) {
     }
     front->outside = outside;
     front->spill_from = front->bricks;
-    several_work(&all);
-    several_gather(&all);
-    several_close(&all);
-    host_points_free(&points);
+    several_work(&two);
+    several_gather(&two);
+    end();
 }
 
 /* Sends the last node what it is to hear of, as long as it has fewer faces than
