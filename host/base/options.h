@@ -44,11 +44,14 @@ struct host_option {
     char *(*fill)(const char *text); /* makes `help` longer, by malloc */
 };
 
+/* Is nowhere: HOST_AT asks for the type of what would be there. */
+extern char host_option_nowhere[];
+
 /* Of a row: the member that its value goes to. */
 #define HOST_AT(type, member)                                                  \
     .at = offsetof(type, member),                                              \
-    .kind = _Generic(((type *)0)->member, bool: HOST_OPTION_FLAG,              \
-                     const char *: HOST_OPTION_TEXT,                           \
+    .kind = _Generic(((type *)(void *)host_option_nowhere)->member,            \
+                     bool: HOST_OPTION_FLAG, const char *: HOST_OPTION_TEXT,   \
                      uint64_t: HOST_OPTION_NUMBER,                             \
                      unsigned: HOST_OPTION_UNSIGNED)
 
