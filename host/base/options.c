@@ -312,11 +312,13 @@ int host_options_parse(const struct host_options *options, int argc,
         }
         if (found == '?')
             return refuse(&table, argv, error);
-        while (found != KEY_LONG + (int)i && found != table.row[i]->letter)
-            i++;
+        const struct host_option *row = table.row[0];
+        while (assert(row != NULL),
+               found != KEY_LONG + (int)i && found != row->letter)
+            row = table.row[++i];
         bool more = i < table.more;
-        take_row(table.row[i], (char *)into + (more ? options->more_at : 0),
-                 optarg, error);
+        take_row(row, (char *)into + (more ? options->more_at : 0), optarg,
+                 error);
         if (error->code != 0)
             return error->code;
         bits |= more ? 0 : UINT64_C(1) << (i - table.more);
