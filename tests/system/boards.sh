@@ -107,7 +107,7 @@ echo 'dimension = 1;' > "$scratch/own.cube"
 refuses 'boards/emulate: a file of the user' 3 'own.cube: not a file that' \
     incode emulate --board mps2-an500 --nodes 2 -o "$scratch/own.cube"
 mkdir "$scratch/bin"
-cp "$INCODE" "$scratch/bin"
+cp "$INCODE" "$scratch/bin/incode"
 refuses 'boards/no firmware' 4 "mps2-an500.img: .*; make the board's firmware \
 with: make firmware$" within "$scratch/bin/incode" run "$points" \
     -q --board mps2-an500 --nodes 2
