@@ -61,8 +61,6 @@ static void fill_table(struct table *t, const struct host_options *options) {
     t->letters[letters++] = ':';
     t->letters[letters++] = 'V';
     t->letters[letters++] = 'h';
-    for (; n < sizeof answered / sizeof answered[0]; n++)
-        t->name[n] = (struct option){answered[n], 0, NULL, KEY_ANSWER};
     for (unsigned i = 0; i < t->rows; i++) {
         const struct host_option *row = t->row[i];
         int value = row->argument == NULL  ? no_argument
@@ -77,6 +75,15 @@ static void fill_table(struct table *t, const struct host_options *options) {
             for (int colons = 0; colons < value; colons++) /* or two */
                 t->letters[letters++] = ':';
         }
+    }
+    /* A command may have one of these names itself, as sign has --version. */
+    size_t own = n;
+    for (size_t i = 0; i < sizeof answered / sizeof answered[0]; i++) {
+        size_t k = 0;
+        while (k < own && strcmp(t->name[k].name, answered[i]) != 0)
+            k++;
+        if (k == own)
+            t->name[n++] = (struct option){answered[i], 0, NULL, KEY_ANSWER};
     }
 }
 
@@ -202,9 +209,13 @@ static char *name_readme(int key, const char *text, void *input) {
 static int answer(const struct host_options *options, const struct table *t,
                   char **argv, const char *word, bool silent,
                   struct host_error *error) {
-    const struct argp argp = {
-        t->help,     NULL, options->arguments, options->about, NULL,
-        name_readme, NULL};
+    const struct argp argp = {t->rows == 0 ? NULL : t->help,
+                              NULL,
+                              options->arguments,
+                              options->about,
+                              NULL,
+                              name_readme,
+                              NULL};
     char text[16];
     char *words[] = {argv[0], text, NULL};
     snprintf(text, sizeof text, "%s", word);
@@ -213,9 +224,7 @@ static int answer(const struct host_options *options, const struct table *t,
     if (!silent)
         (void)argp_parse(&argp, 2, words, 0, NULL, NULL);
     return host_fail(error, HOST_USAGE,
-                     "%s: no help is given here; leave it "
-                     "out",
-                     word);
+                     "%s: no help is given here; leave it out", word);
 }
 
 /* --- values --------------------------------------------------------------- */

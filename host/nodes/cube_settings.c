@@ -384,9 +384,10 @@ static int resolve(const struct reader *r, const struct value *v,
  * is not. */
 static int read_tcp(const struct reader *r, const struct value v[],
                     struct host_cube_wire *wire) {
-    if (resolve(r, &v[LINK_TCP], &wire->at) != 0 ||
-        resolve(r, &v[v[LINK_VIA].at == NULL ? LINK_TCP : LINK_VIA],
-                &wire->via) != 0)
+    if (resolve(r, &v[LINK_TCP], &wire->at) != 0)
+        return r->error->code;
+    wire->via = wire->at;
+    if (v[LINK_VIA].at != NULL && resolve(r, &v[LINK_VIA], &wire->via) != 0)
         return r->error->code;
     wire->insecure = v[LINK_INSECURE].number != 0;
     return r->file->has_key || wire->insecure

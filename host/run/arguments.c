@@ -312,8 +312,7 @@ static const struct host_option rows[] = {
      .take = take_no_progress},
     {0}};
 
-/* --- what goes together
- * ------------------------------------------------------- */
+/* --- what goes together --------------------------------------------------- */
 
 /* The first option given that speaks of a cube, or NULL. */
 static const char *option_of_cube(uint64_t given) {

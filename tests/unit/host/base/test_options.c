@@ -155,13 +155,15 @@ TEST(test_numbers) {
 
 /* Rows before a command's own go to a struct in its struct. */
 struct outer {
-    const char *image;
+    const char *image, *version;
     bool deep;
     struct seen inner;
 };
 
 static const struct host_option outer_rows[] = {
-    {"deep", 0, NULL, "of the outer", HOST_AT(struct outer, deep)}, {0}};
+    {"deep", 0, NULL, "of the outer", HOST_AT(struct outer, deep)},
+    {"version", 0, "TEXT", "its own", HOST_AT(struct outer, version)},
+    {0}};
 
 static int parse_outer(const char *first, const char *second,
                        struct outer *outer, struct host_error *error) {
@@ -174,7 +176,7 @@ static int parse_outer(const char *first, const char *second,
         .needed = true,
         .arguments = "",
         .about = ""};
-    char text[3][20] = {"incode try"};
+    static char text[3][20] = {"incode try"};
     char *argv[] = {text[0], text[1], text[2], NULL};
     int argc = first == NULL ? 1 : second == NULL ? 2 : 3;
     memset(error, 0, sizeof *error);
@@ -206,6 +208,8 @@ TEST(test_rows_of_another_struct) {
     assert_int_equal(parse_outer("--deep", "a", &outer, &error), 0);
     assert_true(outer.deep);
     assert_false(outer.inner.windows);
+    assert_int_equal(parse_outer("--version=2", "a", &outer, &error), 0);
+    assert_string_equal(outer.version, "2");
 }
 
 TEST(test_values) {
