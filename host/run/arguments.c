@@ -420,16 +420,11 @@ static int parse_run(int argc, char **argv, bool silent,
         .about =
             "Triangulates POINTS, and writes each output by its extension. The "
             "work is done by threads of this process or, where an option "
-            "speaks of "
-            "a cube, by nodes.\v"
+            "speaks of a cube, by nodes.\v"
             "POINTS: %s; .gz of any of them; - is .xyz from standard input. Of "
-            "a "
-            ".csv, .xyz or .txt whose first line names columns x, y and z, in "
-            "any "
-            "order and "
-            "among others, these are taken; of other text, and of .npy, the "
-            "first "
-            "three columns.\n\n"
+            "a .csv, .xyz or .txt whose first line names columns x, y and z, "
+            "in any order and among others, these are taken; of other text, "
+            "and of .npy, the first three columns.\n\n"
             "Examples:\n"
             "  incode run bunny.ply -o bunny.vtu\n"
             "  incode run points.xyz --nodes 8 --verify --stats run.json\n"
@@ -438,8 +433,7 @@ static int parse_run(int argc, char **argv, bool silent,
             "input or an output that cannot be written, 4 cube, link or node "
             "failure, 5 a verification failed. A signal such as that of Ctrl-C "
             "ends it as a signal does (130 in a shell). Unless it is 0, no "
-            "output "
-            "has its name, and what had it before is as it was."};
+            "output has its name, and what had it before is as it was."};
     uint64_t given = 0;
     host_run_defaults(options);
     int status =

@@ -279,7 +279,7 @@ static inline void solo_set_up(struct solo *s) {
     assert_non_null(s->committed);
 }
 
-/* The triangulator, with the order that is there. */
+/* Makes the triangulator; s->order has been made. */
 static inline void solo_make(struct solo *s,
                              const struct incode_front_peers *peers) {
     solo_set_up(s);

@@ -121,7 +121,8 @@ static void end(void) {
     host_points_free(&points_of_two);
 }
 
-/* What cannot come of another is told so, and changes nothing. */
+/* A tetrahedron that no other node can have sent is refused, and changes
+ * nothing. */
 TEST(refusals) {
     begin(500, 5);
     struct incode_triangulator *t = two.node[1].solo.t;
