@@ -244,6 +244,14 @@ static void take_row(const struct host_option *row, void *into,
         named = host_option_choose(row->name, value, row->names, error);
         if (named < 0)
             return;
+    } else if (row->powers != NULL) {
+        char option[NAMES_MAX];
+        unsigned nodes = 0;
+        snprintf(option, sizeof option, "--%s", row->name);
+        if (host_parse_nodes(option, value, (unsigned)row->most, row->powers,
+                             &nodes, error) != 0)
+            return;
+        n = nodes;
     } else if (row->kind == HOST_OPTION_NUMBER ||
                row->kind == HOST_OPTION_UNSIGNED) {
         if (host_option_number(row->name, value, row->least, row->most, &n,

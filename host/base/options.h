@@ -15,11 +15,11 @@
 enum { HOST_OPTIONS_MAX = 64 }; /* rows of a command, headings included */
 
 enum host_option_kind {
-    HOST_OPTION_TAKEN,   /* by `take` */
+    HOST_OPTION_TAKEN,   /* by the row's `take` */
     HOST_OPTION_FLAG,    /* bool: becomes true */
     HOST_OPTION_TEXT,    /* const char * */
-    HOST_OPTION_NUMBER,  /* uint64_t, */
-    HOST_OPTION_UNSIGNED /* unsigned, or an enum: from least to most */
+    HOST_OPTION_NUMBER,  /* uint64_t */
+    HOST_OPTION_UNSIGNED /* unsigned, or an enum */
 };
 
 /* Takes a value for `into`, the struct of a command's options; value: NULL
@@ -30,17 +30,20 @@ typedef void host_take(void *into, const char *value, struct host_error *error);
 typedef const char *host_row_name(unsigned i);
 
 struct host_option {
-    const char *name;     /* NULL: a heading; a table ends with {0} */
-    char letter;          /* or 0 */
+    const char *name;     /* NULL: a heading.  The last row is {0}. */
+    char letter;          /* as in -o; 0: none */
     const char *argument; /* as --help names it; NULL: it takes none */
     const char *help;
-    enum host_option_kind kind;
-    size_t at;            /* of the member, in the command's struct */
-    uint64_t least, most; /* of a number */
-    uint64_t unit;        /* it is multiplied by; 0: 1 */
-    host_row_name *names; /* the value is one of these: it becomes its index */
-    const char *omitted;  /* the argument, where it may be left out */
-    host_take *take;      /* instead of all that */
+    enum host_option_kind kind; /* by HOST_AT, as is */
+    size_t at;                  /* of the member in the command's struct */
+    uint64_t least, most;       /* of a number */
+    uint64_t unit;              /* a number is multiplied by it; 0: by 1 */
+    host_row_name *names;       /* an unsigned is the index of one of these */
+    const char *powers;         /* an unsigned is a power of two up to `most`;
+                                   what an error says behind them; or NULL */
+    const char *omitted;        /* the value without an argument; NULL: the
+                                   argument may not be left out */
+    host_take *take;            /* takes the value instead */
     char *(*fill)(const char *text); /* makes `help` longer, by malloc */
 };
 
@@ -57,20 +60,25 @@ extern char host_option_nowhere[];
 
 struct host_options {
     const struct host_option *rows; /* NULL: none */
-    const struct host_option
-        *more;             /* rows before them, or NULL: their struct */
-    size_t more_at;        /* is there in the command's */
-    const char *arguments; /* as --help names them */
-    const char *about;     /* behind \v: below the options */
+    /* Rows that --help prints before them, or NULL.  Their struct is at
+     * `more_at` of the command's. */
+    const struct host_option *more;
+    size_t more_at;
+    const char *arguments;           /* as --help names them */
+    const char *about;               /* behind \v: below the options */
     char *(*fill)(const char *text); /* makes that part longer, by malloc */
-    /* What becomes of arguments, one of: */
-    const char *one;     /* there is one, of this name, a const char *, */
-    size_t one_at;       /* there, */
-    bool needed;         /* which may not be left out; */
-    host_take *argument; /* each is taken, in order; */
-    bool first;          /* the first one ends the options: its index goes to
-                            the struct, an int; */
-    const char *refusal; /* or none is: "ARGUMENT: REFUSAL" */
+    /* A command takes arguments in one of four ways.  First: it takes one,
+     * whose name is `one` and which goes to the const char * at `one_at`. */
+    const char *one;
+    size_t one_at;
+    bool needed; /* that one may not be left out */
+    /* Second: `argument` takes each, in order. */
+    host_take *argument;
+    /* Third: the options end before the first argument, whose index in argv
+     * becomes the command's struct, an int. */
+    bool first;
+    /* Fourth: it takes none; an error says "ARGUMENT: REFUSAL". */
+    const char *refusal;
 };
 
 /* argv[0] is the name for messages ("incode run"), and argv is put in order:

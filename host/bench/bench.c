@@ -218,12 +218,6 @@ struct arguments {
     uint64_t given;
 };
 
-static void take_nodes(void *into, const char *value,
-                       struct host_error *error) {
-    (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
-                           &((struct arguments *)into)->paper.nodes_max, error);
-}
-
 static void take_class(void *into, const char *value,
                        struct host_error *error) {
     ((struct arguments *)into)->peers.class = value;
@@ -282,7 +276,8 @@ static const struct host_option rows[] = {
      "A tenth of the points, up to 64 nodes; or 30,000 points, up to 8",
      HOST_AT(struct arguments, paper.quick)},
     {"nodes", 'n', "N", "Up to N nodes. Default: 256; or 64",
-     .take = take_nodes},
+     HOST_AT(struct arguments, paper.nodes_max), .most = HOST_NODES_MAX,
+     .powers = ""},
     {.help = "Of paper, scaling and boards:"},
     {"csv", 0, "FILE", "All rows, as CSV",
      HOST_AT(struct arguments, paper.csv)},

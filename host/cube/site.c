@@ -114,12 +114,6 @@ enum {
     DIMENSION_UNKNOWN = 0xff /* as SECURE_PORT_UNKNOWN */
 };
 
-static void take_nodes(void *into, const char *value,
-                       struct host_error *error) {
-    (void)host_parse_nodes("--cube-nodes", value, HOST_NODES_MAX, "",
-                           &((struct host_site_options *)into)->nodes, error);
-}
-
 const struct host_option host_site_rows[] = {
     {.help = "Where the cube is, one of:"},
     {"cube", 0, "FILE", "As the cube file says; see README.md",
@@ -135,7 +129,8 @@ const struct host_option host_site_rows[] = {
     {"cube-nodes", 0, "N",
      "Nodes of the cube, a power of two. Default: as node 0 says; a board that "
      "nobody has told yet who it is does not say",
-     .take = take_nodes},
+     HOST_AT(struct host_site_options, nodes), .most = HOST_NODES_MAX,
+     .powers = ""},
     {"baud", 0, "RATE", "Of the serial port. Default: 115200",
      HOST_AT(struct host_site_options, baud), .least = 300, .most = 4000000},
     {"key", 0, "FILE", "The cube's key, for --tcp",

@@ -190,14 +190,9 @@ static void take_board(void *into, const char *name, struct host_error *error) {
     }
 }
 
-static void take_new(void *into, const char *value, struct host_error *error) {
-    (void)host_parse_nodes("--new", value, HOST_NODES_MAX, "",
-                           &((struct cube_new *)into)->nodes, error);
-}
-
 static const struct host_option rows[] = {
     {"new", 0, "N", "Write a cube file of N nodes to start from",
-     .take = take_new},
+     HOST_AT(struct cube_new, nodes), .most = HOST_NODES_MAX, .powers = ""},
     {"serial", 0, "DEVICE",
      "Of it: serial wires, and the host's is DEVICE (/dev/ttyUSB0)",
      HOST_AT(struct cube_new, device), .omitted = "/dev/ttyUSB0"},

@@ -118,13 +118,6 @@ static void take_board(void *into, const char *value,
         (unsigned)host_option_choose("board", value, host_board_name, error));
 }
 
-static void take_nodes(void *into, const char *value,
-                       struct host_error *error) {
-    (void)host_parse_nodes("--nodes", value, HOST_PROCESSES_MAX,
-                           ", or with --cube what its file says",
-                           &((struct host_run_options *)into)->nodes, error);
-}
-
 static void take_memory(void *into, const char *value,
                         struct host_error *error) {
     uint64_t *bytes = &((struct host_run_options *)into)->memory;
@@ -242,7 +235,8 @@ static const struct host_option rows[] = {
      HOST_AT(struct host_run_options, build), .names = build_name},
     {"nodes", 0, "N",
      "Nodes of the cube: 1, 2, 4 .. 64. Default: what suits this machine",
-     .take = take_nodes},
+     HOST_AT(struct host_run_options, nodes), .most = HOST_PROCESSES_MAX,
+     .powers = ", or with --cube what its file says"},
     {"linda", 0, "NAME",
      "Of --strategy linda: master-slaves (the default) or spatial",
      HOST_AT(struct host_run_options, linda), .names = host_linda_name},

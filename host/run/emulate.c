@@ -82,16 +82,11 @@ static void take_linux(void *into, const char *value,
     } while (*end == ',');
 }
 
-static void take_nodes(void *into, const char *value,
-                       struct host_error *error) {
-    (void)host_parse_nodes("--nodes", value, HOST_EMULATED_MAX, "",
-                           &((struct emulate *)into)->nodes, error);
-}
-
 static const struct host_option rows[] = {
     {"board", 0, "NAME", "mps2-an500, mps2-an385 or raspi3b",
      .take = take_board},
-    {"nodes", 0, "N", "Nodes of the cube", .take = take_nodes},
+    {"nodes", 0, "N", "Nodes of the cube", HOST_AT(struct emulate, nodes),
+     .most = HOST_EMULATED_MAX, .powers = ""},
     {"linux", 0, "N,N",
      "These nodes are no boards, but processes that each run on the cube "
      "starts for itself",

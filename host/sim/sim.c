@@ -338,12 +338,6 @@ static void take_seeds(void *into, const char *value,
     add_range(into, first_seed, last_seed, error);
 }
 
-static void take_nodes(void *into, const char *value,
-                       struct host_error *error) {
-    (void)host_parse_nodes("--nodes", value, HOST_NODES_MAX, "",
-                           &((struct host_sim_options *)into)->nodes, error);
-}
-
 int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
                        struct host_error *error) {
     static const struct host_option rows[] = {
@@ -354,7 +348,8 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
          .take = take_seeds},
         {"nodes", 0, "N",
          "Nodes of the cube: 1, 2, 4 .. 1024. Default: the seed decides",
-         .take = take_nodes},
+         HOST_AT(struct host_sim_options, nodes), .most = HOST_NODES_MAX,
+         .powers = ""},
         {"seconds", 0, "T", "Begin no seed after T seconds of processor time",
          HOST_AT(struct host_sim_options, seconds_max), .least = 1,
          .most = 1000000},
