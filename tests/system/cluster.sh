@@ -16,10 +16,11 @@ check 'cluster/one node' "$(last "$scratch/errors")" \
 # those of its nodes.
 slowed() {
     rm -f "$scratch/out.npy"
-    "$INCODE" run "$points" -q --strategy spatial --nodes 8 --patience 600 \
-        --host-rate 100000 --host-rate-time "$1" \
-        -o "$scratch/out.npy" "${@:2}" 2> "$scratch/errors" &
+    "$INCODE" run "$points" --progress --strategy spatial --nodes 8 \
+        --patience 600 --host-rate 100000 --host-rate-time "$1" \
+        -o "$scratch/out.npy" "${@:2}" > /dev/null 2> "$scratch/errors" &
     host=$!
+    await shows_work
     await all_there
     read -r node _ <<< "$nodes"
 }

@@ -165,6 +165,13 @@ amid() {
     return 1
 }
 
+# Whether $host's --progress on $scratch/errors shows tetrahedra: all nodes are at
+# work.  Or whether it has ended.
+shows_work() {
+    grep -q 'triangulating *[1-9]' "$scratch/errors" ||
+        ! kill -0 "$host" 2> /dev/null
+}
+
 # Whether there are pseudo-terminals here; if not, NAME is skipped.
 has_terminals() {
     grep -q ' /dev/pts devpts ' /proc/mounts && return

@@ -192,7 +192,7 @@ ends 'mpi/a node killed' 4 '^incode: node [0-7] \(rank [1-8]\): '
 
 start 2 "$INCODE"
 began=$SECONDS
-kill -KILL "$(pid_of 'incode-mpi' 1)"
+kill -KILL "$(pid_of incode-testing- 1)" # 15 letters of its name
 ends 'mpi/the host killed' 4 '^incode: host \(rank 0\): '
 
 start 2 "$INCODE"

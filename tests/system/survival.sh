@@ -48,10 +48,6 @@ look_for() {
 at_work() {
     await shows_work && kill -0 $host 2> /dev/null
 }
-shows_work() {
-    grep -q 'triangulating *[1-9]' "$scratch/errors" ||
-        ! kill -0 $host 2> /dev/null
-}
 
 # strike SIGNAL NODE: false where the run is over already.
 strike() {
