@@ -192,7 +192,8 @@ ends 'mpi/a node killed' 4 '^incode: node [0-7] \(rank [1-8]\): '
 
 start 2 "$INCODE"
 began=$SECONDS
-kill -KILL "$(pid_of incode-testing- 1)" # 15 letters of its name
+# Its name is cut to 15 letters at first, and then the one that it takes.
+kill -KILL "$(pid_of 'incode-\(testing-\|mpi\)' 1)"
 ends 'mpi/the host killed' 4 '^incode: host \(rank 0\): '
 
 start 2 "$INCODE"
