@@ -20,8 +20,9 @@ computes() {
     local name=$1 status
     shift
     rm -f "$stats"
+    # shellcheck disable=SC2086
     incode run "$points" --no-progress --strategy spatial --stats "$stats" \
-        "$@" > "$scratch/said" 2> "$errors"
+        $patient "$@" > "$scratch/said" 2> "$errors"
     status=$?
     if [ $status != 0 ]; then
         fail "$name" "exit $status: $(last "$errors")"
@@ -216,7 +217,8 @@ is_up() {
     grep -q '^UART 1, node 2: up, frames in' "$scratch/links" ||
         ! kill -0 $host 2> /dev/null
 }
-incode run "$points" -q --cube "$cube" --strategy spatial \
+# shellcheck disable=SC2086
+incode run "$points" -q --cube "$cube" --strategy spatial $patient \
     --stats "$stats" 2> "$errors" &
 host=$!
 await is_up

@@ -29,8 +29,9 @@ looks() {
     shift 3
     [ "$board" = mps2-an500 ] || most=40000
     rm -f "$stats"
+    # shellcheck disable=SC2086
     PATH=$scratch/bin:$PATH incode run "$file" --no-progress -q --board "$board" \
-        --stats "$stats" "$@" 2> "$scratch/errors"
+        $patient --stats "$stats" "$@" 2> "$scratch/errors"
     jq -c '[.per_node[].look_us_max]' "$stats" > "$scratch/looks" 2>&1
     check "$name: at most $most us" \
         "$(cat "$scratch/looks"); $(last "$scratch/errors")" \

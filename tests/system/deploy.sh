@@ -168,7 +168,8 @@ check 'deploy/first: they run' "$(cat "$(board 3)/log")" eval \
     'runs 0 && runs 1 && runs 2 && runs 3'
 "$INCODE" gen uniform 2000 --seed 3 -o "$scratch/points.npy"
 run_on() {
-    succeeds "deploy/$1" incode run -q "$scratch/points.npy" \
+    # shellcheck disable=SC2086
+    succeeds "deploy/$1" incode run -q "$scratch/points.npy" $patient \
         --cube "$scratch/four.cube" --verify -o "$scratch/out.npy"
 }
 run_on 'a run on them'

@@ -49,8 +49,6 @@ await test -e "$port"
 lab=$scratch/own.cube
 succeeds 'first_hour/a cube file' incode cube --new 4 --board $board \
     "--serial=$port" -o "$lab" > "$said"
-# A link is given up after 30 s of silence; here sooner.
-full || sed -i 's/^dimension.*/&\ndead = 3;/' "$lab"
 succeeds 'first_hour/how it is wired' incode cube "$lab" > "$said"
 
 # off NODE, on NODE: an emulated board stands still as one that is off; what it
@@ -159,7 +157,8 @@ step 'all run it'
 begin() {
     rm -f "$stats" "$scratch/out.npy"
     : > "$errors"
-    "$INCODE" run "$points" --verify --no-progress --cube "$lab" \
+    # shellcheck disable=SC2086
+    "$INCODE" run "$points" --verify --no-progress --cube "$lab" $patient \
         --strategy exchange --host-rate 8000 --host-rate-time 5 \
         --stats "$stats" -o "$scratch/out.npy" \
         > "$said" 2> "$errors" &

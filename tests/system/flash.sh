@@ -160,8 +160,9 @@ refuses 'flash/a wrong key for boards that run' 3 'signed with another key; ' \
 flashes 'flash/the old image stays' '^nodes 0-1: had mps2-an500 .* already' \
     --dry-run "$image"
 "$INCODE" gen uniform 200 --seed 1 -o "$scratch/points.npy" 2> /dev/null
+# shellcheck disable=SC2086
 succeeds 'flash/they triangulate' incode run "$scratch/points.npy" -q \
-    --cube "$cube" --verify
+    --cube "$cube" --verify $patient
 
 # --- a Raspberry Pi, whose flash is a part of its card --------------------------
 
@@ -193,8 +194,9 @@ refuses 'flash/raspi3b: an image that hangs' 4 \
     '^incode: node 1: did not come up with the image, and went back.*; ' \
     incode flash --cube "$cube" -q --nodes 1 \
     "$BUILD/firmware/tests/image-raspi3b-hang.img"
+# shellcheck disable=SC2086
 succeeds 'flash/raspi3b: they triangulate' incode run "$scratch/points.npy" -q \
-    --cube "$cube" --verify
+    --cube "$cube" --verify $patient
 # Off and on: what a card has stays.
 kill $boards
 wait $boards
