@@ -91,18 +91,22 @@ size_t incode_arena_min(const struct incode_setup *setup) {
     return bytes;
 }
 
+enum { ROOMY = 8 << 20 };
+
 /* The maker's share point by point, where few bricks are wanted at a time, but
  * all pages of boxes again and again: as many as go into a part of the arena.
- */
+ * A large one has room for bricks around the own ones, too, which are wanted
+ * twice at the end. */
 static struct incode_maker_share
 few_frames(const struct incode_triangulator *t) {
     struct incode_maker_share share = t->shares.maker;
     const struct incode_tree *tree = &t->maker.tree;
     size_t boxes = tree->base[tree->levels] - tree->bricks;
     size_t part = t->bytes / 16 / sizeof(struct incode_frame);
-    share.frames = between(INCODE_FRAMES_MIN,
-                           INCODE_FRAMES_MIN + (boxes < part ? boxes : part),
-                           t->shares.maker.frames);
+    size_t frames = INCODE_FRAMES_MIN + (boxes < part ? boxes : part);
+    if (t->bytes > ROOMY)
+        frames += (t->bytes - ROOMY) / 8 / sizeof(struct incode_frame);
+    share.frames = between(INCODE_FRAMES_MIN, frames, t->shares.maker.frames);
     return share;
 }
 

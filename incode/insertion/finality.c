@@ -21,13 +21,17 @@
 #include "incode/predicates/check.h"
 
 enum {
-    JUDGED = 1024,  /* cells a step */
-    AT_ONCE = 16,   /* cells between two yields */
-    SHOWN = 256,    /* cells looked at as a unit of work */
-    LARGE = 32,     /* a cavity of more than such a part of the cells */
-    FEW = 128,      /* cells: looking at all is better than a search */
-    LEAST_SHARE = 8 /* of the cells must be final */
+    JUDGED = 1024,        /* cells a step */
+    AT_ONCE = 16,         /* cells between two yields */
+    SHOWN = 256,          /* cells looked at as a unit of work */
+    LARGE = 32,           /* a cavity of more than such a part of the cells */
+    SOUGHT_FRAMES = 1024, /* bricks around some own ones have room */
+    NEWTON = 40,          /* from above: a third less at each step */
+    FEW = 128,            /* cells: looking at all is better than a search */
+    LEAST_SHARE = 8       /* of the cells must be final */
 };
+
+#define AROUND 1.5 /* times the distance of points in a volume */
 
 /* Marks of cells: INCODE_CELL_PROVED. */
 enum {
@@ -51,17 +55,55 @@ static void go_on(struct incode_insertion *n,
     n->stage = stage;
 }
 
+/* About the edge of a cube that is one part of a box, by Newton's method. */
+static double edge_of_part(const double lo[3], const double hi[3],
+                           double parts) {
+    double volume = 1 / parts, edge = 0;
+    for (int d = 0; d < 3; d++) {
+        volume *= hi[d] - lo[d];
+        edge = hi[d] - lo[d] > edge ? hi[d] - lo[d] : edge;
+    }
+    for (unsigned i = 0; i < NEWTON; i++)
+        edge = (2 * edge + volume / edge / edge) / 3;
+    return edge;
+}
+
+/* Of others' points those go first that are near the own bricks' box, by as
+ * much as neighbours in a volume are apart.  Without them the cells at its
+ * sides are so large that three times as many points would be inserted. */
+static void bound(struct incode_insertion *n) {
+    const struct incode_rest *rest = &n->work->rest;
+    struct incode_look *look = &n->work->look;
+    double points = (double)(n->own_last - n->own_first) * INCODE_BRICK_POINTS;
+    double around = AROUND * edge_of_part(rest->own_lo, rest->own_hi, points);
+    look->bounded = around > 0 && around < __builtin_inf();
+    for (int d = 0; d < 3; d++) {
+        look->lo[d] = rest->own_lo[d] - around;
+        look->hi[d] = rest->own_hi[d] + around;
+    }
+}
+
 enum incode_step incode_insertion_rest(struct incode_insertion *n) {
     struct incode_insertion_work *work = n->work;
     size_t bits = (n->maker->tree.bricks + 63) / 64 * sizeof(uint64_t);
-    if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from))
+    if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from,
+                         n->own_last))
         return INCODE_WAITING;
     n->closing = n->from == n->own_last && !n->squeezed;
     n->shown = false;
     memset(n->touched, 0, bits);
     memset(n->passed, 0, bits);
     incode_look_init(&work->look, n->maker, n->passed, n->touched);
-    incode_look_begin(&work->look, false, n->own_first, n->from);
+    bool near = n->closing && n->thorough;
+    uint32_t frames = n->maker->pager.frame_count;
+    bool roomy = frames >= SOUGHT_FRAMES || frames >= n->maker->tree.bricks / 2;
+    work->look.sought = near && roomy ? n->sought : NULL;
+    if (work->look.sought != NULL)
+        incode_yield_fill(&n->maker->counts.tally.yield, n->sought, 0,
+                          n->maker->tree.bricks * sizeof *n->sought);
+    incode_look_begin(&work->look, near, n->own_first, n->from);
+    if (near)
+        bound(n);
     n->releases++;
     n->final = n->reached = 0;
     n->round = 0;
@@ -133,7 +175,7 @@ static bool is_wanted(const struct incode_insertion *n,
 /* What the look has told of its cells. */
 static void note(struct incode_insertion *n) {
     const struct incode_look *look = &n->work->look;
-    for (uint32_t i = 0; i < look->count && n->round == 0; i++) {
+    for (uint32_t i = 0; i < look->count && !look->every; i++) {
         bool reached = incode_look_has_reached(look, i);
         incode_cell_set_proved(incode_complex_cell(&n->complex, look->cell[i]),
                                reached ? REACHED : FINAL);
@@ -158,7 +200,9 @@ enum incode_step incode_insertion_look(struct incode_insertion *n) {
     if (r != INCODE_FINISHED)
         return r == INCODE_WORKED ? INCODE_WORKED : INCODE_WAITING;
     note(n);
-    incode_look_begin(look, n->round == 1, n->own_first, n->from);
+    bool bounded = look->bounded;
+    incode_look_begin(look, look->every, n->own_first, n->from);
+    look->bounded = bounded;
     if (n->cell < x->cells)
         return INCODE_WORKED;
     /* Without a visit, those that are reached stay. */
@@ -283,6 +327,22 @@ static enum incode_step end_visit(struct incode_insertion *n) {
     return INCODE_WORKED;
 }
 
+/* Whether a cell may hold it, as far as that was told. */
+static bool is_sought(const struct incode_insertion *n, uint32_t id) {
+    const uint64_t *sought = n->work->look.sought;
+    return sought == NULL ||
+           (sought[id / INCODE_BRICK_POINTS] >> id % INCODE_BRICK_POINTS & 1) !=
+               0;
+}
+
+static bool is_in_bounds(const struct incode_insertion *n, const double p[3]) {
+    const struct incode_look *look = &n->work->look;
+    bool in = true;
+    for (int d = 0; d < 3 && look->bounded; d++)
+        in = in && p[d] >= look->lo[d] && p[d] <= look->hi[d];
+    return in;
+}
+
 enum incode_step incode_insertion_visit(struct incode_insertion *n) {
     struct incode_pager *pager = &n->maker->pager;
     struct incode_walker *walker = &n->maker->walker;
@@ -306,7 +366,8 @@ enum incode_step incode_insertion_visit(struct incode_insertion *n) {
         incode_walker_spend(walker, INCODE_INSERTION_UNITS);
         /* No cell holds a vertex; of one that is released, that is a look at
          * all of them. */
-        if (incode_insertion_has_noted(n, id))
+        if (incode_insertion_has_noted(n, id) || !is_in_bounds(n, p) ||
+            !is_sought(n, id))
             continue;
         if (!n->closing) {
             show_point(n, p);
@@ -317,7 +378,10 @@ enum incode_step incode_insertion_visit(struct incode_insertion *n) {
         }
     }
     n->touched[brick / 64] &= ~(UINT64_C(1) << brick % 64);
-    incode_insertion_set_bit(n->passed, brick);
+    if (n->work->look.sought != NULL)
+        n->work->look.sought[brick] = 0;
+    if (!n->work->look.bounded)
+        incode_insertion_set_bit(n->passed, brick);
     n->brick = brick + 1;
     n->next = 0;
     n->large = false;
@@ -347,136 +411,6 @@ enum incode_step incode_insertion_settle(struct incode_insertion *n) {
     n->closed = n->closing && (n->shown || n->final == cells_left(n));
     incode_insertion_begin_list(n);
     return INCODE_WORKED;
-}
-
-/* --- look ----------------------------------------------------------------- */
-
-enum {
-    PAGES = INCODE_LEVELS_MAX + 16, /* a call */
-    ADD_UNITS = 16                  /* of work: twice the precision, perhaps */
-};
-
-void incode_look_init(struct incode_look *look, struct incode_maker *maker,
-                      const uint64_t *passed, uint64_t *wanted) {
-    double extent = 0;
-    for (int d = 0; d < 3; d++) {
-        double half = maker->hi[d] * 0.5 - maker->lo[d] * 0.5;
-        extent = half > extent ? half : extent;
-    }
-    look->scale = incode_scale_for(extent);
-    look->maker = maker;
-    look->passed = passed;
-    look->wanted = wanted;
-}
-
-void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
-                       uint32_t last) {
-    look->every = every;
-    look->pass_first = first;
-    look->pass_last = last;
-    look->at = 0;
-    look->count = 0;
-    look->reached = 0;
-}
-
-void incode_look_add(struct incode_look *look, const struct incode_complex *x,
-                     uint32_t cell) {
-    struct incode_region r;
-    const struct incode_cell *c = incode_complex_cell(x, cell);
-    INCODE_ASSERT(!incode_look_is_full(look));
-    incode_maker_yield(look->maker, ADD_UNITS);
-    if (!incode_region_set_sharp(&r, x, c, look->scale) &&
-        !incode_region_set(&r, x, c))
-        incode_region_set_all(&r);
-    incode_regions_set(&look->regions, look->count, &r);
-    look->cell[look->count++] = cell;
-}
-
-static bool is_set(const uint64_t *bits, uint32_t i) {
-    return (bits[i / 64] >> i % 64 & 1) != 0;
-}
-
-static uint32_t count_of(uint64_t cells) {
-    return (uint32_t)__builtin_popcountll(cells);
-}
-
-/* Those of some cells that may reach a child. */
-static uint64_t meeting(const struct incode_look *look,
-                        const struct incode_boxes *boxes, unsigned child,
-                        const double lo[3], const double hi[3],
-                        uint64_t cells) {
-    struct incode_lifted l;
-    incode_maker_yield(look->maker, 2 + count_of(cells) / 2);
-    uint64_t met = incode_regions_meeting(&look->regions, cells, lo, hi);
-    if (met == 0 || !incode_boxes_lifted(boxes, child, &l))
-        return met;
-    incode_maker_yield(look->maker, count_of(met));
-    return incode_regions_meeting_lifted(&look->regions, met, boxes, &l);
-}
-
-/* Whether bricks [first, end) need no look. */
-static bool is_passed(const struct incode_look *look, uint32_t first,
-                      uint32_t end) {
-    if (end <= look->at ||
-        (first >= look->pass_first && end <= look->pass_last))
-        return true;
-    return end - first == 1 && (is_set(look->passed, first) ||
-                                (look->every && is_set(look->wanted, first)));
-}
-
-/* Looks at what is below page `index` of a level of boxes, whose children have
- * `span` bricks each. */
-static enum incode_step look_below(struct incode_look *look, uint32_t level,
-                                   uint32_t index, uint64_t span,
-                                   uint64_t cells) {
-    const struct incode_tree *tree = &look->maker->tree;
-    const struct incode_frame *f =
-        incode_pager_get(&look->maker->pager, tree->base[level] + index);
-    if (f == NULL)
-        return INCODE_WAITING;
-    if (look->pages-- == 0)
-        return INCODE_WORKED;
-    alignas(64) double lo[3][INCODE_FANOUT], hi[3][INCODE_FANOUT];
-    const struct incode_boxes boxes = f->page.boxes;
-    uint32_t first = index * INCODE_FANOUT;
-    uint32_t count = tree->count[level - 1] - first;
-    count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
-    incode_maker_yield(look->maker, 4);
-    incode_boxes_axes(&boxes, lo, hi);
-    for (uint32_t i = 0; i < count; i++) {
-        uint64_t end = (first + i + 1) * span;
-        end = end < tree->bricks ? end : tree->bricks;
-        if (is_passed(look, (uint32_t)((first + i) * span), (uint32_t)end))
-            continue;
-        const double from[3] = {lo[0][i], lo[1][i], lo[2][i]};
-        const double to[3] = {hi[0][i], hi[1][i], hi[2][i]};
-        cells &= look->every ? ~UINT64_C(0) : ~look->reached;
-        uint64_t met = meeting(look, &boxes, i, from, to, cells);
-        if (met != 0 && level > 1) {
-            enum incode_step r = look_below(look, level - 1, first + i,
-                                            span / INCODE_FANOUT, met);
-            if (r != INCODE_FINISHED)
-                return r;
-        }
-        if (met != 0 && level == 1) {
-            look->wanted[(first + i) / 64] |= UINT64_C(1) << (first + i) % 64;
-            look->reached |= met;
-        }
-        look->at = (uint32_t)end;
-    }
-    return INCODE_FINISHED;
-}
-
-enum incode_step incode_look_go(struct incode_look *look) {
-    const struct incode_tree *tree = &look->maker->tree;
-    uint64_t span = 1;
-    if (tree->levels < 2 || look->count == 0)
-        return INCODE_FINISHED;
-    look->pages = PAGES;
-    for (uint32_t level = 2; level < tree->levels; level++)
-        span *= INCODE_FANOUT;
-    return look_below(look, tree->levels - 1, 0, span,
-                      ~UINT64_C(0) >> (INCODE_LOOK_CELLS - look->count));
 }
 
 /* --- fallback ------------------------------------------------------------- */

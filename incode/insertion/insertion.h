@@ -81,6 +81,10 @@ uint64_t incode_regions_meeting_lifted(const struct incode_regions *regions,
                                        const struct incode_boxes *boxes,
                                        const struct incode_lifted *lifted);
 
+/* The points of a brick that region i may hold, a bit each. */
+uint64_t incode_regions_points(const struct incode_regions *regions, unsigned i,
+                               const struct incode_brick *brick);
+
 /* A close look at cells: which bricks to come may hold a point of their
  * spheres, as far as all boxes tell, the lifted ones, too.
  *
@@ -99,10 +103,15 @@ struct incode_look {
     /* A bit a brick: not to be looked at; reached, now or before. */
     const uint64_t *passed;
     uint64_t *wanted;
+    /* A word a brick, a bit a point: those of a brick that is wanted which a
+     * cell may reach, of all cells so far; or NULL. */
+    uint64_t *sought;
     bool every; /* all bricks that a cell reaches, not one */
-    uint32_t pass_first, pass_last; /* bricks that are passed, too */
-    uint32_t at;                    /* bricks before it have been looked at */
-    uint32_t pages;                 /* left in this call */
+    uint32_t pass_first, pass_last; /* bricks that are passed, too, */
+    bool bounded;                   /* and those outside this box */
+    double lo[3], hi[3];
+    uint32_t at;    /* bricks before it have been looked at */
+    uint32_t pages; /* left in this call */
     uint32_t count;
     uint64_t reached; /* a bit a cell */
     uint32_t cell[INCODE_LOOK_CELLS];
@@ -138,7 +147,9 @@ static inline bool incode_look_has_reached(const struct incode_look *look,
  * whether one may lie in the sphere of a cell, which is final otherwise.
  *
  * They are the bricks before one and those from another on: some 30 boxes of
- * each level for each of the two.  What these do not tell, look.h does.
+ * each level for each of the two, and what is in those of others' boxes that
+ * reach into the own bricks' box.  A sphere within that box is apart from all
+ * others.  What these boxes do not tell, a look does.
  *
  * Memory: struct incode_rest, about 21 KB. */
 
@@ -150,12 +161,18 @@ struct incode_rest {
     alignas(64) double lo[3][INCODE_REST_MAX];
     alignas(64) double hi[3][INCODE_REST_MAX];
     uint32_t count;
+    /* The box of the own bricks, and how many boxes, the first, reach into it:
+     * as bricks are cut apart, those of others do not. */
+    double own_lo[3], own_hi[3];
+    uint32_t inner;
+    uint32_t own_first, own_last;
+    uint32_t spare; /* room for boxes in those that do */
 };
 
-/* All bricks before one and from another on, before < from; false: a page is
- * missing. */
+/* All bricks but those of the own ones, [first, last), that have been inserted,
+ * [first, from); first < from <= last.  False: a page is missing. */
 bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
-                     uint32_t before, uint32_t from);
+                     uint32_t first, uint32_t from, uint32_t last);
 
 /* Whether a point of the rest may lie in the sphere of a cell, or beyond its
  * facet or in its plane, as far as the rest's boxes tell. */
@@ -189,6 +206,9 @@ struct incode_insertion {
      * or belongs to another node, and may have been released since.  NULL: the
      * memory has no room for it. */
     uint64_t *inserted;
+    /* The same of points of bricks to be visited at the end: they may lie in
+     * the sphere of a cell at an own point.  NULL: any may. */
+    uint64_t *sought;
     struct incode_insertion_work *work;
     bool whole;    /* all bricks are taken in at once */
     bool emitted;  /* something has been */
@@ -275,8 +295,8 @@ incode_insertion_has_committed(const struct incode_insertion *n,
 enum incode_step incode_insertion_step(struct incode_insertion *n);
 
 /* The stages of an insertion, for the files of this room alone: insertion.c
- * takes points in, finality.c says which cells are final, emission.c emits and
- * releases them. */
+ * takes points in, rest.c says what boxes tell of points to come,
+ * finality.c which cells are final, region.c emits and releases them. */
 
 enum {
     INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */

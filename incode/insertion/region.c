@@ -213,6 +213,35 @@ uint64_t incode_regions_meeting(const struct incode_regions *r, uint64_t some,
     return met;
 }
 
+/* As clear_of and before have it, of boxes that are points. */
+uint64_t incode_regions_points(const struct incode_regions *r, unsigned i,
+                               const struct incode_brick *brick) {
+    const double *const p[3] = {brick->x, brick->y, brick->z};
+    bool infinite = (r->infinite >> i & 1) != 0;
+    const double(*from)[INCODE_REGIONS] = infinite ? r->o : r->centre;
+    uint64_t held = 0;
+    for (unsigned k = 0; k < INCODE_BRICK_POINTS; k += INCODE_VD_LANES) {
+        incode_vd sum = incode_vd_all(0);
+        incode_vd most =
+            INCODE_PLANT_BOUND(POINTS_UNDERFLOW, incode_vd_all(-0x1p-900));
+        for (int d = 0; d < 3; d++) {
+            incode_vd a = incode_vd_load(p[d] + k) - incode_vd_all(from[d][i]);
+            incode_vd x = incode_vd_all(r->x[d][i]);
+            double error =
+                INCODE_PLANT_BOUND(POINTS_ERROR, r->error[d][i]) +
+                INCODE_PLANT_BOUND(POINTS_ROUNDING,
+                                   0x1p-48 * __builtin_fabs(r->x[d][i]));
+            sum += infinite ? x * a : a * a;
+            most -= incode_vd_all(error) * incode_vd_abs(a);
+        }
+        incode_vdm off = infinite
+                             ? incode_vd_less(sum, most)
+                             : incode_vd_less(incode_vd_all(r->square[i]), sum);
+        held |= (uint64_t)(~incode_vdm_bits(off) & INCODE_VD_ALL) << k;
+    }
+    return held;
+}
+
 struct box {
     double at[3], size[3]; /* its centre, and of what that is rounded */
     double a[3][3], slope[3], lid, radius;

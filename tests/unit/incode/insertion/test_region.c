@@ -22,6 +22,9 @@ enum bound {
     BEFORE_UNDERFLOW,
     BEFORE_ERROR,
     BEFORE_ROUNDING,
+    POINTS_UNDERFLOW,
+    POINTS_ERROR,
+    POINTS_ROUNDING,
     LIFTED_UNDERFLOW,
     LIFTED_ERROR,
     LIFTED_ROUNDING,
@@ -51,9 +54,11 @@ static const char *const names[BOUNDS] = {"none",
                                           "before/underflow",
                                           "before/error",
                                           "before/rounding",
+                                          "points/underflow",
+                                          "points/error",
+                                          "points/rounding",
                                           "lifted/underflow",
                                           "lifted/error",
-
                                           "lifted/rounding",
                                           "lifted/rest"};
 static uint64_t wrong[BOUNDS];
@@ -140,12 +145,24 @@ static void set_corner(struct corner *c, const double p[3],
 
 static struct incode_regions regions;
 
+/* A brick's every point is that one. */
+static bool holds_in_brick(const double p[3]) {
+    alignas(64) struct incode_brick brick;
+    for (unsigned i = 0; i < INCODE_BRICK_POINTS; i++) {
+        brick.x[i] = p[0];
+        brick.y[i] = p[1];
+        brick.z[i] = p[2];
+    }
+    return incode_regions_points(&regions, 5, &brick) == ~UINT64_C(0);
+}
+
 static void count_wrong(const struct incode_region *r, const double p[3],
                         const struct corner *corners, int count) {
     bool met = true;
     incode_regions_set(&regions, 5, r);
     met = incode_regions_meeting(&regions, 1 << 5, p, p) == 1 << 5;
     met = met && (!r->infinite || incode_region_is_behind(r, p, p));
+    met = met && holds_in_brick(p);
     for (int i = 0; i < count; i++)
         met = met &&
               incode_regions_meeting_lifted(&regions, 1 << 5, &corners[i].boxes,
