@@ -91,7 +91,7 @@ size_t incode_arena_min(const struct incode_setup *setup) {
     return bytes;
 }
 
-enum { ROOMY = 8 << 20 };
+enum { ROOMY = 8 << 20 /* bytes of an arena */ };
 
 /* The maker's share point by point, where few bricks are wanted at a time, but
  * all pages of boxes again and again: as many as go into a part of the arena.

@@ -11,7 +11,8 @@
  * stars of all own points in one visit: a new cell at such a point p is on a
  * facet at p between a cell that gives way and one that stays, and its sphere
  * is within the two's (Edelsbrunner, Combinatorica 10, 1990), both at p, too.
- * So a point that was in no sphere at an own point never will be.  Before that,
+ * So a point that was in no sphere at an own point never will be.  Points near
+ * the own bricks go first, as the cells at their sides are large.  Before that,
  * and where these points do not fit, they are only shown to the cells, and
  * those that hold none are final. */
 #include <stdalign.h>

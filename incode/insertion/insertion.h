@@ -270,9 +270,9 @@ struct incode_insertion_work {
 };
 
 /* Bytes that the triangulation of so many points takes, as a rule, beside two
- * bits a brick.  If not all points are inserted at once, a word a brick is
- * added, unless that is more than one part in INCODE_INSERTION_KNOWN of the
- * memory. */
+ * bits a brick.  If not all points are inserted at once, one or two words a
+ * brick are added, unless they are more than one part in INCODE_INSERTION_KNOWN
+ * of the memory. */
 size_t incode_insertion_bytes(uint64_t points);
 
 void incode_insertion_init(struct incode_insertion *n,

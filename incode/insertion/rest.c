@@ -176,7 +176,8 @@ bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
                      uint32_t first, uint32_t from, uint32_t last) {
     const struct incode_tree *tree = &maker->tree;
     rest->own_first = first;
-    rest->own_last = last;
+    /* The last page of a level may have fewer bricks. */
+    rest->own_last = last == tree->bricks ? UINT32_MAX : last;
     if (!set_own(rest, maker, first, last))
         return false;
     rest->spare = spare_of(maker);
