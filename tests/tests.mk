@@ -122,6 +122,7 @@ $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 
 # The peers of `incode bench peers`, which makes those whose packages are there.
 # -frounding-math: CGAL's filters are wrong without it.
+# -DNDEBUG: its users build it without assertions.
 peers = $(addprefix $(BUILD)/peers/,cgal cgal_file tetgen qhull)
 $(BUILD)/peers/cgal:   peer = -frounding-math $< -lgmp -lnettle
 $(BUILD)/peers/cgal_file: peer = -frounding-math $< -lgmp
@@ -130,7 +131,7 @@ $(BUILD)/peers/qhull:  peer = $< -lqhull_r
 $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	@mkdir -p $(@D)
 	$(say) CXX $<
-	$(Q)$(CXX) -std=c++17 -O3 -march=$(ARCH) $(peer) -o $@
+	$(Q)$(CXX) -std=c++17 -O3 -DNDEBUG -march=$(ARCH) $(peer) -o $@
 
 # What counts an emulated board's instructions for `incode bench boards`.
 $(BUILD)/peers/instructions.so: tests/bench/instructions.c
