@@ -123,11 +123,12 @@ $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 # The peers of `incode bench peers`, which makes those whose packages are there.
 # -frounding-math: CGAL's filters are wrong without it.
 # -DNDEBUG: its users build it without assertions.
-peers = $(addprefix $(BUILD)/peers/,cgal cgal_file tetgen qhull)
+peers = $(addprefix $(BUILD)/peers/,cgal cgal_file tetgen qhull hxt)
 $(BUILD)/peers/cgal:   peer = -frounding-math $< -lgmp -lnettle
 $(BUILD)/peers/cgal_file: peer = -frounding-math $< -lgmp
 $(BUILD)/peers/tetgen: peer = $< -ltet
 $(BUILD)/peers/qhull:  peer = $< -lqhull_r
+$(BUILD)/peers/hxt:    peer = -fopenmp $< -lgmsh
 $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	@mkdir -p $(@D)
 	$(say) CXX $<

@@ -264,7 +264,8 @@ static const struct host_option rows[] = {
      "extremes or cube; real, small and cube are of the files given",
      .take = take_class},
     {"peers", 0, "LIST",
-     "Some peers alone, with commas between: cgal, tetgen, qhull",
+     "Some peers alone, with commas between: cgal, tetgen, qhull, hxt, hxt2 "
+     "(hxt on two threads)",
      HOST_AT(struct arguments, peers.peers)},
     {"large", 0, NULL, "Sets of a million points too",
      HOST_AT(struct arguments, peers.large)},
@@ -299,9 +300,9 @@ static const struct host_options options = {
         "tetrahedron costs each bare board, emulated, in instructions and "
         "bytes, and where they go; scaling, what a point costs from 1,000 to "
         "10,000,000 points, measured, and from 1 to 64 nodes, in virtual time; "
-        "peers, in the source tree, runs CGAL, TetGen and Qhull in turn with "
-        "this program on points that it makes and on those given, and prints "
-        "times, ratios and the goals of each class."};
+        "peers, in the source tree, runs CGAL, TetGen, Qhull and HXT in turn "
+        "with this program on points that it makes and on those given, and "
+        "prints times, ratios and the goals of each class."};
 
 /* An option that the benchmark has not, or NULL. */
 static const char *other_option(const struct arguments *a) {
@@ -382,11 +383,14 @@ int host_bench(int argc, char **argv, struct host_error *error) {
 enum { MAKE_S = 600 };
 
 static const struct {
-    const char *name, *header, *package;
+    const char *name, *program, *threads, *header, *package;
 } peers[HOST_BENCH_PEERS] = {
-    {"cgal", "/usr/include/CGAL/version.h", "libcgal-dev"},
-    {"tetgen", "/usr/include/tetgen.h", "libtet1.5-dev"},
-    {"qhull", "/usr/include/libqhull_r/qhull_ra.h", "libqhull-dev"},
+    {"cgal", "cgal", NULL, "/usr/include/CGAL/version.h", "libcgal-dev"},
+    {"tetgen", "tetgen", NULL, "/usr/include/tetgen.h", "libtet1.5-dev"},
+    {"qhull", "qhull", NULL, "/usr/include/libqhull_r/qhull_ra.h",
+     "libqhull-dev"},
+    {"hxt", "hxt", "1", "/usr/include/gmsh.h", "libgmsh-dev"},
+    {"hxt2", "hxt", "2", "/usr/include/gmsh.h", "libgmsh-dev"},
 };
 
 /* Where this program was made; "build" where it is installed. */
@@ -414,7 +418,7 @@ static int parse(const char *wanted, unsigned *set, struct host_error *error) {
         if (i == HOST_BENCH_PEERS) {
             return host_fail(error, HOST_USAGE,
                              "--peers %.*s: not in this version; allowed: "
-                             "cgal, tetgen, qhull",
+                             "cgal, tetgen, qhull, hxt, hxt2",
                              (int)n, at);
         }
         *set |= 1u << i;
@@ -466,7 +470,9 @@ int host_bench_build(struct host_bench_builds *builds, const char *wanted,
     char folder[PATH_MAX];
     unsigned set;
     memset(builds, 0, sizeof *builds);
-    if (parse(wanted == NULL ? "cgal,tetgen,qhull" : wanted, &set, error) != 0)
+    if (wanted == NULL)
+        wanted = "cgal,tetgen,qhull,hxt,hxt2";
+    if (parse(wanted, &set, error) != 0)
         return error->code;
     if (need_source("peers", error) != 0)
         return error->code;
@@ -482,7 +488,8 @@ int host_bench_build(struct host_bench_builds *builds, const char *wanted,
             continue;
         }
         (void)snprintf(builds->path[i], sizeof builds->path[i],
-                       "%.4000s/peers/%s", folder, peers[i].name);
+                       "%.4000s/peers/%s", folder, peers[i].program);
+        builds->threads[i] = peers[i].threads;
         builds->there[i] = make(folder, builds->path[i], error) == 0;
     }
     return error->code;

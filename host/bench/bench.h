@@ -51,6 +51,7 @@ uint64_t host_bench_used_us(void);
 struct host_bench_builds {
     bool there[HOST_BENCH_PEERS];
     char path[HOST_BENCH_PEERS][4096];
+    const char *threads[HOST_BENCH_PEERS]; /* its argument; NULL: has none */
 };
 
 /* wanted: names with commas between; NULL: all.  One whose package is missing

@@ -285,8 +285,10 @@ static bool command(struct bench *b, unsigned turn,
     if (turn >= PEER) {
         words[n++] = b->builds.path[turn - PEER];
         words[n++] = set->path;
-        words[n++] = first ? "digest" : NULL;
-        words[n] = NULL;
+        words[n] = b->builds.threads[turn - PEER];
+        if (words[n] == NULL && first)
+            words[n] = "digest";
+        words[++n] = NULL;
         return b->builds.there[turn - PEER];
     }
     static const char *const head[] = {
@@ -366,9 +368,10 @@ static double median(double *s, unsigned n) {
 }
 
 static double time_of(const struct bench *b, struct turns *t) {
+    bool wall = b->class->wall || t == &b->turns[PEER + HOST_BENCH_THREADED];
     return t->late || t->failed
                ? 0
-               : median(b->class->wall ? t->wall_s : t->cpu_s, t->rounds);
+               : median(wall ? t->wall_s : t->cpu_s, t->rounds);
 }
 
 /* CGAL breaks ties as this program does: its tetrahedra are the same. */
@@ -558,9 +561,9 @@ static void print_notes(const struct bench *b) {
     printf("Medians of %u rounds.  node: ns of processor time a tetrahedron, "
            "of all nodes;\n+ host: and of the host, from the points in its "
            "memory to the tetrahedra there;\npeers: of one call with the "
-           "points in memory.  ms more: with all that the host does,\nfiles "
-           "apart.  CGAL /: its time to the node's.  !: a goal that is not "
-           "reached.\n",
+           "points in memory; HXT x2: by the clock,\non two threads.  ms more: "
+           "with all that the host does, files apart.  CGAL /: its time to\n"
+           "the node's.  !: a goal that is not reached.\n",
            b->options->rounds);
 }
 

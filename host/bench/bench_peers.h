@@ -29,8 +29,10 @@ int host_bench_peers(const struct host_bench_peers_options *options,
 
 enum {
     HOST_BENCH_MADE_MAX = 13,
-    HOST_BENCH_PEERS = 3, /* CGAL, TetGen, Qhull: in this order everywhere */
-    HOST_BENCH_FEW = 5000 /* points; below, what is fixed counts */
+    /* CGAL, TetGen, Qhull, HXT, HXT on two threads: in this order everywhere */
+    HOST_BENCH_PEERS = 5,
+    HOST_BENCH_THREADED = 4, /* its times are always the clock's */
+    HOST_BENCH_FEW = 5000    /* points; below, what is fixed counts */
 };
 
 /* How the program is run. */

@@ -39,11 +39,11 @@ inline double seconds(clockid_t clock) {
            1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// From its making on: processor time of this thread, and the clock's.
+// From its making on: processor time of all threads, and the clock's.
 class Watch {
   public:
     void stop() {
-        cpu_ += seconds(CLOCK_THREAD_CPUTIME_ID);
+        cpu_ += seconds(CLOCK_PROCESS_CPUTIME_ID);
         wall_ += seconds(CLOCK_MONOTONIC);
     }
     void print(std::size_t tetrahedra, const std::string &digest) const {
@@ -56,7 +56,7 @@ class Watch {
     }
 
   private:
-    double cpu_ = -seconds(CLOCK_THREAD_CPUTIME_ID);
+    double cpu_ = -seconds(CLOCK_PROCESS_CPUTIME_ID);
     double wall_ = -seconds(CLOCK_MONOTONIC);
 };
 

@@ -7,7 +7,7 @@ top=$PWD
 
 refuses peers/class 2 '--class tiny: .*allowed: .*growth' \
     "$INCODE" bench peers --class tiny
-refuses peers/name 2 '--peers gmsh: .*allowed: cgal, tetgen, qhull' \
+refuses peers/name 2 '--peers gmsh: .*allowed: cgal, tetgen, qhull, hxt, hxt2' \
     "$INCODE" bench peers --peers cgal,gmsh
 refuses peers/option 2 '--rounds: no option of bench links' \
     "$INCODE" bench links --rounds 2
@@ -17,6 +17,24 @@ refuses peers/elsewhere 2 'run it at the top of the source tree' \
     "$INCODE" bench peers
 cd "$top" || exit 1
 
+# HXT, whose structures the peer declares itself: it has each tetrahedron, on
+# one thread and on two.
+if [ -r /usr/include/gmsh.h ]; then
+    mkdir "$scratch/even"
+    incode gen uniform 6000 -o "$scratch/even/even.npy"
+    succeeds peers/hxt within "$INCODE" bench peers --rounds 1 \
+        --peers hxt,hxt2 --class real "$scratch/even" > "$scratch/table"
+    check peers/columns 'no times of HXT and HXT x2' \
+        grep -qE '^even +6000( +[0-9]+){5} ' "$scratch/table"
+    all=$(incode run "$scratch/even/even.npy" -q --stats - | jq .tetrahedra)
+    for threads in 1 2; do
+        has=$("$BUILD/peers/hxt" "$scratch/even/even.npy" "$threads" |
+            jq .tetrahedra)
+        check "peers/hxt $threads" "$has tetrahedra, not $all" [ "$has" = "$all" ]
+    done
+else
+    skip peers/hxt 'libgmsh-dev is not installed: make bench installs it'
+fi
 if [ ! -r /usr/include/CGAL/version.h ]; then
     skip peers/cgal 'CGAL is not installed: make bench installs it'
     exit 0
