@@ -1,5 +1,5 @@
-/* A triangulator that lends stars (front/loan.h), and uses what was found
- * there between its own steps. */
+/* A triangulator that lends stars (front/exchange.h), and uses the tetrahedra
+ * that a borrower found between its own steps. */
 #ifndef INCODE_LENDING_H
 #define INCODE_LENDING_H
 
@@ -10,23 +10,24 @@
 bool incode_triangulator_lend(struct incode_triangulator *t,
                               struct incode_loan *loan);
 
-/* Uses what was found from *used on, sound, about so many units, 1 at least.
- * INCODE_WORKED: call again; INCODE_WAITING: there is no room for it before its
- * own steps have made some; INCODE_FINISHED: all of it is used, the loan is
- * over; INCODE_BROKEN. */
+/* Uses the tetrahedra in found from *used on, for about so many units of work,
+ * at least 1. found must be sound.  INCODE_WORKED: call again.  INCODE_WAITING:
+ * steps of the lender must make room first.  INCODE_FINISHED: all are used, and
+ * the loan is over.  Or INCODE_BROKEN. */
 enum incode_step incode_triangulator_use(struct incode_triangulator *t,
                                          const struct incode_loan *loan,
                                          const struct incode_found *found,
                                          uint32_t *used, uint32_t units);
 
-/* Who closes stars for another: takes a run that a front has lent
- * (front/loan.h), and finds tetrahedra beside its faces by the maker of its own
- * triangulator, whose front it leaves alone.  It keeps the faces that are open
- * at the run's vertices, as the lender does, and goes on across those that it
- * opens: not where a tetrahedron, or a face, is another's to build, as its
- * lowest vertex is, nor where a face waits in the list of a vertex that is not
- * of the run.  It stops when as much is found as fits an answer; what is open
- * then is the lender's as before.
+/* A borrower closes stars for another node.  It takes a run of vertices that a
+ * front has lent (front/exchange.h), and finds tetrahedra beside their faces
+ * with the maker of its own triangulator; it does not change that
+ * triangulator's front.  Like the lender, it keeps a list of the open faces at
+ * the run's vertices, and continues across the faces that it opens.  It does
+ * not continue across a face or tetrahedron whose lowest vertex belongs to
+ * another node, nor across a face in the list of a vertex outside the run.  It
+ * stops when the answer is full.  Faces that are then open remain with the
+ * lender.
  *
  * Memory: struct incode_borrower, about 2.6 KB, and a search of the maker. */
 
@@ -44,16 +45,18 @@ struct incode_borrower {
     bool done;
 };
 
-/* Whether a triangulator of an exchange should borrow: it is quiet, and half of
- * its bricks at least are committed.  Before, what it waits for is on its way,
- * and the pages that it would ask for hold up those that others begin with. */
+/* Whether a triangulator of an exchange should borrow: it is quiet, and at
+ * least half of its bricks are committed.  Before that, the tetrahedra that it
+ * waits for are on their way, and its page requests would delay the first pages
+ * of other nodes. */
 bool incode_triangulator_may_borrow(const struct incode_triangulator *t);
 
-/* Whether it is a run of vertices of its lender's bricks, among so many. */
+/* Whether the loan is a run of vertices of its lender's bricks, in a set of
+ * `bricks` bricks. */
 bool incode_loan_is_sound(const struct incode_loan *loan, uint32_t bricks);
 
-/* Begins a run, of which incode_loan_bytes are read; it is sound.  t's search
- * for what is borrowed is its own from now on until it is done. */
+/* Begins a run, which must be sound, and of which incode_loan_bytes are read.
+ * The borrower uses t's search for borrowed faces until it is done. */
 void incode_borrower_begin(struct incode_borrower *b,
                            struct incode_triangulator *t,
                            const struct incode_loan *loan);

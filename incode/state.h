@@ -1,5 +1,5 @@
-/* What a triangulator is made of: a maker that finds apexes, a front that wants
- * them, and an insertion that does without. */
+/* The parts of a triangulator: a maker that finds apexes, a front that asks for
+ * them, and an insertion, which needs no apexes. */
 #ifndef INCODE_STATE_H
 #define INCODE_STATE_H
 
@@ -8,11 +8,11 @@
 #include "incode/insertion/insertion.h"
 #include "triangulator.h"
 
-/* What a job is about. */
+/* The phase of a job. */
 enum incode_phase {
-    INCODE_PHASE_CHOOSE,   /* how: pages of boxes tell */
+    INCODE_PHASE_CHOOSE,   /* by points or faces, by pages of boxes */
     INCODE_PHASE_POINTS,   /* point by point */
-    INCODE_PHASE_HANDOVER, /* of what is open to the front */
+    INCODE_PHASE_HANDOVER, /* fall back to faces: open ones to the front */
     INCODE_PHASE_FACES,    /* face by face, star after star */
     INCODE_PHASE_IDLE
 };
@@ -47,23 +47,23 @@ static inline size_t incode_arena_aligned(size_t bytes) {
     return (bytes + 63) & ~(size_t)63;
 }
 
-/* Bytes of the bits that say which bricks are committed point by point; 0: they
- * would take more than a part in 64.  Where the owner is the lowest vertex, of
- * the maps of an exchange. */
+/* Bytes of the bits of bricks that are committed by points; 0: they would take
+ * more than a 64th of the arena.  With INCODE_OWNER_LOWEST, bytes of the maps
+ * of an exchange. */
 size_t incode_arena_bits(const struct incode_setup *setup, size_t bytes);
 
-/* The shares face by face; false: it is too small. */
+/* The shares for building by faces; false: the arena is too small. */
 bool incode_arena_divide(struct incode_shares *s, struct incode_map *map,
                          const struct incode_setup *setup, size_t bytes);
 
-/* The share of a maker alone: what its horizon leaves, frames take. */
+/* The share of a maker alone: the horizon, and frames in the rest. */
 struct incode_maker_share incode_arena_maker(size_t bytes);
 
 /* Bytes of the arena for an insertion. */
 size_t incode_arena_room(const struct incode_triangulator *t);
 
-/* Divides the arena for a job point by point, which is begun, or face by face;
- * false: pages are on their way, whose frames stay. */
+/* Divides the arena for a job by points, which begins, or by faces.  False:
+ * pages are on their way, and their frames must stay. */
 bool incode_arena_turn(struct incode_triangulator *t, bool points);
 
 /* The most bytes that were in use, before or after the arena was divided anew.

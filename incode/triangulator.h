@@ -1,14 +1,14 @@
 /* A node's triangulator: closes the star of every vertex of its bricks and
- * hands out the tetrahedra that are its own, with points that come page by
- * page and a front that may spill.  It is a maker and a front joined: what the
- * front asks, the maker answers.  Or it inserts all points into a triangulation
- * of its own, where they fit.
+ * emits the tetrahedra that are its own.  Points arrive page by page, and the
+ * front may spill.  It joins a maker and a front: the front asks for apexes,
+ * and the maker finds them.  Or it inserts its points into a triangulation, if
+ * what is not yet final fits the memory.
  *
  * Work: a call of incode_triangulator_step closes at most one star, or takes
  * one search as far as one missing page, or some steps of an insertion
  * (insertion/insertion.h).  With the indexes `naive` and `grid` it builds at
- * most one tetrahedron, and looks at no more than 256 pages of points or
- * about 4,096 rows of cells and points.
+ * most one tetrahedron, and reads at most 256 pages of points or about 4,096
+ * rows of cells and points.
  *
  *     t = incode_triangulator_init(arena, bytes, &setup, &outside, &why);
  *     incode_triangulator_start(t, &job);
@@ -27,20 +27,21 @@
 
 enum { INCODE_CELLS_MAX = 1 << 30 /* of the grid, along one side */ };
 
-/* How tetrahedra are found: face by face, as InCoDe does it, or from a
- * triangulation that is grown point by point, as long as what is not final of
- * it fits in the node.  INCODE_BUILD_AUTO: point by point where a volume of so
- * many points fits, and all bricks are the node's own or they are of a surface;
- * if they are all and of a surface, always.  With the indexes `naive` and
- * `grid` and the face rule `paper`, face by face. */
+/* How tetrahedra are found: by faces, as InCoDe does, or by points, from a
+ * triangulation that grows point by point.  INCODE_BUILD_AUTO takes points for
+ * all bricks of a surface; for all bricks of a volume if the cells that are not
+ * yet final take at most half of the memory; and for some bricks of a surface
+ * if as many points of a volume would fit in the same way.  It takes faces
+ * otherwise, and always with the indexes `naive` and `grid` and the face rule
+ * `paper`. */
 enum incode_build {
     INCODE_BUILD_AUTO,
     INCODE_BUILD_FACES,
     INCODE_BUILD_POINTS
 };
 
-/* What every node of a run is told once.  incode_setup_fault tells what is out
- * of its limits. */
+/* What every node of a run gets once. incode_setup_fault names a field that is
+ * out of its limits. */
 struct incode_setup {
     /* Bricks of at most INCODE_BRICK_POINTS points, 1 or more; vertex numbers,
      * brick * INCODE_BRICK_POINTS and up, stay below INCODE_NONE. */
@@ -55,12 +56,12 @@ struct incode_setup {
     /* How tetrahedra are found: enum incode_build. */
     uint8_t build;
 
-    /* Whose a tetrahedron is: enum incode_owner_rule.  The lowest: face by
-     * face. */
+    /* Which brick owns a tetrahedron: enum incode_owner_rule.
+     * INCODE_OWNER_LOWEST builds by faces. */
     uint8_t owner_rule;
 
-    /* Of the order in which pages that have arrived are taken, for tests; 0: as
-     * they arrive. */
+    /* For tests: seed of the order in which arrived pages are taken; 0: the
+     * order of arrival. */
     uint64_t shuffle_seed;
 
     /* Box of all points, tight and finite, lo <= hi, in the points' unit. */
@@ -73,22 +74,22 @@ struct incode_setup {
     uint32_t reserved2; /* 0 */
 };
 
-/* How the triangulator reaches the world.  All calls return at once. */
+/* How the triangulator reaches its surroundings.  All calls return at once. */
 struct incode_outside {
     struct incode_page_source pages;   /* what its maker asks for */
     struct incode_front_outside front; /* what its front gives and takes back */
-    /* Others that share one active face list with it (front/exchange.h), whose
-     * owner rule is the lowest and face rule `own`; share = NULL: there are
-     * none. */
+    /* Fronts of other nodes that share one active face list with this one
+     * (front/exchange.h).  The owner rule is then INCODE_OWNER_LOWEST and the
+     * face rule `own`. share = NULL: there are none. */
     struct incode_front_peers peers;
-    /* Who is called while a step is long; look = NULL: nobody. */
+    /* Called during long steps; poll = NULL: nothing is called. */
     struct incode_yield yield;
 };
 
-/* The memory map, in bytes but for the three counts.  control, frames, afl and
- * bricks, with the alignment of tables, are the total, which is at most the
- * arena.  Point by point, the triangulation has what the active face list, the
- * bricks and all but a few frames have otherwise. */
+/* The memory map in bytes, except for the three counts. total is the sum of
+ * control, frames, afl and bricks, with the alignment of tables, and is at most
+ * the arena.  By points, the triangulation takes the memory of the active face
+ * list, the bricks and all frames except a few. */
 struct incode_map {
     size_t control;               /* the triangulator itself, the horizon too */
     size_t frames, frame_count;   /* of pages */
@@ -117,7 +118,7 @@ struct incode_statistics {
                                           octaves */
 };
 
-/* How full it is now. */
+/* How much of the memory is in use now. */
 struct incode_gauge {
     uint32_t pages, held; /* that there is room for, and that are there */
     uint32_t faces, open; /* likewise, of the active face list; point by point
@@ -134,9 +135,9 @@ size_t incode_arena_min(const struct incode_setup *setup);
 /* NULL, or a static string that says which field is out of its limits. */
 const char *incode_setup_fault(const struct incode_setup *setup);
 
-/* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside
- * it, or NULL with *why set to a static string: the arena is too small, or what
- * incode_setup_fault says. */
+/* Divides the arena (aligned to 64 bytes).  Returns the triangulator inside it,
+ * or NULL with *why set to a static string: the arena is too small, or the text
+ * of incode_setup_fault. */
 struct incode_triangulator *incode_triangulator_init(
     void *arena, size_t bytes, const struct incode_setup *setup,
     const struct incode_outside *outside, const char **why);
@@ -146,20 +147,22 @@ struct incode_triangulator *incode_triangulator_init(
 void incode_triangulator_start(struct incode_triangulator *t,
                                const struct incode_job *job);
 
-/* A page has arrived: `bytes` of it, those of its kind (pages/pages.h) or, for
- * a brick, 24 times its number of points: x[count], y[count], z[count].
- * Returns 0, or INCODE_PAGE_UNASKED or _UNSOUND (pages/pages.h) where it was
- * not asked for, or cannot be the page of that number; it is dropped then. */
+/* Delivers a page of `bytes` bytes: those of its kind (pages/pages.h) or, for a
+ * brick, 24 times its number of points: x[count], y[count], z[count]. Returns
+ * 0.  Returns INCODE_PAGE_UNASKED (pages/pages.h) for a page that was not
+ * requested, and INCODE_PAGE_UNSOUND for one that cannot be the page of that
+ * number, and drops the page. */
 int incode_triangulator_page(struct incode_triangulator *t, uint32_t page,
                              const void *data, size_t bytes);
 
-/* The same of a page that nobody asked for: kept where it is on its way, or
- * nothing has to make room for it.  0, or INCODE_PAGE_UNSOUND. */
+/* Delivers a page that was not requested.  It is kept if it is on its way, or
+ * if no page has to be evicted for it.  0, or INCODE_PAGE_UNSOUND. */
 int incode_triangulator_put(struct incode_triangulator *t, uint32_t page,
                             const void *data, size_t bytes);
 
-/* Whether a page is there, and then, if it is one of points or boxes, its bytes
- * for another node, at most INCODE_PAGE_BYTES; 0: it is not. */
+/* _has: whether a page is resident. _copy: copies a resident page of points or
+ * boxes for another node, and returns its bytes, at most INCODE_PAGE_BYTES; 0:
+ * it is not resident, or of another kind. */
 bool incode_triangulator_has(const struct incode_triangulator *t,
                              uint32_t page);
 size_t incode_triangulator_copy(const struct incode_triangulator *t,
@@ -174,49 +177,49 @@ uint64_t *incode_triangulator_label(const struct incode_triangulator *t,
 bool incode_triangulator_awaits(const struct incode_triangulator *t,
                                 uint32_t page);
 
-/* Whether a page that is not there is on its way; where nothing has to make
- * room for it, it is asked for. */
+/* Requests a page that is not resident, if no page has to be evicted for it.
+ * Returns whether the page is on its way. */
 bool incode_triangulator_fetch(struct incode_triangulator *t, uint32_t page);
 
-/* A page that has been asked for and has not arrived; INCODE_NONE: there is
- * none.  A pass over the frames. */
+/* A page that was requested and has not arrived; INCODE_NONE: there is none.
+ * Work: a pass over the frames. */
 uint32_t incode_triangulator_awaited(const struct incode_triangulator *t);
 
-/* Spilled toggles of a brick that was asked for, in the order in which they
- * went; `last`: there are no more.  Returns 0, or -1 where the brick was not
- * asked for or a face is not its own. */
+/* Delivers spilled toggles of a brick that was requested, in the order in which
+ * they were spilled; `last`: there are no more.  Returns 0, or -1 if the brick
+ * was not requested or a face is not of this brick. */
 int incode_triangulator_unspill(struct incode_triangulator *t, uint32_t brick,
                                 const struct incode_face *faces, size_t count,
                                 bool last);
 
-/* With peers: whether so many of what follows may come now, as
- * incode_front_may_take. */
+/* With peers: whether `count` calls of incode_triangulator_take are possible
+ * now (incode_front_may_take). */
 bool incode_triangulator_may_take(struct incode_triangulator *t,
                                   uint32_t count);
 
-/* With peers: a tetrahedron or facet of the hull that another has built, as
- * incode_front_take.  Returns 0, or -1 where it is none that can come. */
+/* With peers: a tetrahedron or facet of the hull that another front has built
+ * (incode_front_take).  Returns 0, or -1 if it is impossible. */
 int incode_triangulator_take(struct incode_triangulator *t,
                              const uint32_t v[4]);
 
-/* With peers, all of which are quiet: tries first tetrahedra. */
+/* With peers, when all are quiet: tries first tetrahedra. */
 void incode_triangulator_seed(struct incode_triangulator *t);
 
-/* With peers: whether nothing is to be done until a tetrahedron comes, and the
- * bricks of the job that are not committed. */
+/* With peers. _is_quiet: whether there is no work until a tetrahedron arrives.
+ * _left: the number of bricks of the job that are not committed. */
 bool incode_triangulator_is_quiet(const struct incode_triangulator *t);
 uint32_t incode_triangulator_left(const struct incode_triangulator *t);
 
 /* Works on: see enum incode_step.  Bounds are stated at the top. */
 enum incode_step incode_triangulator_step(struct incode_triangulator *t);
 
-/* From now on a step ends after about so many units of work, at first after as
- * many as it likes.  A unit is a step, a face, or as many points looked at as a
- * brick has: a microsecond or less where doubles are quick.  What a step
- * leaves, the next ones do; the results are the same. */
+/* From now on a step ends after about so many units of work; at first there is
+ * no limit.  A unit is a step, a face, or the points of one brick: a
+ * microsecond or less with doubles in hardware.  The next steps do the rest;
+ * the results are the same. */
 void incode_triangulator_allow(struct incode_triangulator *t, uint32_t units);
 
-/* Units that were worked since init. */
+/* Units of work since init. */
 uint64_t incode_triangulator_spent(const struct incode_triangulator *t);
 
 /* Counts of all jobs since init. */

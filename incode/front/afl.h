@@ -3,15 +3,15 @@
  * table of bricks that the front has touched.
  *
  * Memory: incode_afl_bytes(faces, bricks), fixed.  A list that grows
- * nevertheless, as where all hubs are in use, is spread over neighbouring
- * heads by its faces' other vertices, and a toggle looks at one part of it;
+ * nevertheless, as where all hubs are in use, is spread over neighbouring heads
+ * by its faces' other vertices, and a toggle looks at one part of it;
  * INCODE_AFL_WIDE lists can be at a time, and one that is short again gives
  * way.
  *
- * A face may be held, as it has been asked about elsewhere: it stays open, and
- * its twin closes it as any other, but it is taken no more until it is let go.
- * Or it is foreign: what lies beyond is another's to build, so that it is not
- * let go either. */
+ * A face may be held, because its apex is being searched elsewhere.  A held
+ * face stays open, and its twin closes it like any other, but it is not taken
+ * until it is released.  A face may be foreign: the tetrahedron beyond it is
+ * another front's to build.  A foreign face is not released either. */
 #ifndef INCODE_AFL_H
 #define INCODE_AFL_H
 

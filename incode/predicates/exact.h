@@ -1,16 +1,16 @@
-/* The last resort of the predicates: their polynomials, summed without any
- * rounding for all finite doubles.
+/* The last stage of the predicates: their polynomials, summed without rounding
+ * for all finite doubles.
  *
  * Every monomial is a product of at most three coordinates, so of at most 159
  * bits; it is added into one long fixed-point number that spans the exponents
  * actually present (Kulisch's accumulator).  Differences are never formed, so
  * nothing can overflow, underflow or be rounded.  in_sphere is a sum of squares
- * of coordinates times orient3d, of which first only the highest limbs count.
+ * of coordinates times orient3d, first with the highest limbs only.
  *
  * Memory: at most 6 KB of stack (INCODE_EXACT_STACK).  Work: 24 (orient3d), 12
  * (compare_distance) or 18 (collinear) monomials; in_sphere 5 times orient3d
- * and, of the widest exponents, up to 15 products of 5 limbs and 200, as often
- * as not 8; it yields. */
+ * and, with the widest exponents, up to 15 products of 5 limbs and 200 limbs, 8
+ * in half of the calls; it yields. */
 #ifndef INCODE_EXACT_H
 #define INCODE_EXACT_H
 
@@ -37,9 +37,9 @@ int incode_exact_compare_distance(const double *const p[3]);
 bool incode_exact_collinear(const double *const p[3]);
 
 /* The predicates on integers: coordinate differences written as multiples of
- * one common power of two, which exact data of like exponents are (floats,
- * grids, and doubles at most 60 binary places below the largest difference).
- * True zeros cost here no more than other signs.
+ * one common power of two, which is possible for data with similar exponents
+ * (floats, grids, and doubles at most 60 binary places below the largest
+ * difference).  Zeros cost no more here than other signs.
  *
  * Memory: under 1 KB of stack.  Work: 12 (orient3d) or 44 to 72 (in_sphere)
  * products of 64-bit words. */
@@ -72,9 +72,10 @@ bool incode_fixed_parallel(const int64_t d[2][3]);
 int incode_fixed_orient3d_portable(const int64_t d[3][3]);
 int incode_fixed_in_sphere_portable(const int64_t d[4][3]);
 
-/* The predicates in twice the precision, each number the sum of two doubles:
- * for points whose coordinates span too many binary places to be integers of
- * one word.  They tell all but true zeros and what is nearly one.
+/* The predicates in double-double arithmetic, each number the sum of two
+ * doubles, for points whose coordinates span too many binary places to be
+ * integers of one word.  They decide every sign except zeros and values close
+ * to zero.
  *
  * Memory: under 1 KB of stack.  Work: some 1,000 (orient3d) or 3,000
  * (in_sphere) operations at most, without branches. */

@@ -1,13 +1,14 @@
-/* Five cospherical points told apart (Devillers and Teillaud, CGTA 44:160-168,
- * 2011): the lift of each point is raised by an amount of its own, that of the
- * lexicographically larger point infinitely more than that of the smaller.
- * Coordinates never move, so no degenerate tetrahedron can arise, and nothing
- * but the points decides.
+/* Breaks ties of five cospherical points (Devillers and Teillaud, CGTA
+ * 44:160-168, 2011).  The lift of each point is raised by an infinitesimal
+ * amount, that of a lexicographically larger point by infinitely more than that
+ * of a smaller one.  Coordinates never move, so no degenerate tetrahedron can
+ * arise.  The result depends on the points alone.
  *
- * The raised determinant is a sum of the amounts, each times a cofactor.  For
- * the query it is -orient3d(p0,p1,p2,p3) < 0: raised, it leaves the sphere.
- * For p_i it is the orient3d with the query in place of p_i.  The largest
- * point whose cofactor is not zero decides; of two, one is not, since the
+ * The perturbed determinant is a sum of the amounts, each times a cofactor.
+ * The query's cofactor is -orient3d(p0,p1,p2,p3) < 0: raising the query moves
+ * it out of the sphere.  The cofactor of p_i is the orient3d with the query in
+ * place of p_i.  The largest point whose cofactor is not zero decides.  Of the
+ * two largest points, at least one has a cofactor that is not zero, because the
  * first four points span space. */
 #ifndef INCODE_TIE_H
 #define INCODE_TIE_H

@@ -5,18 +5,18 @@
  *
  * Work is counted in units of about 200 instructions of a Cortex-M7, or 6,000
  * of a processor without doubles: an in_sphere that its filter decides.
- * Between two calls there are INCODE_YIELD_UNITS, or as many as the last one
- * has asked for, and INCODE_YIELD_OVER more at the most. */
+ * Between two calls there are INCODE_YIELD_UNITS units, or as many as the last
+ * call returned, and at most INCODE_YIELD_OVER more. */
 #ifndef INCODE_YIELD_H
 #define INCODE_YIELD_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* What a part of the work has come to, in all rooms of incode. */
+/* The outcome of a part of the work, in all rooms of incode. */
 enum incode_step {
     INCODE_WORKED,   /* not yet done: call again */
-    INCODE_WAITING,  /* for a page, for an answer, or for room outside */
+    INCODE_WAITING,  /* for a page, an answer, or room outside */
     INCODE_FINISHED, /* done: what was asked for is there */
     INCODE_AGAIN,    /* not done: begin again at the vertex, without waiting */
     INCODE_FULL,     /* it does not fit the memory that is given */
@@ -45,7 +45,7 @@ void incode_yield_poll(struct incode_yield *yield);
 void incode_yield_fill(struct incode_yield *yield, void *memory, int byte,
                        size_t bytes);
 
-/* Called before so many units of work, at most INCODE_YIELD_OVER. */
+/* Called before `units` units of work, at most INCODE_YIELD_OVER. */
 static inline void incode_yield_after(struct incode_yield *yield,
                                       uint32_t units) {
     yield->left -= (int32_t)units;
