@@ -1,12 +1,11 @@
-/* The whole set as it looks from one brick: what is near brick by brick, what
- * is farther off in boxes of the tree, split where searches come to look into
- * them.  Most searches beyond the local points end here, without a walk, in one
- * pass over the boxes, many at a time, and read the points themselves only
- * where they matter.
+/* The whole set as seen from one brick: near bricks one by one, farther bricks
+ * in boxes of the tree, which are split when a search needs their children.
+ * Most searches beyond the local points end here without a walk: they test the
+ * boxes in one pass, many at a time, and read points only in boxes that matter.
  *
- * A search asks for what may lie in a cap: beyond the face and inside a sphere
- * through it, as D |y|^2 - M . y < 0 relative to the face's vertex.  So spheres
- * of any size, planes among them, keep their precision near the vertex.
+ * A search asks which points may lie in a cap: beyond the face and inside a
+ * sphere through it, D |y|^2 - M . y < 0 relative to the face's vertex.  So
+ * spheres of any size, planes among them, are precise near the vertex.
  *
  * Memory: 106 bytes a box, for 128 to 320 of them, and 768 a copied brick,
  * given by its owner. */
@@ -32,7 +31,7 @@ enum {
  * and of the vertex, half a unit each, in a gradient of 2 D far + |M|; six
  * roundings of a term and of the sum. */
 #define INCODE_HORIZON_DOUBT 0x1p-20F
-/* The farness of what may be anywhere. */
+/* The value of `far` for a box that may be anywhere. */
 #define INCODE_ANYWHERE 3e30F
 
 /* Boxes along the axes and lifted ones (incode/pages/pages.h) in the horizon's
@@ -76,8 +75,8 @@ static inline uint32_t incode_horizon_near(const struct incode_horizon *h) {
     return h->boxes / 8 * 5;
 }
 
-/* What is beyond a face and inside a sphere: D |y|^2 - M . y < 0 < n . y, with
- * y = x - v in the horizon's units. */
+/* A cap, beyond a face and inside a sphere: D |y|^2 - M . y < 0 < n . y, with y
+ * = x - v in the horizon's units. */
 struct incode_horizon_cap {
     float d, m[3], v[3], n[3];
     float peak[3];     /* M / 2 D, where the least value is */
@@ -102,7 +101,7 @@ bool incode_horizon_cap(const struct incode_horizon *h,
                         double scale, const double m[3], double det,
                         const double n[3]);
 
-/* Bounds a cap by a radical plane (empty_spheres.h), for r as above. */
+/* Bounds a cap by a radical plane (sphere.h), for r as above. */
 void incode_horizon_bound(const struct incode_horizon *h,
                           struct incode_horizon_cap *cap, double scale,
                           const struct incode_radical_bound *radical);
@@ -115,23 +114,23 @@ uint32_t incode_horizon_reached(
     const uint64_t done[INCODE_HORIZON_MAX / 64],
     uint32_t index[INCODE_HORIZON_MAX + INCODE_HORIZON_PADDING]);
 
-/* Looks into a box page: gives boxes of their own to those of its children that
- * the cap reaches.  INCODE_WAITING: the page is missing;
- * INCODE_FULL: there is no room for them. */
+/* Splits a box page: lists one by one those of its children that the cap
+ * reaches.  INCODE_WAITING: the page is missing.  INCODE_FULL: there is no room
+ * for the children. */
 enum incode_step incode_horizon_split(struct incode_horizon *h,
                                       struct incode_walker *walker,
                                       uint32_t index,
                                       const struct incode_horizon_cap *cap,
                                       uint32_t *missing);
 
-/* Copies the points of a brick, which is in the frame; the oldest copy gives
- * way. */
+/* Copies the points of a brick, which is in the frame, in place of the oldest
+ * copy. */
 void incode_horizon_copy(struct incode_horizon *h, uint32_t index,
                          const struct incode_frame *frame);
 
-/* The points of a brick that has been copied, one bit each, that are not
- * certainly outside the cap's sphere: all are looked at, without a branch on
- * where they are.  The bits past the brick's last point mean nothing. */
+/* The points of a copied brick, one bit each, that are not certainly outside
+ * the cap's sphere.  All are tested, without a branch.  Bits past the brick's
+ * last point have no meaning. */
 uint64_t incode_horizon_points(const struct incode_horizon *h, uint32_t index,
                                const struct incode_horizon_cap *cap);
 
@@ -152,10 +151,10 @@ static inline bool incode_horizon_holds(const struct incode_horizon *h,
     return holds;
 }
 
-/* The points around one leaf, copied out of their pages once for its (up to 8)
- * vertices; and of these the points around one vertex, relative to it, scanned
- * for every tetrahedron that is built there.  Far vertices are appended as they
- * are met.
+/* Local points.  The points around one leaf are copied from their pages once
+ * for its (up to 8) vertices.  From these the points around one vertex are
+ * selected, relative to it, and scanned for every tetrahedron that is built
+ * there.  Far vertices are appended when a search meets them.
  *
  * Memory: struct incode_local_points, about 43 KB. */
 
@@ -255,10 +254,10 @@ uint32_t incode_local_inside(const struct incode_local_points *local,
                              const struct incode_sphere *s,
                              uint16_t out[INCODE_NEAR_ALL]);
 
-/* Points in the ball that the search of a regular face has come down to, and
- * where they are in the face's pencil of spheres.  Many are placed at a time;
- * the first of them draws the ball in, and what falls out of it is dropped
- * where room is wanted.  What is left is for the predicates.
+/* Hits: the points in the current ball of the search of a regular face, and
+ * their places in the face's pencil of spheres.  Many are placed at a time.
+ * The first of them in the pencil shrinks the ball, and points outside the ball
+ * are dropped when room is needed.  The predicates decide among the rest.
  *
  * Memory: struct incode_hits, about 5 KB. */
 

@@ -1,21 +1,20 @@
-/* MakeTetra: which apexes some faces have.  The maker holds the points, in
- * pages that come on demand, and what it has learned of them: the local points
- * of the vertex at work, the horizon of its brick, empty spheres, half-spaces
- * and planes of the hull.  A search that misses a page is suspended, up to
- * INCODE_SEARCHES of them at a time, and resumed when the page is there.  It
+/* MakeTetra: finds the apexes of faces.  The maker holds the points, in pages
+ * that arrive on demand, and data derived from them: the local points of the
+ * vertex at work, the horizon of its brick, empty spheres, half-spaces and
+ * planes of the hull.  A search that misses a page is suspended, up to
+ * INCODE_SEARCHES at a time, and resumed when the page has arrived.  The maker
  * knows no list of faces and no order of work.
  *
- * There are two ways to ask, over the same searches.  A tetrahedron builder,
- * which is sent faces, asks for their apexes by incode_maker_apexes.  Who has
- * the open faces of a whole star before it, as the triangulator, goes step by
- * step: incode_maker_centre, _apex and _resume with the index `kd`,
- * incode_maker_face with the others.
+ * The same searches have two interfaces.  A tetrahedron builder, which receives
+ * faces, calls incode_maker_apexes.  The triangulator, which has all open faces
+ * of a star, goes step by step: it calls incode_maker_centre, _apex and _resume
+ * with the index `kd`, and incode_maker_face with the other indexes.
  *
  * Memory: struct incode_maker, about 63 KB, and the share of an arena that
  * incode_maker_bytes states: the horizon's boxes and copies, frames of pages.
  * Work: a call takes one search as far as its next missing page; with the
- * indexes `naive` and `grid` it looks at no more than 256 pages of points or
- * about 4,096 rows of cells and points. */
+ * indexes `naive` and `grid` it reads at most 256 pages of points or about
+ * 4,096 rows of cells and points. */
 #ifndef INCODE_MAKER_H
 #define INCODE_MAKER_H
 
@@ -42,12 +41,12 @@ struct incode_points {
 
 enum incode_search_stage {
     INCODE_SEARCH_NONE,
-    INCODE_SEARCH_POINTS, /* among points beyond those at hand */
+    INCODE_SEARCH_POINTS, /* beyond the local points */
     INCODE_SEARCH_FOUND,  /* it is over, its answer not yet given */
     INCODE_SEARCH_FIRST   /* of a first tetrahedron */
 };
 
-/* A first tetrahedron under way: see first.c. */
+/* The search of a first tetrahedron (apex.c). */
 struct incode_first {
     enum incode_first_stage {
         INCODE_FIRST_NEAREST,
@@ -79,7 +78,7 @@ struct incode_search {
     };
 };
 
-/* A plane with every point on it or below, and a place below. */
+/* A plane with every point on it or below it, and some location below it. */
 struct incode_hull_plane {
     double p[3][3], below[3];
 };
@@ -117,14 +116,14 @@ struct incode_maker {
     struct incode_local_points local;
 };
 
-/* So many units of incode/predicates/yield.h are about to be worked. */
+/* Called before `units` units of work (incode/predicates/yield.h). */
 static inline void incode_maker_yield(struct incode_maker *m, uint32_t units) {
     incode_yield_after(&m->counts.tally.yield, units);
 }
 
 /* ---- memory ---- */
 
-/* What a maker is given beside its struct. */
+/* The memory of a maker beside its struct. */
 struct incode_maker_share {
     uint32_t boxes, copies; /* of the horizon: incode_horizon_init */
     uint32_t frames;        /* INCODE_FRAMES_MIN to INCODE_FRAMES_MAX */
@@ -138,21 +137,21 @@ size_t incode_maker_bytes(const struct incode_maker_share *share);
 uint32_t incode_maker_frames(const struct incode_maker_share *share,
                              size_t bytes);
 
-/* memory: aligned to 64 bytes, incode_maker_bytes of the share.  yield: is told
- * of what takes long, from now on; the maker has a copy. */
+/* memory: aligned to 64 bytes, incode_maker_bytes of the share.  yield: called
+ * during long work; the maker keeps a copy. */
 void incode_maker_init(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share,
                        const struct incode_points *points,
                        const struct incode_page_source *source,
                        const struct incode_yield *yield);
 
-/* Moves to other memory, of another share: what was there is forgotten, counts
- * stay.  No page may be on its way. */
+/* Moves to other memory, of another share.  The content of the old memory is
+ * forgotten; counts stay.  No page may be on its way. */
 void incode_maker_move(struct incode_maker *m, void *memory,
                        const struct incode_maker_share *share);
 
-/* Begins other work on the same points: no fault, nothing looked ahead at.
- * Searches that are to be given up are forgotten one by one. */
+/* Begins other work on the same points: clears the fault and the look-ahead.
+ * The caller forgets each search that it gives up. */
 void incode_maker_start(struct incode_maker *m);
 
 /* ---- faces ---- */
@@ -169,17 +168,17 @@ struct incode_answer {
 
 /* Answers faces[*done] to faces[count - 1] (v[0], v[1], v[2]: the side where
  * orient3d is positive is unknown), one after another, in search `slot`.
- * INCODE_FINISHED: all are answered; INCODE_WAITING, INCODE_WORKED: call again
- * with the same arguments, when page search[slot].page is there or at once.
- * Faces with the same first vertex, one after another, share its local points.
- * Faces are of the triangulation: of others, what empty spheres rule out may be
- * the apex. */
+ * INCODE_FINISHED: all are answered.  Otherwise call again with the same
+ * arguments: after INCODE_WAITING when page search[slot].page has arrived,
+ * after INCODE_WORKED at once.  Consecutive faces with the same first vertex
+ * share its local points.  Every face must belong to the triangulation;
+ * otherwise empty spheres may rule out its apex. */
 enum incode_step incode_maker_apexes(struct incode_maker *m, unsigned slot,
                                      const uint32_t (*faces)[3], uint32_t count,
                                      struct incode_answer *answers,
                                      uint32_t *done);
 
-/* Ends whatever search `slot` was doing. */
+/* Ends the work of search `slot`. */
 void incode_maker_forget(struct incode_maker *m, unsigned slot);
 
 /* Whether the search of an apex or a first tetrahedron is under way. */
@@ -188,33 +187,33 @@ static inline bool incode_maker_is_searching(const struct incode_maker *m,
     return m->search[slot].stage != INCODE_SEARCH_NONE;
 }
 
-/* Indexes `naive` and `grid`: whether it got on when it was last asked. */
+/* Indexes `naive` and `grid`: whether the last call advanced the search. */
 static inline bool incode_maker_has_advanced(const struct incode_maker *m,
                                              unsigned slot) {
     return m->search[slot].advanced;
 }
 
-/* Index `kd`, step by step.  First, brings the points around a vertex to hand:
+/* Index `kd`, step by step.  First, gathers the local points of a vertex:
  * INCODE_FINISHED or INCODE_WAITING. */
 enum incode_step incode_maker_centre(struct incode_maker *m, unsigned slot,
                                      uint32_t v);
 
-/* Then the apex of (v, b, c), with near[0] and near[1] where b and c are among
- * the local points or INCODE_LOCAL_NONE; they are set.  INCODE_FINISHED: *a is
- * the answer; INCODE_WORKED: go on by incode_maker_resume; INCODE_WAITING,
- * INCODE_AGAIN: nothing is begun. */
+/* Then finds the apex of (v, b, c). near[0] and near[1] are the indices of b
+ * and c among the local points, or INCODE_LOCAL_NONE; the call sets them.
+ * INCODE_FINISHED: *a is the answer.  INCODE_WORKED: continue with
+ * incode_maker_resume.  INCODE_WAITING, INCODE_AGAIN: no search was begun. */
 enum incode_step incode_maker_apex(struct incode_maker *m, unsigned slot,
                                    uint32_t b, uint32_t c, uint16_t near[2],
                                    struct incode_answer *a);
 
-/* Goes on with the search of an apex, after incode_maker_centre at the same
- * vertex.  INCODE_FINISHED: *a is the answer; INCODE_WORKED: what was learned
- * is no answer yet, ask for the face again by incode_maker_apex. */
+/* Continues the search of an apex, after incode_maker_centre at the same
+ * vertex.  INCODE_FINISHED: *a is the answer.  INCODE_WORKED: there is no
+ * answer yet; call incode_maker_apex for the face again. */
 enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
                                      struct incode_answer *a);
 
-/* Indexes `naive` and `grid`: begins the search of the apex of f, or goes on
- * with that under way, whatever f is. */
+/* Indexes `naive` and `grid`: begins the search of the apex of f.  If a search
+ * is under way, continues it and ignores f. */
 enum incode_step incode_maker_face(struct incode_maker *m, unsigned slot,
                                    const uint32_t f[3],
                                    struct incode_answer *a);
@@ -233,31 +232,32 @@ uint32_t incode_maker_waiting(const struct incode_maker *m, uint32_t slots);
 int incode_maker_page(struct incode_maker *m, uint32_t page, const void *data,
                       size_t bytes);
 
-/* One that comes unasked: kept where it is on its way, or nothing has to make
- * room for it.  0, or INCODE_PAGE_UNSOUND. */
+/* A page that was not requested (incode_triangulator_put).  0, or
+ * INCODE_PAGE_UNSOUND. */
 int incode_maker_put(struct incode_maker *m, uint32_t page, const void *data,
                      size_t bytes);
 
-/* Whether a page that is not there is on its way; where nothing has to make
- * room for it, it is asked for. */
+/* Requests a page that is not resident, if no page has to be evicted for it.
+ * Returns whether the page is on its way. */
 bool incode_maker_fetch(struct incode_maker *m, uint32_t page);
 
-/* Asks for the pages of a brick, of up to `more` after it, and of what lies
- * around the first; true: all that can be has been done for it. */
+/* Requests the pages of a brick, of up to `more` bricks after it, and of the
+ * bricks around the first.  True: all possible requests have been made. */
 bool incode_maker_prefetch(struct incode_maker *m, uint32_t brick,
                            uint32_t more);
 
-/* Bricks [first, last) come next, in this order: asks for the pages of some of
+/* Bricks [first, last) come next, in this order: requests the pages of some of
  * them, as far ahead as the frames allow, once each. */
 void incode_maker_look_ahead(struct incode_maker *m, uint32_t first,
                              uint32_t last);
 
-/* The same where `count` bricks, from brick last - 1 down, are worked on, and
- * `passed` of them are passed. */
+/* The same for `count` bricks from brick last - 1 down, of which `passed` are
+ * done. */
 void incode_maker_look_down(struct incode_maker *m, uint32_t last,
                             uint32_t passed, uint32_t count);
 
-/* Points of a brick, or 0: its page is missing and has been asked for. */
+/* Number of points of a brick, or 0: its page is missing and has been
+ * requested. */
 uint32_t incode_maker_count(struct incode_maker *m, uint32_t brick);
 
 #endif

@@ -1,6 +1,6 @@
-/* Walks down the tree of boxes to the leaves that a question concerns, in page
- * order or the other way round, and can be suspended at a missing page and
- * resumed there.
+/* Walks down the tree of boxes to the leaves that a query concerns, in page
+ * order or in reverse.  A walk can be suspended at a missing page and resumed
+ * there.
  *
  * Memory: the struct; stack for INCODE_LEVELS_MAX levels. */
 #ifndef INCODE_QUERY_H
@@ -30,7 +30,7 @@ struct incode_query {
     bool ahead;          /* BOX: asks for missing bricks and passes them over */
     bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool round;          /* APEX: what matters lies in the ball below */
-    bool lens;           /* round: it is less than the sphere (half_space.h) */
+    bool lens;           /* round: it is less than the sphere (sphere.h) */
     bool large;          /* round, and the sphere itself tells of boxes, too */
     bool done;           /* not what lies within [done_lo, done_hi] */
     bool yields;         /* the walk is suspended where the walker has no more
@@ -73,7 +73,7 @@ static inline void incode_query_relative(double out[3],
         out[d] = (p[d] - q->pv[d]) * q->scale;
 }
 
-/* What a walk runs on. */
+/* What a walk needs. */
 struct incode_walker {
     struct incode_pager *pager;
     const struct incode_tree *tree;
@@ -83,13 +83,13 @@ struct incode_walker {
                       that may be visited; one is always */
 };
 
-/* So many units were worked. */
+/* Counts `units` units of work. */
 static inline void incode_walker_spend(struct incode_walker *walker,
                                        uint32_t units) {
     walker->left = walker->left > units ? walker->left - units : 0;
 }
 
-/* So many units of incode/predicates/yield.h are about to be worked. */
+/* Called before `units` units of work (incode/predicates/yield.h). */
 static inline void incode_walker_yield(const struct incode_walker *walker,
                                        uint32_t units) {
     incode_yield_after(&walker->tally->yield, units);
@@ -151,15 +151,15 @@ incode_visit incode_visit_points;
 /* 2^k with k such that 2^k * extent is about 1; exact, never 0 or infinite. */
 double incode_scale_for(double extent);
 
-/* MakeTetra's search by the paper's uniform grid: its cells in shells around
- * the face, each shell twice as far out as the one before, until no cell that
- * is left meets the sphere of the best point so far.  Points come from the
- * pages of the grid's two lists and from their bricks; the search can be
+/* MakeTetra's search in the paper's uniform grid.  It takes the cells in shells
+ * around the face, each shell twice as far out as the one before, until no
+ * remaining cell meets the sphere of the best point so far.  Points come from
+ * the pages of the grid's two lists and from their bricks; the search can be
  * suspended at a missing page, and resumed there.
  *
- * Work: INCODE_CELL_SEARCH_WORK rows and points a call and at most one shell;
- * a shell's rows of cells are tested whole against the sphere, and halved as
- * long as they hold many points. */
+ * Work: INCODE_CELL_SEARCH_WORK rows and points a call and at most one shell; a
+ * shell's rows of cells are tested whole against the sphere, and halved as long
+ * as they hold many points. */
 
 enum {
     INCODE_CELL_SEARCH_WORK = 4096,

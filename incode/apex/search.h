@@ -1,11 +1,11 @@
-/* Searches of the whole set by the tree of boxes, the planes of the hull that
- * are known, and what the maker counts; shared by its parts. */
+/* Searches of the whole set by the tree of boxes, the known planes of the hull,
+ * and the maker's counts.  For the files of this room only. */
 #ifndef INCODE_SEARCH_H
 #define INCODE_SEARCH_H
 
 #include "maker.h"
 
-/* The fault of one who names a slot that its brick has not. */
+/* The fault of a caller that names a slot beyond the points of a brick. */
 #define INCODE_NO_VERTEX "a face has a vertex that its brick has not"
 
 /* Begins the search of the apex of (v, b, c). */
@@ -13,25 +13,25 @@ void incode_search_begin(struct incode_maker *m, struct incode_search *s,
                          const uint32_t f[3], const double pv[3],
                          const double pb[3], const double pc[3], double radius);
 
-/* Goes on with it: INCODE_FINISHED with query.best (INCODE_NONE: a hull facet),
- * or INCODE_WAITING for query.missing, or INCODE_WORKED: the walker has no
- * units left.
- */
+/* Continues it: INCODE_FINISHED with query.best (INCODE_NONE: a hull facet), or
+ * INCODE_WAITING for query.missing, or INCODE_WORKED: the walker has no units
+ * left. */
 enum incode_step incode_search_run(struct incode_maker *m,
                                    struct incode_search *s);
 
-/* Notes what a walk waits for: INCODE_WAITING or INCODE_WORKED, as above. */
+/* Records the page that a walk waits for: INCODE_WAITING or INCODE_WORKED, as
+ * above. */
 enum incode_step incode_search_suspend(struct incode_search *s);
 
 /* The next box of a search for a first candidate. */
 void incode_search_box(struct incode_maker *m, struct incode_search *s);
 
-/* The last look: every point that the best so far does not clearly beat, or
- * every point if there is none. */
+/* The last pass: over every point that the best so far does not clearly beat,
+ * or over every point if there is no best. */
 void incode_search_last(struct incode_maker *m, struct incode_search *s);
 
-/* Learns from the search of the apex of an open face that is over: where many
- * points were looked at, the sphere found helps the next ones. */
+/* Learns from a finished search of an apex: if many points were tested, the
+ * sphere found is kept for the next searches. */
 void incode_search_learn(struct incode_maker *m, const struct incode_query *q,
                          uint64_t looked);
 
@@ -50,7 +50,7 @@ void incode_hull_learn(struct incode_maker *m, const struct incode_query *q);
 bool incode_fetch_point(struct incode_maker *m, uint32_t v, double p[3],
                         uint32_t *page);
 
-/* Notes a MakeTetra that is over: how many candidates it looked at. */
+/* Counts a finished MakeTetra and its candidates. */
 void incode_count_candidates(struct incode_maker *m, uint64_t looked);
 
 /* A MakeTetra under way, shared by apex.c (among the local points) and
@@ -99,8 +99,8 @@ enum incode_near incode_apex_near(struct incode_maker *m, uint32_t b,
 
 /* ---- around.c ---- */
 
-/* Goes on among the bricks around: true where they decide, with query.best the
- * apex; false: the search is ready to go on with the tree. */
+/* Continues among the bricks around.  True: they decide, and query.best is the
+ * apex.  False: the search is ready to continue in the tree. */
 bool incode_apex_around(struct incode_make *make, struct incode_search *s);
 
 #endif

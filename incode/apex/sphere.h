@@ -63,8 +63,8 @@ static inline double incode_dd_max_norm(const struct incode_dd a[3]) {
 /* Of a nearer point, underflow may have left no direction. */
 #define INCODE_PENCIL_LEAST 1e-240
 
-/* Where in the pencil a point lies; false: it is not clearly beyond the face.
- */
+/* The place of a point in the pencil; false: the point is not clearly beyond
+ * the face. */
 static inline bool incode_pencil_place(const struct incode_pencil *pencil,
                                        const double r[3], double *t) {
     double beyond = incode_dot(pencil->n, r), far = incode_max_norm(r);
@@ -100,8 +100,8 @@ incode_sphere_is_ill_conditioned(const struct incode_sphere *s) {
     return s->pdet > 1024 * det || incode_max_norm(s->pm) > 1024 * m;
 }
 
-/* So ill-conditioned, or so much larger than its face, that it tells nothing of
- * where points lie that are coplanar up to rounding. */
+/* So ill-conditioned, or so much larger than its face, that it does not
+ * separate points that are coplanar up to rounding. */
 static inline bool
 incode_sphere_is_near_degenerate(const struct incode_sphere *s) {
     double size = s->lb > s->lc ? s->lb : s->lc;
@@ -153,13 +153,13 @@ static inline double incode_plane_error(const struct incode_sphere *s,
            INCODE_SPHERE_TINY;
 }
 
-/* Empty spheres met before, and what they tell of a search among points that
- * lie on one sphere up to rounding: all of them are in doubt about a
- * candidate's sphere, and boxes say nothing.  But no point is inside the sphere
- * of a tetrahedron; so a point that beats the candidate lies, in power, nearer
- * to the candidate's sphere than to any of these, which is a half-space
- * (Aurenhammer, SIAM J. Comput. 16, 1987).  Near the face, it leaves a sliver
- * of the set.
+/* Empty spheres of earlier searches, for searches among points that lie on one
+ * sphere up to rounding.  The filter is uncertain about every such point in a
+ * candidate's sphere, and boxes exclude none.  But no point is inside the
+ * sphere of a tetrahedron.  So a point that beats the candidate has a smaller
+ * power with respect to the candidate's sphere than to any of these spheres,
+ * which bounds it by a half-space (Aurenhammer, SIAM J.  Comput.  16, 1987).
+ * Near the face, only a sliver of the set remains.
  *
  * Memory: struct incode_empty_spheres, about 1 KB. */
 
@@ -194,17 +194,17 @@ struct incode_radical_bound {
     double g[3], level, slack;
 };
 
-/* What is known to lie outside the sphere of four points, the first of which r
- * is relative to; n: the direction in which it matters. */
+/* A half-space known to lie outside the sphere of four points; r is relative to
+ * the first. n: the direction of interest. */
 void incode_radical_bound_set(struct incode_radical_bound *c,
                               const struct incode_empty_spheres *e,
                               const double *const p[4], double scale,
                               const double n[3]);
 
-/* Half-spaces that hold every point, and what they tell of a face that lies in
- * the hull's side up to rounding.  Points coplanar up to rounding are all in
- * doubt about such a face, and a sphere through it says nothing of where its
- * apex can be; but no point rises above the half-space, so the points that beat
+/* Half-spaces that hold every point, for a face that lies in a side of the hull
+ * up to rounding.  The filter is uncertain about all points that are coplanar
+ * with such a face up to rounding, and a sphere through the face does not bound
+ * its apex.  But no point lies above the half-space, so the points that beat
  * the best so far lie in a ball (incode_near_degenerate_lessen). */
 
 /* n . ((x - p) scale) <= most for every point x. */
@@ -238,10 +238,10 @@ bool incode_half_space_faces(const struct incode_half_space *half_space,
 
 enum { INCODE_LESSEN_UNITS = 64 }; /* of work (incode/predicates/yield.h) */
 
-/* Lessens degenerate->ball: no point outside it comes before p[3] in Delaunay
- * distance from the face (p[0], p[1], p[2]).  Nothing changes where neither the
- * face's circle nor a half-space tells, and what holds for one point holds for
- * all that come before it. */
+/* Shrinks degenerate->ball: no point outside the ball comes before p[3] in
+ * Delaunay distance from the face (p[0], p[1], p[2]).  The ball does not change
+ * if neither the face's circle nor a half-space bounds it.  A ball that is
+ * valid for a point is valid for all points before it. */
 void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
                                    const double *const p[4], double scale);
 
@@ -249,8 +249,8 @@ void incode_near_degenerate_lessen(struct incode_near_degenerate *degenerate,
 void incode_near_degenerate_sphere(struct incode_near_degenerate *degenerate,
                                    const double *const p[4], double scale);
 
-/* Whether a point is certainly outside the sphere of the last one asked: the
- * predicates would say so at several times the cost. */
+/* Whether a point is certainly outside the sphere of the last point tested.
+ * The predicates would find the same at several times the cost. */
 bool incode_near_degenerate_outside(
     const struct incode_near_degenerate *degenerate, const double pv[3],
     const double p[3], double scale);

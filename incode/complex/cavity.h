@@ -1,5 +1,5 @@
-/* The steps of an insertion, for the files of this room alone: where the point
- * is, which cells give way, what takes their place.
+/* The steps of an insertion, for the files of this room only: to locate the
+ * point, to find the cells in conflict, to fill the cavity.
  *
  * Memory: the complex's, and 32 KB of stack. */
 #ifndef INCODE_CAVITY_H
@@ -11,7 +11,7 @@
 
 /* INCODE_CELL_MARK of cells during an insertion. */
 enum {
-    INCODE_CELL_STAYS = 1, /* looked at */
+    INCODE_CELL_STAYS = 1, /* tested, outside the cavity */
     INCODE_CELL_GOES = 3
 };
 
@@ -61,7 +61,7 @@ void incode_complex_free_cell(struct incode_complex *x, uint32_t i);
 static const uint8_t incode_cell_facet[4][3] = {
     {2, 1, 3}, {0, 2, 3}, {1, 0, 3}, {0, 1, 2}};
 
-/* What each cell keeps of its sphere, to tell most points from it at once.
+/* What each cell keeps of its sphere, to decide for most points at once.
  *
  * With d the difference of a point and the cell's vertex v[3], the point is in
  * the sphere where |d|^2 - X d < 0, X being twice the centre as seen from that

@@ -1,7 +1,8 @@
-/* The Delaunay triangulation of some of the points, kept whole and grown point
- * by point (Bowyer, Computer Journal 24, 1981; Watson, ibid.): the cells whose
- * spheres hold the new point give way to those between it and their boundary.
- * Ties are the predicates', so it is the one triangulation of its points.
+/* The Delaunay triangulation of some of the points, which grows point by point
+ * (Bowyer, Computer Journal 24, 1981; Watson, ibid.): the cells whose spheres
+ * hold the new point, those in conflict, are replaced by cells between the
+ * point and the boundary of their union.  The predicates break ties, so the
+ * triangulation of its points is unique.
  *
  * Outside the hull there are infinite cells, one beyond each of its facets,
  * with the vertex INCODE_COMPLEX_INFINITE; so every cell has four neighbours.
@@ -21,7 +22,7 @@
 enum {
     INCODE_COMPLEX_POINTS_MAX = 65534,
     INCODE_COMPLEX_CELLS_MAX = (1 << 23) - 2,
-    INCODE_COMPLEX_CAVITY = 640,      /* cells, looked at for a point */
+    INCODE_COMPLEX_CAVITY = 640,      /* cells tested for a point */
     INCODE_CELL_NONE = (1 << 24) - 1, /* at the end of a list by n[0] */
     INCODE_COMPLEX_INFINITE = 0,      /* the vertex beyond the hull */
     /* In the place of a neighbour that has been released, a finite and an
@@ -40,7 +41,7 @@ struct incode_cell {
         uint32_t cell : 24, low : 8; /* of sphere[i]: its last bits; n[3]: of
                                         a walk, within a call */
     } n[4];
-    int16_t sphere[3]; /* with the scale, as sphere.h has it */
+    int16_t sphere[3]; /* with the scale: see cavity.h */
     uint8_t scale;
     uint8_t flags; /* INCODE_CELL_... */
 };
@@ -76,8 +77,8 @@ struct incode_complex {
     uint32_t cells;       /* used or free */
     uint32_t free, free_count;
     uint32_t free_point; /* by `id`, up to 0 */
-    uint64_t searches; /* insertions that looked at all points for a near one */
-    uint64_t scans;    /* insertions that looked at all cells for a first one */
+    uint64_t searches;   /* insertions that tested all points for a near one */
+    uint64_t scans;      /* insertions that tested all cells for a first one */
 };
 
 /* memory: aligned to 8 bytes; faster where it begins and ends at multiples of
@@ -101,33 +102,33 @@ bool incode_complex_begin(struct incode_complex *x, struct incode_tally *tally,
                           const uint32_t four[4]);
 
 /* Releases the cells that are proved: none of their spheres will hold a point
- * that is inserted later.  Vertices that have no cell left are forgotten, and
- * their places taken by points that are added; so is what is no vertex yet.
- * n[0] and the points' `cell` may have been used for lists before. */
+ * that is inserted later.  Vertices without cells, and points that are no
+ * vertex yet, are forgotten, and their slots are used again. n[0] and the
+ * points' `cell` may have been used for lists before. */
 void incode_complex_release(struct incode_complex *x,
                             struct incode_yield *yield);
 
-/* Inserts a point that is no vertex yet, and is none of theirs, from the vertex
- * `near` on, best one near by.  False: there is no room, or the same point is a
- * vertex; all is as before. */
+/* Inserts a point that is no vertex yet.  The walk begins at the vertex `near`,
+ * which should be close.  False: there is no room, or the same point is a
+ * vertex; nothing has changed. */
 bool incode_complex_insert(struct incode_complex *x, struct incode_tally *tally,
                            uint32_t v, uint32_t near);
 
-/* The cells that would give way to a point, 0 if it is a vertex; INCODE_NONE:
- * they and those around them are more than INCODE_COMPLEX_CAVITY.  near: as
+/* The cells in conflict with a point, 0 if it is a vertex.  INCODE_NONE: these
+ * and the cells around them are more than INCODE_COMPLEX_CAVITY. near: as
  * above. */
 uint32_t incode_complex_cavity(struct incode_complex *x,
                                struct incode_tally *tally, const double p[3],
                                uint32_t near,
                                uint32_t cells[INCODE_COMPLEX_CAVITY]);
 
-/* Whether a cell would. */
+/* Whether a cell is in conflict with a point. */
 bool incode_complex_gives_way(const struct incode_complex *x,
                               struct incode_tally *tally,
                               const struct incode_cell *c, const double p[3]);
 
-/* Sets INCODE_CELL_PROVED of all of them to 0, and returns how many there are;
- * *were: those that had another. */
+/* Sets INCODE_CELL_PROVED of all cells in conflict with a point to 0, and
+ * returns their number; *were: the number that had another value. */
 uint32_t incode_complex_disprove(struct incode_complex *x,
                                  struct incode_tally *tally, const double p[3],
                                  uint32_t near, uint32_t *were);
@@ -142,7 +143,7 @@ static inline bool incode_cell_is_free(const struct incode_cell *c) {
     return c->v[0] == c->v[1];
 }
 
-/* What its owner has put down of a cell: 0 to 3. */
+/* The owner's mark of a cell: 0 to 3. */
 static inline unsigned incode_cell_proved(const struct incode_cell *c) {
     return (c->flags & (unsigned)INCODE_CELL_PROVED) / 4;
 }

@@ -2,11 +2,11 @@
  * the list of its key vertex (its first), found by a hash of that key; and the
  * table of bricks that the front has touched.
  *
- * Memory: incode_afl_bytes(faces, bricks), fixed.  A list that grows
- * nevertheless, as where all hubs are in use, is spread over neighbouring heads
- * by its faces' other vertices, and a toggle looks at one part of it;
- * INCODE_AFL_WIDE lists can be at a time, and one that is short again gives
- * way.
+ * Memory: incode_afl_bytes(faces, bricks), fixed.  If a list grows although its
+ * vertex cannot become a hub, because all hubs are in use, the list is spread
+ * over neighbouring heads by its faces' other vertices, and a toggle searches
+ * one part of it.  At most INCODE_AFL_WIDE lists are spread at a time.  A list
+ * that is short again is joined to make room for another.
  *
  * A face may be held, because its apex is being searched elsewhere.  A held
  * face stays open, and its twin closes it like any other, but it is not taken
@@ -27,7 +27,7 @@ enum incode_face_state {
     INCODE_FACE_FOREIGN
 };
 
-/* What is known of a brick from its first touch until it is finished. */
+/* The state of a brick from its first touch until it is finished. */
 struct incode_touched {
     uint64_t reached; /* a tetrahedron has this vertex */
     uint64_t pending; /* its list may have faces that can be taken or held */
@@ -45,7 +45,7 @@ struct incode_afl_node {
 enum {
     INCODE_AFL_CROWD = 224, /* faces: a long list */
     INCODE_AFL_WIDE = 32,   /* lists that are spread, at a time */
-    INCODE_AFL_BREATH = 16  /* looks at faces or bricks, a unit of work */
+    INCODE_AFL_BREATH = 16  /* faces or bricks read in a unit of work */
 };
 
 struct incode_afl {
@@ -82,17 +82,17 @@ static inline void incode_afl_yield(const struct incode_afl *afl,
         incode_yield_after(afl->yield, units);
 }
 
-/* In a loop over many, at number i: now and then. */
+/* Yields in a loop over many, at index i, every INCODE_AFL_BREATH rounds. */
 static inline void incode_afl_yield_at(const struct incode_afl *afl,
                                        uint32_t i) {
     if (i % INCODE_AFL_BREATH == 0)
         incode_afl_yield(afl, 1);
 }
 
-/* Asks for what each of some lists has next, in the cache, and goes on to where
- * the next but one is found; best when what was asked for before has come.
- * Returns how many have not ended, now the first of them.  Where faces have
- * gone since, it leads elsewhere, in vain. */
+/* Prefetches the next node of each of some lists, and advances each link to it;
+ * best called when the nodes prefetched before have arrived.  Returns the
+ * number of lists that have not ended, which are now the first.  If faces were
+ * removed meanwhile, a prefetch may be useless. */
 static inline uint32_t incode_afl_fetch(const struct incode_afl *afl,
                                         const uint32_t **link, uint32_t count) {
     uint32_t left = 0;
@@ -112,9 +112,9 @@ void incode_afl_init(struct incode_afl *afl, void *memory, uint32_t capacity,
                      uint32_t bricks, struct incode_yield *yield);
 void incode_afl_clear(struct incode_afl *afl);
 
-/* The entry of a brick, made where there is none.  The caller keeps enough free
- * for faces of one triangulation; where others came there may be none left:
- * afl->fault, and an entry of no use. */
+/* The entry of a brick, made if there is none.  The caller keeps enough entries
+ * free for faces of one triangulation.  With other faces there may be none
+ * left: then afl->fault is set, and the entry is useless. */
 struct incode_touched *incode_afl_touch(struct incode_afl *afl, uint32_t brick);
 /* The entry of a brick, or NULL. */
 struct incode_touched *incode_afl_find(const struct incode_afl *afl,
@@ -122,14 +122,13 @@ struct incode_touched *incode_afl_find(const struct incode_afl *afl,
 /* Forgets a brick, which must have no face left. */
 void incode_afl_drop(struct incode_afl *afl, uint32_t brick);
 
-/* Where the first face is found of the list that a face and its twin are in, or
- * would be. */
+/* The head of the list for a face and its twin. */
 uint32_t *incode_afl_list(const struct incode_afl *afl, uint32_t key,
                           uint32_t b, uint32_t c);
 
-/* Opens the face (key, b, c), whose unknown side is where orient3d(key, b, c,
- * p) > 0; or closes it where its twin (key, c, b) is open.  One that is open
- * already is afl->fault. */
+/* Closes the twin (key, c, b) if it is open.  Otherwise opens the face (key, b,
+ * c), whose unknown side is where orient3d(key, b, c, p) > 0.  A face that is
+ * open already is afl->fault. */
 void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
                        uint32_t c);
 
@@ -137,7 +136,7 @@ void incode_afl_toggle(struct incode_afl *afl, uint32_t key, uint32_t b,
 void incode_afl_open(struct incode_afl *afl, uint32_t key, uint32_t b,
                      uint32_t c, enum incode_face_state state);
 
-/* Closes the twin (key, c, b) where it is open; false: it is not. */
+/* Closes the twin (key, c, b) if it is open; false: it is not. */
 bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
                            uint32_t c);
 
@@ -146,16 +145,17 @@ bool incode_afl_close_twin(struct incode_afl *afl, uint32_t key, uint32_t b,
 uint32_t incode_afl_take(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit, bool *more);
 
-/* Tells up to `limit` faces of v that are not held; they stay as they are. */
+/* Copies up to `limit` faces of v that are not held; the list does not change.
+ */
 uint32_t incode_afl_tell(const struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit);
 
-/* Tells up to `limit` faces of v that are not held, and holds them: of those
- * that share an edge at v one at a time, as they may have the same tetrahedron.
- * Work: two looks at each face of the list, and up to INCODE_AFL_CROWD more at
- * each where there are no more faces of v than that; of a longer list, some
- * that share no edge are passed over, and offered again when a held one closes.
- */
+/* Copies up to `limit` faces of v that are not held, and holds them.  Of faces
+ * that share an edge at v only one is held at a time, because they may have the
+ * same tetrahedron.  Work: each face of the list is read twice, and up to
+ * INCODE_AFL_CROWD times more if v has at most that many faces.  In a longer
+ * list, some faces that share no edge are passed over, and offered again when a
+ * held one closes. */
 uint32_t incode_afl_hold(struct incode_afl *afl, uint32_t v,
                          uint32_t (*pairs)[2], uint32_t limit);
 
@@ -167,11 +167,11 @@ bool incode_afl_hold_face(struct incode_afl *afl, uint32_t key, uint32_t b,
 bool incode_afl_is_open(const struct incode_afl *afl, uint32_t key, uint32_t b,
                         uint32_t c);
 
-/* Lets all faces of v go, but for those that are foreign; how many were held.
- */
+/* Releases all held faces of v that are not foreign; returns how many were
+ * held. */
 uint32_t incode_afl_let_go(struct incode_afl *afl, uint32_t v);
 
-/* The same, of all faces, as they are to move. */
+/* Releases all faces of v, foreign ones too, before they move. */
 void incode_afl_free(struct incode_afl *afl, uint32_t v);
 
 #endif

@@ -1,17 +1,19 @@
 /* Fronts that share one active face list: each has the faces of its own
- * vertices, and they tell each other the tetrahedra that they build.
+ * vertices, and sends the tetrahedra that it builds to the others that need
+ * them.
  *
  * Regions are runs of bricks.  A tetrahedron belongs to the front that owns its
- * lowest vertex (its number; owner.h); only that front builds it, toggles its
- * own faces and shares it with the owners of its other vertices, who toggle
- * theirs (incode_front_take).  A facet of the hull is the business of its
- * lowest vertex, and is shared likewise.  So each tetrahedron toggles once
- * everywhere, and no double has to be recognised.
+ * vertex of the lowest number (job.h).  Only that front builds it.  It toggles
+ * its own faces and sends the tetrahedron to the owners of the other vertices,
+ * which toggle theirs (incode_front_take).  The owner of the lowest vertex of a
+ * hull facet finds the facet, and sends it in the same way.  So each
+ * tetrahedron toggles once at each front, and no front has to recognise
+ * duplicates.
  *
- * A face is pursued by the owner of its lowest vertex alone; the others keep it
- * open until they hear of its tetrahedra.  Where the apex found is lower still
- * and foreign, the tetrahedron is the apex's owner's to build: the face stays
- * open until it comes.  Nobody ever has to build across such a face:
+ * Only the owner of a face's lowest vertex pursues it.  The others keep it open
+ * until its tetrahedra arrive.  If the apex is still lower and foreign, the
+ * owner of the apex builds the tetrahedron, and the face stays open until it
+ * arrives.  No front ever has to build across such a face.
  *
  *   All tetrahedra are built if each vertex without a lower neighbour has a
  *   first one.  By induction on the number of a vertex v: all tetrahedra of v
@@ -24,61 +26,62 @@
  *   tetrahedron, which is v's, and so on.  If v has no lower neighbour, the
  *   same way leads on from its first tetrahedron.
  *
- * When all fronts are quiet, the lowest vertex at which something is missing
- * has thus no tetrahedron at all, so it is enough to try a first one at each
- * vertex that has none (incode_front_seed_all), once: where it is foreign, the
- * vertex has a lower neighbour and will be reached.  One at the start, wherever
- * it is the front's own, sets it to work.
+ * So when all fronts are quiet, the lowest vertex at which something is missing
+ * has no tetrahedron at all.  Therefore it is enough to try a first tetrahedron
+ * once at each vertex that has none (incode_front_seed_all).  If the first
+ * tetrahedron is foreign, the vertex has a lower neighbour and will be reached.
+ * At the start one first tetrahedron of the front's own gives it work.
  *
- * Order of work: highest bricks first, as it is low ones that wait for others;
- * and faces that look out of the region to where lower ones are come last, as
- * their tetrahedra may come by themselves.
+ * Order of work: highest bricks first, because the lower regions' fronts wait
+ * for the low borders.  Faces that look out of the region towards lower regions
+ * come last, because their tetrahedra may arrive from other fronts.
  *
  * A brick is committed when no open face has a vertex of it and all of its
- * vertices are reached: its stars are closed for good.  A sweep over the list
- * now and then finds such bricks: it marks those that a face touches, and
- * whatever is opened meanwhile marks its own.
+ * vertices are reached: then its stars stay closed.  A periodic sweep over the
+ * list finds such bricks.  It marks the bricks that an open face touches; a
+ * face that is opened meanwhile marks its bricks.
  *
- * A front may lend stars to others that have nothing to do (loan.h).  What they
- * find counts only while its face is open, so that all of this holds as before;
- * the bricks of vertices that are lent are not committed, and the front is not
- * quiet, until they are back.
+ * A front may lend stars to fronts that have nothing to do (below).  A
+ * tetrahedron that a borrower finds counts only if its face is still open, so
+ * all of the above holds.  Until the stars are returned, the bricks of lent
+ * vertices are not committed, and the front is not quiet.
  *
- * Work: a call of incode_front_next looks at 256 lists of the hash and all
- * that is in them, or 512 entries and 64 commits of a sweep; or at 256 bricks
- * or entries in search of a vertex, and at a bit for each own brick, 64 at a
- * time; or, to let faces go, at the lists of one brick. */
+ * Work: a call of incode_front_next does one of three things.  In a sweep it
+ * reads 256 lists of the hash with all their faces, or 512 entries, and makes
+ * 64 commits.  In search of a vertex it reads 256 bricks or entries, and a bit
+ * for each own brick, 64 at a time.  To release faces it reads the lists of one
+ * brick. */
 #ifndef INCODE_EXCHANGE_H
 #define INCODE_EXCHANGE_H
 
 #include "front.h"
 
-/* Stars that a loaded front lends to who has nothing to do: a run of its ready
- * vertices with their open faces.  Who borrows them (incode/lending.h) finds
- * tetrahedra beside those faces, and beside the faces that these open at the
- * same vertices, and tells them in the order in which it found them.  The
- * faces stay open meanwhile, and their vertices are not worked on here.
+/* A loaded front lends stars to a front that has nothing to do: a run of its
+ * ready vertices with their open faces.  The borrower (incode/lending.h) finds
+ * tetrahedra beside these faces, and beside the faces that these tetrahedra
+ * open at the same vertices, and returns them in the order in which it found
+ * them.  Meanwhile the faces stay open, and the lender does not work at their
+ * vertices.
  *
- * What comes back counts only as far as its face is open when it comes, and is
- * then built as if it had been found here: emitted, shared with the others, its
- * faces toggled.  So each tetrahedron is still toggled once everywhere,
- * whatever has been built from elsewhere while the run was out, and nobody but
- * the lender and the borrower knows of a loan.
+ * A returned tetrahedron counts only if its face is open when it arrives.  The
+ * lender then builds it like one of its own: it emits it, sends it to the other
+ * owners, and toggles its faces.  So each tetrahedron is still toggled once at
+ * each front, whatever other fronts have built while the run was out.  Only the
+ * lender and the borrower know of a loan.
  *
- * A run is taken from the far end of the order of work: the lowest vertices of
- * the lowest bricks.  There is less of it that work here will come to next.
- * Only what is at hand is lent: nothing that is spilled, on its way back, or of
- * a hub.
+ * A run is taken from the far end of the order of work, which the lender would
+ * reach last: the lowest vertices of the lowest bricks.  Faces that are
+ * spilled, on their way back, or of a hub are not lent.
  *
- * Memory: struct incode_loan, 780 bytes, and struct incode_found, 1,028, which
- * also travel, as far as they are in use.  Work: to lend, a look at 64 bricks
- * and at the faces of 4 vertices; to use, four toggles a tetrahedron. */
+ * Memory: struct incode_loan, 780 bytes, and struct incode_found, 1,028, of
+ * which the used parts also travel.  Work: to lend, 64 bricks and the faces of
+ * 4 vertices are read; to use, four toggles for each tetrahedron. */
 
 enum {
     INCODE_LOAN_VERTICES = 4, /* of a loan, at most */
     INCODE_LOAN_FACES = 64,   /* that it has, and that are found, at most */
-    INCODE_LOAN_LEAST = 8,    /* ready vertices: who has fewer lends none */
-    INCODE_LOAN_SHARE = 4     /* of those that are ready one is lent */
+    INCODE_LOAN_LEAST = 8,    /* ready vertices of a front that lends */
+    INCODE_LOAN_SHARE = 4     /* one of so many ready vertices is lent */
 };
 
 struct incode_loan {
@@ -102,22 +105,22 @@ static inline size_t incode_found_bytes(const struct incode_found *found) {
     return offsetof(struct incode_found, v) + found->count * sizeof found->v[0];
 }
 
-/* Lends a run; false: there is too little to do.  Each loan is to be returned,
+/* Lends a run; false: too few vertices are ready.  Each loan is to be returned,
  * unless another job begins before. */
 bool incode_front_lend_run(struct incode_front *front,
                            struct incode_loan *loan);
 
-/* Whether what was found can have been, among so many bricks. */
+/* Whether the content of found is possible in a set of `bricks` bricks. */
 bool incode_found_is_sound(const struct incode_found *found, uint32_t bricks);
 
-/* Builds found->v[from] and up, `most` of them at most, as far as their faces
- * are open: the front has room for that (incode_front_turn, emit_room).  How
- * many it has looked at. */
+/* Builds up to `most` tetrahedra, found->v[from] and those after it, if their
+ * faces are open.  The front must have room (incode_front_turn, emit_room).
+ * Returns how many it has tested. */
 uint32_t incode_front_use_found(struct incode_front *front,
                                 const struct incode_found *found, uint32_t from,
                                 uint32_t most);
 
-/* The loan is over: its vertices are worked on here again. */
+/* The loan is over: the front works at its vertices again. */
 void incode_front_return(struct incode_front *front,
                          const struct incode_loan *loan);
 
@@ -133,21 +136,22 @@ void incode_front_exchange(struct incode_front *front,
                            const struct incode_front_peers *peers,
                            const double lo[3], uint64_t *maps);
 
-/* Whether so many tetrahedra may come now, INCODE_TAKEN_MAX at most: what they
- * may spill has room.  False: not before there is room outside. */
+/* Whether incode_front_take may be called `count` times now, at most
+ * INCODE_TAKEN_MAX: there is room for the faces that it may spill.  False:
+ * there must be room outside first. */
 bool incode_front_may_take(struct incode_front *front, uint32_t count);
 
-/* A tetrahedron that another front has built, of positive orientation, with an
- * own vertex; v[3] = INCODE_NONE: a facet of the hull, as it was open.  0; -1:
- * it is none that can come.  Where it might not come, or the list is full,
- * front->fault says so. */
+/* Takes a tetrahedron of positive orientation, with an own vertex, that another
+ * front has built. v[3] = INCODE_NONE: a facet of the hull, as it was open.
+ * Returns 0, or -1 if no front can send it. front->fault is set if it should
+ * not have been sent, or if the list is full. */
 int incode_front_take(struct incode_front *front, const uint32_t v[4]);
 
-/* All fronts are quiet, and nothing is under way: first tetrahedra are to be
- * tried where there are none. */
+/* All fronts are quiet, and no tetrahedron is under way: the front tries first
+ * tetrahedra at vertices that have none. */
 void incode_front_seed_all(struct incode_front *front);
 
-/* Whether there is nothing to do until a tetrahedron comes. */
+/* Whether there is no work until a tetrahedron arrives. */
 static inline bool incode_front_is_quiet(const struct incode_front *front) {
     return front->finished || front->exchange.quiet;
 }
@@ -175,11 +179,11 @@ enum incode_turn incode_front_begin(struct incode_front *front, uint32_t v,
 /* Whether there is room for a star (front.c). */
 bool incode_front_has_room(const struct incode_front *front);
 
-/* Asks for the next spilled brick, if there is one and room for it (order.c).
+/* Requests the next spilled brick, if there is one and room for it (order.c).
  */
 bool incode_front_fetch(struct incode_front *front);
 
-/* Whether a face, or a tetrahedron, is another's to build. */
+/* Whether another front owns the lowest vertex of a face or tetrahedron. */
 static inline bool incode_exchange_is_foreign(const struct incode_front *front,
                                               const uint32_t *v,
                                               unsigned count) {
@@ -224,8 +228,8 @@ uint64_t incode_exchange_pending(const struct incode_front *front,
 /* A brick that was spilled is whole again. */
 void incode_exchange_returned(struct incode_front *front, uint32_t brick);
 
-/* A tetrahedron or facet of the hull was built; shared: others have a vertex of
- * it, and are told. */
+/* A tetrahedron or facet of the hull was built; shared: it is sent to other
+ * fronts, which own a vertex of it. */
 static inline void incode_exchange_share(struct incode_front *front,
                                          const uint32_t v[4], bool shared) {
     struct incode_exchange *e = &front->exchange;

@@ -1,28 +1,28 @@
 /* The front: which faces are open, in which order vertices are closed, and
- * which tetrahedra are kept.  It holds the active face list, spills what does
- * not fit, and asks for apexes; who answers, from what points, it does not
- * know.
+ * which tetrahedra are kept.  It holds the active face list, spills faces that
+ * do not fit, and asks for apexes.  It does not know how, or from which points,
+ * the apexes are found.
  *
  * Memory: struct incode_front, about 19 KB, and the share of an arena that
  * incode_front_bytes states, for the active face list.
  *
- * Work: a face put into or taken out of a list costs a look at the faces of one
- * vertex, and of those that share its hash.  incode_front_start clears the
- * list: all its hash heads and entries of bricks.  incode_front_next, once the
- * own bricks are passed or the job ends, and incode_front_room, which
- * incode_front_turn calls, where it decides what to spill or looks for what is
- * to go, may look at every entry of a brick; the latter empties the lists of at
- * most one brick, as far as there is room outside.  incode_front_drain moves
- * 128 faces at most, incode_front_unspill those that it is given, and a star
- * has INCODE_STAR_FACES faces and builds INCODE_STAR_BUILT tetrahedra at most.
- * All else is constant, but for a look at the tasks or hubs, 16 and 32.
+ * Work.  To put a face into a list, or to take it out, the faces of one vertex,
+ * and of vertices with the same hash, are read. incode_front_start clears all
+ * hash heads and entries of bricks. incode_front_next, after the own bricks or
+ * at the end of the job, may read every entry of a brick.  So may
+ * incode_front_room, which incode_front_turn calls, when it decides what to
+ * spill; it empties the lists of at most one brick, as far as there is room
+ * outside. incode_front_drain moves at most 128 faces, incode_front_unspill
+ * those that it is given.  A star has at most INCODE_STAR_FACES faces and
+ * builds at most INCODE_STAR_BUILT tetrahedra.  Everything else is constant, or
+ * reads the 16 tasks or the 32 hubs.
  *
- * A task is a vertex that is worked on; it may be suspended and resumed.  It
- * runs between incode_front_run and incode_front_done or _suspend.  In it,
- * either the whole star is opened (incode_star_open), its faces are taken one
- * by one (_take), the answer to each is built (_build), and what has none yet
- * is put back (_put, _shut); or one face is looked at (incode_front_face), and
- * its answer is used some time later, if the face is still open
+ * A task is the work at one vertex; it may be suspended and resumed.  It runs
+ * between incode_front_run and incode_front_done or _suspend.  There are two
+ * kinds of tasks.  One opens the whole star (incode_star_open), takes its faces
+ * one by one (_take), builds the tetrahedron of each (_build), and puts faces
+ * without an answer back (_put, _shut).  The other copies one face
+ * (incode_front_face) and uses its answer later, if the face is still open
  * (incode_front_use). */
 #ifndef INCODE_FRONT_H
 #define INCODE_FRONT_H
@@ -57,8 +57,8 @@ struct incode_task {
     bool seed;     /* no tetrahedron has v: a first one is wanted */
 };
 
-/* A face (v, b, c) of the star at v.  hint: what the answerer has noted of b
- * and c, or INCODE_HINT_NONE. */
+/* A face (v, b, c) of the star at v.  hint: the maker's notes on b and c, or
+ * INCODE_HINT_NONE. */
 struct incode_star_face {
     uint32_t b, c;
     uint16_t hint[2];
@@ -84,12 +84,12 @@ struct incode_front_counts {
     uint64_t faults;   /* suspensions for what was not there */
     uint64_t foreign;  /* tetrahedra found, and left to their owner */
     uint64_t taken;    /* that came of others */
-    uint64_t lent;     /* vertices, to others: loan.h */
+    uint64_t lent;     /* vertices, to other fronts: exchange.h */
     uint64_t late;     /* tetrahedra found there, whose faces were closed */
 };
 
-/* What a front needs where several share one list: exchange.h.  Maps have a bit
- * a position of an own brick. */
+/* The state of a front that shares its list with others: exchange.h.  A map has
+ * a bit for each position of an own brick. */
 struct incode_exchange {
     bool on;
     struct incode_front_peers peers;
@@ -107,7 +107,7 @@ struct incode_exchange {
     bool quiet;          /* nothing to do until something comes */
     uint32_t fetched;    /* bricks, since something came or was built */
     uint32_t left;       /* own bricks that are not committed */
-    uint32_t lent;       /* loans that are out: loan.h */
+    uint32_t lent;       /* loans that are out: exchange.h */
     uint32_t last_count; /* points of the last own brick; 0: not known yet */
     /* First tetrahedra: tries at the start, then brick by brick. */
     uint32_t tries;
@@ -160,7 +160,7 @@ struct incode_front {
 
 /* ---- memory ---- */
 
-/* What a front is given beside its struct. */
+/* The memory of a front beside its struct. */
 struct incode_front_share {
     uint32_t faces;   /* open at a time, INCODE_FACES_MIN at least */
     uint32_t entries; /* bricks touched at a time, INCODE_ENTRIES_MIN at least,
@@ -176,15 +176,16 @@ static inline uint32_t incode_front_entries(uint32_t bricks) {
 size_t incode_front_bytes(const struct incode_front_share *share);
 
 /* memory: aligned to 64 bytes, incode_front_bytes of the share.  bricks: of the
- * whole set, 1 at least.  yield: told of what takes long, or NULL; it stays. */
+ * whole set, 1 at least.  yield: called during long work, or NULL; it must
+ * outlive the front. */
 void incode_front_init(struct incode_front *front, void *memory,
                        const struct incode_front_share *share, uint32_t bricks,
                        enum incode_face_rule rule,
                        const struct incode_front_outside *outside,
                        struct incode_yield *yield);
 
-/* Abandons the job at work, its fault and what it waits for, if there is one.
- */
+/* Abandons the current job, its fault and its outstanding requests, if there
+ * are any. */
 void incode_front_abandon(struct incode_front *front);
 
 /* Moves to other memory, of another share: counts stay.  No job may be at work.
@@ -203,8 +204,8 @@ void incode_front_take_over(struct incode_front *front,
                             const struct incode_job *job,
                             const uint64_t *passed);
 
-/* Spilled toggles of the brick that was asked for come back; -1: it was not, or
- * what came is no face of it. */
+/* Delivers spilled toggles of the requested brick. -1: the brick was not
+ * requested, or a face is not of it. */
 int incode_front_unspill(struct incode_front *front, uint32_t brick,
                          const struct incode_face *faces, size_t count,
                          bool last);
@@ -213,8 +214,8 @@ int incode_front_unspill(struct incode_front *front, uint32_t brick,
 
 enum incode_turn {
     INCODE_TURN_WORKED, /* something was done: take a turn again */
-    INCODE_TURN_WAIT,   /* nothing to do until an answer, a spilled list or
-                           room outside comes */
+    INCODE_TURN_WAIT,   /* no work until an answer or a spilled list comes, or
+                           there is room outside */
     INCODE_TURN_RESUME, /* task *task may go on */
     INCODE_TURN_NEXT,   /* none may: ask incode_front_next */
     INCODE_TURN_TASK,   /* task *task is new */
@@ -237,23 +238,23 @@ enum incode_turn incode_front_next(struct incode_front *front, uint32_t *which);
 enum incode_turn incode_front_count(struct incode_front *front, uint32_t count,
                                     uint32_t *which);
 
-/* Lends up to `most` faces, those of the vertices that are next: they are held,
- * and stay open until incode_front_use has their answers, or others close them.
- * Those that are moved or spilled meanwhile are lent again.  How many. */
+/* Lends up to `most` faces of the next vertices, and returns how many.  They
+ * are held, and stay open until incode_front_use gets their answers, or other
+ * tetrahedra close them.  Faces that are moved or spilled meanwhile are lent
+ * again. */
 uint32_t incode_front_lend(struct incode_front *front, uint32_t (*faces)[3],
                            uint32_t most);
 
-/* A task runs: sets how many tetrahedra it may build, `most` at most, 1 at
- * least. */
+/* A task runs.  It may build at most `most` tetrahedra, at least 1. */
 void incode_front_run(struct incode_front *front, uint32_t most);
 
-/* It is suspended, for an answer that is not there (fault) or of its own
- * accord.  advanced: the search of its answer got on, so that it needs no room
- * to itself. */
+/* A task is suspended: for an answer that needs a missing page (fault), or by
+ * choice. advanced: its search made progress, so the task need not run alone.
+ */
 void incode_front_suspend(struct incode_front *front, unsigned task, bool fault,
                           bool advanced);
 
-/* It is over. */
+/* A task is over. */
 void incode_front_done(struct incode_front *front, unsigned task);
 
 /* The vertex that a task works on. */
@@ -262,7 +263,8 @@ static inline uint32_t incode_front_vertex(const struct incode_front *front,
     return front->task[task].v;
 }
 
-/* Whether it wants a first tetrahedron, as none has its vertex. */
+/* Whether a task searches a first tetrahedron, because no tetrahedron has its
+ * vertex. */
 static inline bool incode_front_is_seed(const struct incode_front *front,
                                         unsigned task) {
     return front->task[task].seed;
@@ -355,26 +357,26 @@ void incode_front_toggle(struct incode_front *front, const uint32_t v[3],
 void incode_front_reached(struct incode_front *front, uint32_t v);
 /* Whether one has. */
 bool incode_front_is_reached(const struct incode_front *front, uint32_t v);
-/* Makes room for one star, spilling what comes last; false: the caller waits,
- * or, with front->fault set, is broken. */
+/* Makes room for one star, and spills the last faces in the order of work.
+ * False: the caller must wait or, if front->fault is set, stop. */
 bool incode_front_room(struct incode_front *front);
-/* Sends what waits in the spill buffer; false: no room for it outside. */
+/* Sends the spill buffer; false: there is no room for it outside. */
 bool incode_front_flush(struct incode_front *front);
-/* Where a vertex has too many open faces, makes it a hub and moves some of them
- * to its neighbours' lists, so that the front at it stays as short as the work
- * around it; nothing else may run before all are moved.  False: there is
- * nothing to do.  Needs the room of a star. */
+/* Makes a vertex with too many open faces a hub, and moves some of them to its
+ * neighbours' lists, so that its list stays as short as the work around it.
+ * Nothing else may run before all are moved.  False: there is nothing to do.
+ * Needs room for a star. */
 bool incode_front_drain(struct incode_front *front);
 /* Whether a vertex of the brick is a hub. */
 bool incode_front_has_hub(const struct incode_front *front, uint32_t brick);
 
-/* ---- stars (star.c) ---- */
+/* ---- stars ---- */
 
 /* Takes the open faces of a vertex out of the list; false: it has none. */
 bool incode_star_open(struct incode_front *front, uint32_t v);
 
-/* Whether the star is to be put off: it is nearly full, or has built enough; or
- * none of its faces at hand is left. */
+/* Whether the star is nearly full; has no faces left; has built enough.  In
+ * each case the task ends or is suspended. */
 static inline bool incode_star_is_full(const struct incode_front *front) {
     return front->star.faces > INCODE_STAR_FACES - 4;
 }
@@ -399,7 +401,7 @@ static inline bool incode_star_take(struct incode_front *front,
     return true;
 }
 
-/* Puts one that has no answer yet back. */
+/* Puts a face without an answer back. */
 void incode_star_put(struct incode_front *front,
                      const struct incode_star_face *face);
 
@@ -417,7 +419,7 @@ void incode_star_build(struct incode_front *front, const uint32_t v[4],
 /* Puts what is left of the star back and emits what it has kept. */
 void incode_star_shut(struct incode_front *front);
 
-/* ---- one face at a time (star.c) ---- */
+/* ---- one face at a time ---- */
 
 /* An open face of a vertex, which stays open; false: there is none. */
 bool incode_front_face(struct incode_front *front, uint32_t v,

@@ -1,4 +1,4 @@
-/* What a front is asked to do, and how it reaches the world. */
+/* A front's job, and its calls to its surroundings. */
 #ifndef INCODE_JOB_H
 #define INCODE_JOB_H
 
@@ -28,14 +28,15 @@ struct incode_front_outside {
     /* Tetrahedra (vertex, apexes[i][0..2]), each of positive orientation. */
     void (*emit)(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
                  size_t count);
-    /* Brick committed: all tetrahedra whose owner (owner.h) lies in it have
-     * been emitted before this call. */
+    /* A brick is committed: all tetrahedra whose owner (incode_owner) lies in
+     * it have been emitted before this call. */
     void (*commit)(void *context, uint32_t brick);
     /* Spilled toggles, to be kept in order with their brick (= v[0] / 64);
      * v[1] = INCODE_NONE: vertex v[0] was reached.  False: no room now. */
     bool (*spill)(void *context, const struct incode_face *faces, size_t count);
-    /* Asks for a brick's spilled toggles; they come by incode_front_unspill,
-     * the last call with `last` set. */
+    /* Requests a brick's spilled toggles.  They arrive by calls of
+     * incode_front_unspill, the last of them with `last` set.  False: not now.
+     */
     bool (*unspill)(void *context, uint32_t brick);
 };
 
@@ -51,18 +52,18 @@ struct incode_front_peers {
     void (*share)(void *context, const uint32_t v[4]);
 };
 
-/* Whose a tetrahedron is: that of the brick of one of its vertices, the
- * lexicographically smallest one, or the one of the lowest number.  A function
- * of the tetrahedron alone, so that of all who build it one keeps it, and host
- * and nodes agree on which. */
+/* The owner of a tetrahedron is one of its vertices: the lexicographically
+ * smallest, or the one with the lowest number.  The tetrahedron belongs to the
+ * owner's brick.  The owner depends on the tetrahedron alone.  So of all nodes
+ * that build it one keeps it, and host and nodes agree which. */
 
 enum incode_owner_rule {
     INCODE_OWNER_SMALLEST, /* the paper's: the upper left frontmost */
-    INCODE_OWNER_LOWEST    /* of number: coordinates do not count */
+    INCODE_OWNER_LOWEST    /* the lowest number */
 };
 
-/* Which of four points is the smallest: by x alone, as a rule, and without a
- * branch, as nothing foretells which it is. */
+/* The index of the smallest of four points.  As a rule x decides, without a
+ * branch, because the result is not predictable. */
 static inline unsigned incode_smallest(const double *const p[4]) {
     unsigned least = 0;
     double x = p[0][0];
@@ -84,7 +85,8 @@ static inline unsigned incode_lowest(const uint32_t *v, unsigned count) {
     return least;
 }
 
-/* Which of a tetrahedron's vertices v, at p[0] to p[3], has it: 0 to 3. */
+/* The index of the owner among a tetrahedron's vertices v, at p[0] to p[3]: 0
+ * to 3. */
 static inline unsigned incode_owner(enum incode_owner_rule rule,
                                     const uint32_t v[4],
                                     const double *const p[4]) {

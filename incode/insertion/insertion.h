@@ -1,17 +1,17 @@
-/* The tetrahedra of own bricks from a Delaunay triangulation grown point by
- * point (incode/complex): no face has to be searched, and what is flat,
- * stretched or nearly degenerate costs little more than what is not.
+/* Builds the tetrahedra of own bricks by a Delaunay triangulation that grows
+ * point by point (incode/complex).  No apex has to be searched, and flat,
+ * stretched or nearly degenerate sets cost little more than others.
  *
- * Where all points fit, they are inserted at once.  Otherwise brick after
- * brick; when memory runs short, cells whose spheres hold no point that is
- * still to come are final: they are emitted and released (Isenburg, Liu,
+ * If all points fit, they are inserted at once.  Otherwise they are inserted
+ * brick after brick.  When memory runs short, cells whose spheres hold no point
+ * of bricks to come are final: they are emitted and released (Isenburg, Liu,
  * Shewchuk, Snoeyink, Streaming computation of Delaunay triangulations, ACM
  * Transactions on Graphics 25, 2006).  A brick is committed when all cells at
- * its points are.  Of others' bricks, the points that have to do with own ones
- * are inserted last.
+ * its points are emitted.  Points of other nodes' bricks that lie in spheres of
+ * own cells are inserted last.
  *
- * Memory: struct incode_insertion, about 2 KB, and a block given by its
- * owner: 34 KB, two bits a brick, the complex the rest. */
+ * Memory: struct incode_insertion, about 2 KB, and a block given by its owner:
+ * 34 KB, two bits a brick, the complex the rest. */
 #ifndef INCODE_INSERTION_H
 #define INCODE_INSERTION_H
 
@@ -23,20 +23,21 @@
 #include "incode/front/job.h"
 #include "incode/front/front.h"
 
-/* The sphere of a cell, or the half-space beyond the facet of an infinite one,
- * to tell it from boxes of points: what is told apart holds none of them, up to
- * every rounding; what is not may.
+/* The sphere of a cell, or the half-space beyond the facet of an infinite cell,
+ * to be tested against boxes of points.  A region that does not meet a box
+ * holds none of its points, with all rounding errors included.  A region that
+ * meets it may.
  *
  * Memory: struct incode_region, 112 bytes. */
 
-/* |p - o|^2 - X (p - o) < 0, or X (p - o) > 0, but for the errors of X. */
+/* |p - o|^2 - X (p - o) < 0, or X (p - o) > 0, up to the errors of X. */
 struct incode_region {
     double o[3], x[3], error[3];
     double centre[3], square; /* of a ball that holds the sphere */
     bool infinite;
 };
 
-/* As the cell keeps it; false: nothing is known. */
+/* From the sphere that the cell keeps; false: it keeps none. */
 bool incode_region_set(struct incode_region *r, const struct incode_complex *x,
                        const struct incode_cell *c);
 
@@ -85,11 +86,11 @@ uint64_t incode_regions_meeting_lifted(const struct incode_regions *regions,
 uint64_t incode_regions_points(const struct incode_regions *regions, unsigned i,
                                const struct incode_brick *brick);
 
-/* A close look at cells: which bricks to come may hold a point of their
- * spheres, as far as all boxes tell, the lifted ones, too.
+/* A look tests some cells against the boxes of all bricks to come, the lifted
+ * boxes too: which of these bricks may hold a point of a cell's sphere.
  *
- * Some cells at a time go down the tree together, so that a page is wanted once
- * for all of them, and each box is unpacked once.
+ * Several cells go down the tree together, so a page is requested once for all
+ * of them, and each box is unpacked once.
  *
  * Memory: struct incode_look, about 8 KB, and bits of its owner's; stack for
  * the levels of boxes.  Work: some pages a call, 32 boxes of each for each of
@@ -100,7 +101,7 @@ enum { INCODE_LOOK_CELLS = INCODE_REGIONS };
 struct incode_look {
     struct incode_maker *maker;
     double scale; /* 2^k, of relative coordinates */
-    /* A bit a brick: not to be looked at; reached, now or before. */
+    /* A bit for each brick: to be passed over; reached, now or before. */
     const uint64_t *passed;
     uint64_t *wanted;
     /* A word a brick, a bit a point: those of a brick that is wanted which a
@@ -121,9 +122,9 @@ struct incode_look {
 void incode_look_init(struct incode_look *look, struct incode_maker *maker,
                       const uint64_t *passed, uint64_t *wanted);
 
-/* No cells yet; bricks [first, last) are passed.  every: all bricks that a cell
- * may reach become wanted, but which cells do is not told; else one of them,
- * for each cell that does. */
+/* Begins without cells; bricks [first, last) are passed over. every: all bricks
+ * that a cell may reach become wanted, and the cells are not reported.
+ * Otherwise one such brick becomes wanted for each cell that may reach any. */
 void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
                        uint32_t last);
 
@@ -134,7 +135,7 @@ static inline bool incode_look_is_full(const struct incode_look *look) {
 void incode_look_add(struct incode_look *look, const struct incode_complex *x,
                      uint32_t cell);
 
-/* Looks at some pages. */
+/* Tests some pages. */
 enum incode_step incode_look_go(struct incode_look *look);
 
 /* Whether cell i of those added may reach a brick. */
@@ -269,10 +270,10 @@ struct incode_insertion_work {
     };
 };
 
-/* Bytes that the triangulation of so many points takes, as a rule, beside two
- * bits a brick.  If not all points are inserted at once, one or two words a
- * brick are added, unless they are more than one part in INCODE_INSERTION_KNOWN
- * of the memory. */
+/* Bytes that the triangulation of so many points usually takes, beside two bits
+ * a brick.  If not all points are inserted at once, one or two words a brick
+ * are added, unless they are more than one part in INCODE_INSERTION_KNOWN of
+ * the memory. */
 size_t incode_insertion_bytes(uint64_t points);
 
 void incode_insertion_init(struct incode_insertion *n,
@@ -294,9 +295,9 @@ incode_insertion_has_committed(const struct incode_insertion *n,
 
 enum incode_step incode_insertion_step(struct incode_insertion *n);
 
-/* The stages of an insertion, for the files of this room alone: insertion.c
- * takes points in, rest.c says what boxes tell of points to come,
- * finality.c which cells are final, region.c emits and releases them. */
+/* The stages of an insertion, for the files of this room only. insertion.c
+ * inserts points. rest.c tests boxes of bricks to come. finality.c finds the
+ * cells that are final. region.c emits and releases them. */
 
 enum {
     INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */
@@ -326,7 +327,8 @@ static inline void incode_insertion_set_bit(uint64_t *bits, uint32_t i) {
     bits[i / 64] |= UINT64_C(1) << i % 64;
 }
 
-/* A point has become a vertex before its turn, or is another's. */
+/* Records a point that was inserted before its turn, or belongs to another
+ * node. */
 static inline void incode_insertion_note(const struct incode_insertion *n,
                                          uint32_t id) {
     if (n->inserted != NULL)
@@ -334,7 +336,7 @@ static inline void incode_insertion_note(const struct incode_insertion *n,
                                                  << id % INCODE_BRICK_POINTS;
 }
 
-/* Whether it has, as far as that is known. */
+/* Whether a point was recorded in this way, if there is memory for records. */
 static inline bool incode_insertion_has_noted(const struct incode_insertion *n,
                                               uint32_t id) {
     return n->inserted != NULL &&
@@ -342,15 +344,15 @@ static inline bool incode_insertion_has_noted(const struct incode_insertion *n,
             1) != 0;
 }
 
-/* Whether the own bricks are all there are. */
+/* Whether the own bricks are all bricks of the set. */
 static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
     return n->own_last - n->own_first == n->maker->tree.bricks;
 }
 
-/* What an insertion leaves to the front when it does not fit any more: the
- * faces between released tetrahedra and what is not final, which are open, and
- * which vertices have been reached.  All goes out as spilled toggles, so that
- * the front begins with nothing in memory and has each brick's brought back in
+/* The fall back to faces, when an insertion does not fit any more.  The faces
+ * between released tetrahedra and cells that are not yet final are open.  They
+ * and the reached vertices are sent to the host as spilled toggles.  So the
+ * front begins with an empty list, and the toggles of each brick come back in
  * its turn. */
 
 struct incode_fallback {
@@ -365,8 +367,8 @@ struct incode_fallback {
 void incode_fallback_begin(struct incode_fallback *h,
                            struct incode_insertion *n);
 
-/* front: idle, with the rule and the bricks of the job, which is its next one.
- * INCODE_FINISHED: all has gone out. */
+/* front: idle, with the rule and the bricks of the job, which is its next job.
+ * INCODE_FINISHED: everything has been sent. */
 enum incode_step incode_fallback_step(struct incode_fallback *h,
                                       struct incode_front *front);
 

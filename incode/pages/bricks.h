@@ -2,8 +2,8 @@
  *
  *   vertex = 64 * brick + slot
  *
- * Every brick is full but the last of each region.  Who has no page of points
- * still knows what lies together. */
+ * Every brick except the last of each region is full.  So vertex numbers tell
+ * which points lie together, also without a page of points. */
 #ifndef INCODE_BRICKS_H
 #define INCODE_BRICKS_H
 

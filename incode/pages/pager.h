@@ -1,14 +1,15 @@
 /* Pages in fixed frames, replaced least recently used first.  A frame is
- * reserved before its page is asked for, so that a reply always has room.
+ * reserved before its page is requested, so a reply always has room.
  *
- * Memory: incode_pager_bytes(frames), 1,600 and 16 a frame.  Work: constant
- * for a page that is there; where one is replaced, a look at the times of use
- * of one group of frames in 32, and of some groups as a rule; for a box of
- * points, these.
+ * Memory: incode_pager_bytes(frames), 1,600 and 16 a frame.  Work: constant for
+ * a resident page.  To replace a page, the pager reads the times of use of one
+ * group of frames in 32, and as a rule of the frames of some groups; for a box
+ * of points, these points.
  *
- * A frame stays as it is until a page is asked for that is not there.  So one
- * may be held across a walk, which returns at the first such page; not across
- * one that looks ahead, which passes them over. */
+ * A frame keeps its page until a page is requested that is not resident.  So a
+ * caller may hold a frame across a walk, which returns at the first missing
+ * page, but not across a walk that looks ahead and passes missing pages over.
+ */
 #ifndef INCODE_PAGER_H
 #define INCODE_PAGER_H
 
@@ -37,7 +38,7 @@ struct incode_frame {
 static_assert(sizeof(struct incode_frame) == 1600,
               "a frame holds its page and little else");
 
-/* What the pager looks at to find a frame, close together. */
+/* What the pager reads to find a frame, close together. */
 struct incode_slot {
     uint32_t number;
     uint16_t chain; /* next frame of the same hash */
@@ -62,8 +63,8 @@ double incode_frame_box(const struct incode_frame *f, double lo[3],
 /* Where pages come from. */
 struct incode_page_source {
     void *context;
-    /* Asks for a page; the frame is reserved.  False: no credit now, it is
-     * asked for again later. */
+    /* Requests a page whose frame is reserved.  False: there is no credit now;
+     * the pager requests it again later. */
     bool (*request)(void *context, uint32_t page);
 };
 
@@ -95,24 +96,24 @@ void incode_pager_init(struct incode_pager *pager, void *memory,
                        uint32_t frames, uint32_t bricks,
                        struct incode_yield *yield);
 
-/* The frame of a page that is ready, now the most recently used; NULL: it is
- * not, and is asked for as far as credit and frames allow. */
+/* The frame of a page that is ready, now the most recently used.  NULL: the
+ * page is not ready, and is requested as far as credit and frames allow. */
 struct incode_frame *incode_pager_get(struct incode_pager *pager,
                                       uint32_t page);
 
 /* Whether the page is on its way. */
 bool incode_pager_loading(const struct incode_pager *pager, uint32_t page);
 
-/* A page that is on its way; INCODE_NONE: there is none.  A pass over the
+/* A page that is on its way; INCODE_NONE: there is none.  Work: a pass over the
  * frames. */
 uint32_t incode_pager_awaited(const struct incode_pager *pager);
 
-/* 0, or -1 where the page was not asked for or the size is wrong. */
+/* 0, or -1 if the page was not requested or its size is wrong. */
 int incode_pager_deliver(struct incode_pager *pager, uint32_t page,
                          const void *data, size_t bytes);
 
-/* A page that comes unasked: taken where it is on its way, or where a frame was
- * never used.  0, or -1 where its size is wrong. */
+/* A page that was not requested: kept if it is on its way, or if a frame was
+ * never used.  0, or -1 if its size is wrong. */
 int incode_pager_put(struct incode_pager *pager, uint32_t page,
                      const void *data, size_t bytes);
 
@@ -121,9 +122,9 @@ static inline bool incode_pager_has_free(const struct incode_pager *pager) {
     return pager->free < pager->frame_count;
 }
 
-/* Whether a page is ready, and then, if it is one of points or boxes, its bytes
- * as they came: at most INCODE_PAGE_BYTES; 0: it is not.  No use of it that
- * counts. */
+/* _has: whether a page is ready. _copy: copies a page of points or boxes that
+ * is ready as it arrived, and returns its bytes, at most INCODE_PAGE_BYTES; 0:
+ * it is not ready, or of another kind.  Neither counts as a use. */
 bool incode_pager_has(const struct incode_pager *pager, uint32_t page);
 size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
                          void *data);
@@ -131,8 +132,8 @@ size_t incode_pager_copy(const struct incode_pager *pager, uint32_t page,
 /* The label of a page that has a frame, 0 at first; NULL: it has none. */
 uint64_t *incode_pager_label(const struct incode_pager *pager, uint32_t page);
 
-/* Makes one page that the shuffle keeps back ready, by chance one call in four
- * or, if `now`, at once; false: none was. */
+/* Makes one page ready that the shuffle keeps back: in one call of four at
+ * random or, if `now`, at once.  False: none was made ready. */
 bool incode_pager_release(struct incode_pager *pager, bool now);
 
 /* The uniform grid of the paper, index `grid`: cells over the tight box of all
@@ -164,7 +165,7 @@ double incode_cells_lowest(const struct incode_grid *g, int d, uint32_t cell);
 double incode_cells_highest(const struct incode_grid *g, int d, uint32_t cell);
 
 /* Word i of the list whose pages begin at `base`; false: page *missing is.
- * Beyond the end of a list, where who made it erred, it is 0. */
+ * Beyond the end of a list, which only a faulty list asks for, it is 0. */
 bool incode_cells_word(const struct incode_grid *g, uint32_t base, uint32_t i,
                        uint32_t *word, uint32_t *missing);
 

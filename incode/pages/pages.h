@@ -1,10 +1,11 @@
 /* The points of a run as pages: bricks of 64 points in spatial order, and a
- * tree of boxes over them, 32 children a page.  They are 1,536 and 1,568 bytes,
- * so one pager serves both and the number of points has no bound but 2^32.
+ * tree of boxes over them, 32 children a page.  Pages have 1,536 and 1,568
+ * bytes, so one pager serves both, and the only bound on the number of points
+ * is 2^32.
  *
- * Level 0 pages are bricks; page i of level k+1 holds the boxes of the
- * children [32 i, 32 i + 32) of level k.  The root is the one page of the
- * highest level, which is at least 1.
+ * Level 0 pages are bricks; page i of level k+1 holds the boxes of the children
+ * [32 i, 32 i + 32) of level k.  The root is the one page of the highest level,
+ * which is at least 1.
  *
  * Memory: struct incode_tree; a page is 1,568 bytes at most.  Work: constant,
  * as there are 8 levels at most. */
@@ -118,8 +119,8 @@ enum {
  * lists have pages of their own, or by the tree. */
 enum incode_index { INCODE_NAIVE, INCODE_GRID, INCODE_KD };
 
-/* Why a page that has come is not taken: nobody has asked for it, or it cannot
- * be the one of that number (sound.h). */
+/* Why an arrived page is dropped: it was not requested, or it cannot be the
+ * page of that number (incode_page_is_sound). */
 enum { INCODE_PAGE_UNASKED = -1, INCODE_PAGE_UNSOUND = -2 };
 
 /* A brick: coordinates of slots [0, count); the rest repeats the last point. */
@@ -162,19 +163,19 @@ struct incode_tree {
 void incode_tree_init(struct incode_tree *tree, uint32_t bricks,
                       uint32_t cells);
 
-/* Where bricks [first, first + count), 2 or more, are cut in space: so many
- * come before the cut.  At the multiple of 32^k nearest to the middle, for the
- * largest k that leaves a fifth on either side, so that the children of a box
- * page lie together. */
+/* Where bricks [first, first + count), 2 or more, are cut in space: the number
+ * of bricks before the cut.  The cut is at the multiple of 32^k nearest to the
+ * middle, for the largest k that leaves a fifth on either side, so that the
+ * children of a box page lie together. */
 uint32_t incode_bricks_cut(uint32_t first, uint32_t count);
 
 /* Level of a page, or tree->levels for the uniform grid's pages. */
 uint32_t incode_tree_level(const struct incode_tree *tree, uint32_t page);
 
-/* Whether bytes that have arrived can be the page that they are said to be.
- * Who has checked them once need not ask again: coordinates are finite and in
- * the box of all points, boxes too, numbers in lists are those of vertices.
- * That the points are the right ones, no node can tell. */
+/* Whether bytes that have arrived can be the page of their number: coordinates
+ * are finite and in the box of all points, boxes too, and numbers in lists are
+ * vertex numbers.  Later code relies on this.  No node can tell whether the
+ * points are the right ones. */
 
 /* lo, hi: the box of all points.  data: aligned to 4 bytes. */
 bool incode_page_is_sound(const struct incode_tree *tree, const double lo[3],

@@ -1,9 +1,10 @@
-/* The tetrahedron builder: a maker alone.  It takes lists of faces, finds the
- * apex of each, and keeps the answers until they are fetched; it knows no list
- * of what is open.  A list that waits for a page lets the next one go on.
+/* The tetrahedron builder: a maker without a front.  It takes lists of faces,
+ * finds the apex of each, and keeps the answers until they are fetched.  It has
+ * no list of open faces.  While a list waits for a page, the builder works on
+ * the next one.
  *
- * Memory: struct incode_builder, about 63 KB, and what it is given: the
- * lists, with their answers, and page frames. */
+ * Memory: struct incode_builder, about 63 KB, and the caller's memory for
+ * lists, their answers and page frames. */
 #ifndef INCODE_BUILDER_H
 #define INCODE_BUILDER_H
 
@@ -21,7 +22,7 @@ struct incode_lent {
     struct incode_list list;
     struct incode_answers answers;
     uint64_t known[(INCODE_LIST_MAX + 63) / 64]; /* found on others' behalf */
-    uint64_t born;                               /* 0: the place is empty */
+    uint64_t born;                               /* 0: the slot is empty */
     uint32_t done;                               /* faces answered */
     uint32_t retries;                            /* since it got on last */
 };
@@ -38,28 +39,28 @@ struct incode_builder {
     uint64_t spent; /* units of work since init */
 };
 
-/* Bytes of memory that it does with, for so many lists. */
+/* The least bytes of memory for so many lists. */
 size_t incode_builder_min(uint32_t lists);
 
 /* memory: aligned to 64 bytes, at least incode_builder_min(lists) of it; lists:
- * at a time, 1 to INCODE_LISTS_MAX.  setup: sound.  yield: who is called while
- * a step is long. */
+ * at a time, 1 to INCODE_LISTS_MAX.  setup: sound. yield: called during long
+ * steps. */
 void incode_builder_init(struct incode_builder *b, void *memory, size_t bytes,
                          const struct incode_setup *setup, uint32_t lists,
                          const struct incode_page_source *source,
                          const struct incode_yield *yield);
 
-/* Takes a list, of which incode_list_bytes are read; false: there is no room
- * for it.  What is no list is a fault. */
+/* Takes a list, of which incode_list_bytes are read; false: there is no slot
+ * for it.  An unsound list is a fault. */
 bool incode_builder_take(struct incode_builder *b,
                          const struct incode_list *list);
 
-/* Works on, about so many units, 1 at least: INCODE_WORKED; INCODE_WAITING for
- * a list, a page, or for answers to be fetched; INCODE_BROKEN. */
+/* Works for about `units` units, at least 1.  INCODE_WORKED; INCODE_WAITING for
+ * a list, for a page, or until answers are fetched; INCODE_BROKEN. */
 enum incode_step incode_builder_step(struct incode_builder *b, uint32_t units);
 
-/* Answers that are complete, those of the oldest list first, or NULL; the same
- * until they are dropped. */
+/* Complete answers, those of the oldest list first, or NULL.  The same answers
+ * are returned until they are dropped. */
 const struct incode_answers *
 incode_builder_answers(const struct incode_builder *b);
 void incode_builder_drop(struct incode_builder *b);
@@ -70,8 +71,8 @@ uint32_t incode_builder_held(const struct incode_builder *b);
 /* NULL, or a static string: why the step is INCODE_BROKEN. */
 const char *incode_builder_fault(const struct incode_builder *b);
 
-/* Counts since init: tetrahedra are built here, once for each face that found
- * them, and kept by whoever lent the faces. */
+/* Counts since init.  Tetrahedra count as built here, once for each face that
+ * found them, and as kept at the manager that lent the faces. */
 void incode_builder_statistics(const struct incode_builder *b,
                                struct incode_statistics *s);
 

@@ -1,7 +1,7 @@
-/* Lists of faces that a face manager lends, and what a tetrahedron builder
- * answers: the paper's "list of m faces", as they travel.  There are two more
- * kinds, as a manager has no points: which first tetrahedron a vertex has, and
- * how many points there are in some bricks. */
+/* Lists of faces that a face manager lends, and a tetrahedron builder's
+ * answers: the paper's "list of m faces", as they travel.  A manager has no
+ * points, so two more kinds of lists ask for the first tetrahedron at a vertex,
+ * and for the number of points of some bricks. */
 #ifndef INCODE_LIST_H
 #define INCODE_LIST_H
 
@@ -21,7 +21,7 @@ enum incode_list_kind {
 
 struct incode_list {
     uint32_t kind, count;
-    uint32_t v[INCODE_LIST_MAX][3]; /* what a kind does not use is 0 */
+    uint32_t v[INCODE_LIST_MAX][3]; /* 0 if the kind does not use it */
 };
 
 /* As many as the list had, in its order.  FACES: the face, and its apex or

@@ -1,14 +1,13 @@
-/* The face manager: a front alone.  It lends its open faces in lists, takes the
- * answers, of whichever builder and in whatever order, and knows no point.  A
- * face that is lent stays open: if another answer closes it first, its own does
- * not count any more (the paper's replication test).  No copy of a list is
- * kept.
+/* The face manager: a front without a maker.  It lends its open faces in lists,
+ * and takes the answers of any builder in any order.  It has no points.  A lent
+ * face stays open.  If another answer closes it first, its own answer does not
+ * count (the paper's replication test).  No copy of a list is kept.
  *
- * Memory: struct incode_manager, about 21 KB, and what it is given, which is
- * the active face list's: as many faces as fit, and what does not is spilled.
- * Work: a step uses 32 answers at most, or passes or spills a brick; lending a
- * list looks at the bricks of the window, or at all that are touched when the
- * own ones are passed. */
+ * Memory: struct incode_manager, about 21 KB, and the caller's memory for the
+ * active face list.  Faces that do not fit are spilled.  Work: a step uses at
+ * most 32 answers, or passes or spills a brick.  To lend a list, the manager
+ * reads the bricks of the window or, after the own bricks are passed, all
+ * touched bricks. */
 #ifndef INCODE_MANAGER_H
 #define INCODE_MANAGER_H
 
@@ -36,12 +35,12 @@ struct incode_manager {
     uint64_t spent; /* units of work since init */
 };
 
-/* Bytes of memory that it does with. */
+/* The least bytes of memory. */
 size_t incode_manager_min(void);
 
 /* memory: aligned to 64 bytes, at least incode_manager_min() of it.  setup:
- * sound, and of the face rule `own`, as the other one asks for points.  yield:
- * who is called while a step is long. */
+ * sound, with the face rule `own`, because the other rule needs points. yield:
+ * called during long steps. */
 void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
                          const struct incode_setup *setup,
                          const struct incode_front_outside *outside,
@@ -51,8 +50,8 @@ void incode_manager_init(struct incode_manager *m, void *memory, size_t bytes,
 void incode_manager_start(struct incode_manager *m,
                           const struct incode_job *job);
 
-/* What is to be asked next, `most` faces at most, 1 to INCODE_LIST_MAX: how
- * much is in the list; 0: nothing at present. */
+/* Makes the next list, of at most `most` faces, 1 to INCODE_LIST_MAX.  Returns
+ * the number of its entries; 0: there is nothing to ask at present. */
 uint32_t incode_manager_lend(struct incode_manager *m, uint32_t most,
                              struct incode_list *list);
 
@@ -61,16 +60,17 @@ static inline bool incode_manager_is_free(const struct incode_manager *m) {
     return m->used == m->taken.count;
 }
 
-/* Answers to a list, if it is free; incode_answers_bytes of them are read. What
- * cannot answer what is lent is a fault, at once where the kind or the number
- * tells, at the latest when no list is out and something lent has no answer. */
+/* Takes answers to a list, of which incode_answers_bytes are read.  The manager
+ * must be free.  Answers to something that was not lent are a fault: at once if
+ * their kind or number shows it, at the latest when no list is out and a lent
+ * face has no answer. */
 void incode_manager_take(struct incode_manager *m,
                          const struct incode_answers *answers);
 
-/* Works on, about so many units, an answer each, 1 at least.
- * INCODE_WAITING: nothing to do until answers come, something can be lent, a
- * spilled list comes or there is room outside; INCODE_FINISHED: no list is out
- * either. */
+/* Works for about `units` units, at least 1; an answer is a unit.
+ * INCODE_WAITING: no work until answers come, something can be lent, a spilled
+ * list comes, or there is room outside.  INCODE_FINISHED: the job is done, and
+ * no list is out. */
 enum incode_step incode_manager_step(struct incode_manager *m, uint32_t units);
 
 /* As incode_triangulator_unspill. */
@@ -81,8 +81,8 @@ int incode_manager_unspill(struct incode_manager *m, uint32_t brick,
 /* NULL, or a static string: why the step is INCODE_BROKEN. */
 const char *incode_manager_fault(const struct incode_manager *m);
 
-/* Counts of all jobs since init.  Tetrahedra are kept here, and built where
- * they are found. */
+/* Counts of all jobs since init.  Tetrahedra count as kept here, and as built
+ * at the builders. */
 void incode_manager_statistics(const struct incode_manager *m,
                                struct incode_statistics *s);
 
