@@ -1,5 +1,5 @@
-/* Numbers among the bytes of a wire, the low byte first, whatever the machine's
- * order and alignment. */
+/* Reads and writes numbers in the bytes of a wire, the low byte first, on
+ * machines of any byte order and alignment. */
 #ifndef TRANSPORT_BYTES_H
 #define TRANSPORT_BYTES_H
 

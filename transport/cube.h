@@ -1,21 +1,21 @@
-/* A hypercube of nodes wired point to point, and a host attached to node 0,
- * to that and a spare node, or to each of the first 2, 4 or 8.
- * Messages of up to CUBE_PAYLOAD_MAX bytes travel hop by hop along the e-cube
- * path (lowest differing dimension first), in order between any two ends;
- * broadcasts run along binomial trees.  Link d of a node leads to node
+/* A hypercube of nodes wired point to point, and a host.  The host is attached
+ * to node 0, to node 0 and a spare node, or to each of the first 2, 4 or 8
+ * nodes.  Messages of up to CUBE_PAYLOAD_MAX bytes travel hop by hop along the
+ * e-cube path (lowest differing dimension first), in order between any two
+ * ends; broadcasts run along binomial trees.  Link d of a node leads to node
  * self ^ (1 << d); link `dimension` of a node that has a host port, as node 0
  * has always, leads to the host.
  *
- * Generations make every loss survivable: the host begins a new one
+ * Generations make every loss survivable.  The host begins a new generation
  * (cube_renew) when something was lost, and all messages of the old one are
- * dropped wherever they are.  The generation, the host gateway (the node by
- * which the host speaks) and the dead links are gossiped from link to link; a
- * node that starts is told by its neighbours, and neither sends nor reads
- * before.
+ * dropped everywhere.  The generation, the host gateway (the node by which the
+ * host sends) and the dead links spread by gossip from link to link.  A node
+ * that starts learns them from its neighbours, and neither sends nor reads
+ * messages before.
  *
- * Memory: one arena of cube_arena_bytes(): a send and a receive window for each
- * link, nothing shared between links (Dally and Seitz, 1987: e-cube routing is
- * free of deadlock with buffers of each channel's own).  Work: cube_poll
+ * Memory: one arena of cube_arena_bytes(), with a send and a receive window for
+ * each link.  Links share no buffers (Dally and Seitz, 1987: e-cube routing is
+ * free of deadlock if each channel has its own buffers).  Work: cube_poll
  * handles at most one window of frames a link.
  *
  *     struct cube *cube = cube_init(arena, bytes, &config);
@@ -45,8 +45,8 @@ enum {
     CUBE_HOST_PORTS_MAX = 8
 };
 
-/* A link that is dead for the run, named by its lower end (its host's wire:
- * `dimension` of the cube), or a node with all its links. */
+/* A link that is dead for the run, named by its lower end (`dimension` of the
+ * cube: the wire of that node to the host), or a node with all its links. */
 struct cube_dead {
     uint16_t node;
     uint8_t dimension; /* or CUBE_WHOLE_NODE */
@@ -59,11 +59,11 @@ struct cube_wrong {
     uint8_t refusal; /* enum link_refusal */
 };
 
-/* What all ends of a cube agree on, in time. */
+/* The state on which all ends of a cube come to agree. */
 struct cube_wiring {
-    uint32_t generation; /* 1 at the start; 0: not told yet; wraps to 1 */
+    uint32_t generation; /* 1 at the start; 0: unknown so far; wraps to 1 */
     uint32_t host_epoch; /* of the host that began it */
-    uint16_t gateway;    /* the node by which the host speaks */
+    uint16_t gateway;    /* the node by which the host sends */
     uint16_t settled;    /* dead[0 .. settled) were so when it began: routes
                             avoid them; the others were found since */
     uint16_t dead_count, wrong_count;
@@ -73,10 +73,10 @@ struct cube_wiring {
     struct cube_wrong wrong[CUBE_WRONG_MAX];
 };
 
-/* cube_arena_bytes() is 0, and cube_init gives NULL, where a limit is not kept,
- * or one of struct link_config: cube_config_fault() says which.  A field that
- * has a default takes it where it is 0.  All ends of a cube are given the same
- * where it says so. */
+/* If a field, or one of struct link_config, is out of its limits,
+ * cube_arena_bytes() is 0, cube_init returns NULL, and cube_config_fault()
+ * names the field.  A field with a default takes it if it is 0.  Some fields
+ * must be the same at all ends of a cube; their comments say so. */
 struct cube_config {
     /* This node, 0 .. 2^dimension - 1; or CUBE_HOST. */
     uint16_t self;
@@ -102,15 +102,15 @@ struct cube_config {
      * leads there.  Default: none; 1 .. 2^dimension - 1, with host_ports 0. */
     uint16_t spare_node;
 
-    /* Instead of it: nodes 0 .. host_ports - 1 have host ports, pipes[i] of the
-     * host leads to node i, and what goes between the host and a node takes
-     * that node's, or that of the node with the same low bits.  The same at all
-     * ends.  Default, as for 1: node 0 alone; a power of two, up to
-     * CUBE_HOST_PORTS_MAX and 2^dimension. */
+    /* Instead of a spare node: nodes 0 .. host_ports - 1 have host ports, and
+     * pipes[i] of the host leads to node i.  Messages between the host and a
+     * node use the port of that node, or of the node with the same low bits.
+     * The same at all ends.  Default, as for 1: node 0 only; a power of two, up
+     * to CUBE_HOST_PORTS_MAX and 2^dimension. */
     uint8_t host_ports;
 
-    /* At the spare node: that it has a host port.  Default: it has none; node 0
-     * has one always. */
+    /* At the spare node: true, it has a host port.  Default: it has none; node
+     * 0 always has one. */
     bool host_port;
 
     /* At the host: the host gateway of the first generation.  Default: node 0;
@@ -126,12 +126,12 @@ struct cube_config {
     uint16_t host_window;
 
     /* Bytes of a message in a frame.  The same at both ends of a wire.
-     * Default: a message a frame; limits: see link.h.  With serial_baud 408,
-     * whatever stands here. */
+     * Default: a whole message; limits: see link.h.  Ignored with serial_baud:
+     * then 408. */
     uint16_t frame_payload;
 
-    /* Frames encoded ahead of the pipe.  Default and limits: see link.h.  With
-     * serial_baud 2, whatever stands here. */
+    /* Frames encoded ahead of the pipe.  Default and limits: see link.h.
+     * Ignored with serial_baud: then 2. */
     uint16_t staging;
 
     /* Of the slowest serial wire of the cube: cube_for_serial() sets it.  The
@@ -158,17 +158,17 @@ struct cube_statistics {
     uint64_t outdone;       /* generations of others that the host answered */
 };
 
-/* Settings for a cube with serial wires, of which the slowest has that baud
- * rate, and a window that fits them: the same on all nodes and the host.  0:
- * there are none, and nothing changes. */
+/* Settings, and a fitting window, for a cube whose slowest serial wire has that
+ * baud rate: the same on all nodes and the host.  0: there are no serial wires,
+ * and nothing changes. */
 void cube_for_serial(struct cube_config *config, uint32_t baud);
 
 /* The first field that breaks its limit, and which, as in "dimension is above
  * 10" (`window` stands for host_window too); NULL: the config is sound. */
 const char *cube_config_fault(const struct cube_config *config);
 
-/* The end to which link d of an end leads, be it a node or CUBE_HOST; of the
- * config, what says who has host ports. */
+/* The end to which link d of an end leads, a node or CUBE_HOST.  Of the config,
+ * only the fields about host ports are read. */
 struct link_end cube_peer_of(const struct cube_config *config, unsigned self,
                              unsigned d);
 
@@ -182,11 +182,11 @@ struct cube *cube_init(void *arena, size_t bytes,
  * the number of frames handled (0: nothing to do until bytes or time come). */
 int cube_poll(struct cube *cube, uint64_t now_us);
 
-/* The same for who is in the midst of something: between cube_read and
- * cube_release, or between a look at cube_room and cube_write.  It enters no
- * generation, and leaves room where there was some: neighbours' datagrams and
- * farewells wait for cube_poll, and of others' messages only those pass that
- * leave room for one of this node. */
+/* The same for a caller between cube_read and cube_release, or between
+ * cube_room and cube_write.  It enters no generation, and room for a message of
+ * this node stays: neighbours' datagrams and BYEs wait for cube_poll, and
+ * messages of other nodes are forwarded only if they leave room for one of this
+ * node. */
 int cube_tend(struct cube *cube, uint64_t now_us);
 
 /* Queues a message.  dest: a node, CUBE_HOST or CUBE_ALL (every node but the
@@ -201,13 +201,13 @@ int cube_write(struct cube *cube, uint16_t dest, uint8_t type, const void *data,
 unsigned cube_room(const struct cube *cube, uint16_t dest);
 
 /* The next message for this node, valid until cube_release; false: none.  An
- * unread message keeps its buffer, and so holds back its link alone. */
+ * unread message keeps its buffer, and so holds back its link only. */
 bool cube_read(struct cube *cube, struct cube_message *message);
 void cube_release(struct cube *cube);
 
-/* For a reader that takes some messages before others, as transport/ncube does:
- * the same from link d alone; and instead of cube_release, to leave it unread
- * so far. */
+/* For a reader that takes some messages before others. _read_from: the same
+ * from link d only. _put_back, instead of cube_release: leaves the message
+ * unread. */
 bool cube_read_from(struct cube *cube, unsigned d,
                     struct cube_message *message);
 void cube_put_back(struct cube *cube);
@@ -220,21 +220,22 @@ const struct link_peer *cube_link_peer(const struct cube *cube, unsigned d);
 unsigned cube_links(const struct cube *cube);
 const struct cube_statistics *cube_statistics(const struct cube *cube);
 
-/* What this end knows.  The generation changes in cube_poll and cube_renew
- * alone: who looks at it after them, and drops what it was about to write,
- * never sends in a generation what it decided in another. */
+/* The wiring as this end knows it.  The generation changes in cube_poll and
+ * cube_renew only.  A caller that checks it after them, and drops what it was
+ * about to write, never sends in one generation what it decided in another. */
 const struct cube_wiring *cube_wiring(const struct cube *cube);
 
 /* At the host: begins a generation with next's gateway and dead links, and
- * drops all messages of the old one here and, as it spreads, everywhere.  Its
- * number is next's where that is after the present one, else the one behind
- * this. */
+ * drops all messages of the old one, here at once and elsewhere as it spreads.
+ * Its number is next's if that is later than the present one, and otherwise the
+ * number after the present one. */
 void cube_renew(struct cube *cube, const struct cube_wiring *next);
 
-/* Whether a node can be reached, by what was dead when the generation began. */
+/* Whether a node can be reached, with the links that were dead when the
+ * generation began. */
 bool cube_reaches(const struct cube *cube, uint16_t node);
 
-/* Whether link d is dead, by all that is known. */
+/* Whether link d is dead, settled or found since. */
 bool cube_link_is_dead(const struct cube *cube, unsigned d);
 
 /* The first wrong wire as a sentence, "node 5 link 2 is wired to node 3,
@@ -242,16 +243,17 @@ bool cube_link_is_dead(const struct cube *cube, unsigned d);
 enum { CUBE_FAULT_BYTES = 80 };
 bool cube_wiring_fault(const struct cube *cube, char text[CUBE_FAULT_BYTES]);
 
-/* The same of any one, in a cube with the config's dimension and host ports. */
+/* The same text for a given wrong wire, in a cube with the config's dimension
+ * and host ports. */
 void cube_wrong_text(const struct cube_wrong *wrong,
                      const struct cube_config *config,
                      char text[CUBE_FAULT_BYTES]);
 
-/* True when the neighbours have acknowledged all that is written here and no
- * message waits to be passed on: a node may leave then. */
+/* True when the neighbours have acknowledged everything that was written here,
+ * and no message waits to be forwarded: then a node may leave. */
 bool cube_idle(const struct cube *cube);
 
-/* Says farewell on all links once they are idle, or at deadline_us. */
+/* Sends BYE on all links once they are idle, or at deadline_us. */
 void cube_close(struct cube *cube, uint64_t deadline_us);
 
 /* Microseconds until cube_poll must be called again even if no byte comes. */

@@ -1,7 +1,7 @@
-/* What the parts of a cube share: cube_config.c (what a config means), cube.c
- * (memory, messages), gossip.c (what neighbours tell each other), fault.c
- * (wrong wires in words).  Not for others, but
- * for who plays an end of a cube falsely: host/sim/stand_in.c.
+/* Shared by the files of a cube: config.c (checks and defaults), cube.c
+ * (memory, messages), gossip.c (the wiring), fault.c (wrong wires as text).
+ * For these files only, and for host/sim/stand_in.c, which plays a false end of
+ * a cube.
  *
  * Memory and work: see cube.h. */
 #ifndef TRANSPORT_CUBE_INTERNAL_H
@@ -22,7 +22,7 @@ struct cube_arrival {
     bool there;
 };
 
-/* What is known of a neighbour. */
+/* The state of a neighbour. */
 struct cube_neighbour {
     uint64_t comings;  /* times that the link came up, as of the last look */
     uint64_t told_us;  /* when it was last told our wiring */
@@ -54,7 +54,7 @@ struct cube {
     uint64_t looked_us; /* when links were looked at last */
 };
 
-/* cube_config.c: links of the config's own end, and the config of each. */
+/* config.c: links of the config's own end, and the config of each. */
 unsigned cube_links_of(const struct cube_config *config);
 struct link_config cube_link_config(const struct cube_config *config,
                                     unsigned d);
@@ -62,8 +62,8 @@ struct link_config cube_link_config(const struct cube_config *config,
 /* cube.c: the messages of the generation before go. */
 void cube_drop_all(struct cube *cube);
 
-/* gossip.c: the neighbour at link d was in our generation when it was to send
- * that frame next. */
+/* gossip.c: the neighbour at link d was in this end's generation when that
+ * frame was the next that it would send. */
 void cube_is_together(struct cube *cube, unsigned d, uint16_t sequence);
 
 /* gossip.c: a neighbour that came again may be in another generation. */

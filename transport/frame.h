@@ -1,7 +1,7 @@
 /* Frames on a pipe of bytes: a header with a check of its own, a payload and a
  * CRC-32C over both, made free of zero bytes (COBS: Cheshire and Baker, 1999)
- * and closed by a zero.  A reader finds the next frame at the next zero,
- * whatever went before, and believes no length or number that is not checked.
+ * and closed by a zero.  A receiver finds the next frame at the next zero,
+ * whatever precedes it, and uses no field before its check.
  *
  * Memory: none but a constant table of 1 KB.  Work: linear in the bytes given;
  * CRC-32C takes most of it where the processor does not compute it. */
@@ -47,14 +47,14 @@ struct frame_reader {
     uint32_t crc;
 };
 
-/* CRC-32C (Castagnoli, reflected 0x82f63b78); start with 0 and give the last
- * result to go on. */
+/* CRC-32C (Castagnoli, reflected 0x82f63b78). crc: 0 at first, then the result
+ * of the bytes before. */
 uint32_t frame_crc32c(uint32_t crc, const void *bytes, size_t size);
 
 /* The same by the table, on every machine: the reference of the tests. */
 uint32_t frame_crc32c_table(uint32_t crc, const void *bytes, size_t size);
 
-/* CRC-16/DNP (reflected 0xa6bc): finds any 5 false bits in a header. */
+/* CRC-16/DNP (reflected 0xa6bc): detects up to 5 false bits in a header. */
 uint16_t frame_crc16(const void *bytes, size_t size);
 
 /* Offset of the first zero, or size. */
@@ -70,12 +70,12 @@ enum frame_result frame_open(struct frame_reader *reader, const uint8_t *in,
                              size_t size, struct frame_header *header);
 
 /* Decodes header->size bytes of payload and checks the whole.  Unless the
- * result is FRAME_GOOD, payload holds nothing to be believed. */
+ * result is FRAME_GOOD, the content of payload has no meaning. */
 enum frame_result frame_take(struct frame_reader *reader,
                              const struct frame_header *header, void *payload);
 
-/* Both of one frame that has the bytes between two zeros to itself; true: it is
- * good, and its payload, which is at most `most` bytes. */
+/* Decodes the header and payload of one frame, the `size` bytes between two
+ * zeros.  True: the frame is good, and its payload has at most `most` bytes. */
 bool frame_decode(const uint8_t *in, size_t size, struct frame_header *header,
                   void *payload, size_t most);
 

@@ -1,11 +1,11 @@
-/* Who a node is that has neither options nor a file: it listens on its links
- * until a neighbour, or the host, greets a node that has such links there.  A
- * greeting to another is counted, and passed over.
+/* The learner: finds the number of a node that has neither options nor a file.
+ * The node waits until a neighbour, or the host, sends a HELLO to a node with
+ * these links.  A HELLO to another node is counted and skipped.
  *
- * A neighbour whose link is up does not greet, and a serial wire does not tell
- * it that this end began anew: who has such wires asks, until it knows.  Over
- * TCP without a key a question is not what a listener expects first: a pipe
- * without `send` is not asked.
+ * A neighbour whose link is up sends no HELLO, and a serial wire does not
+ * report that this end has started again.  So a node with serial wires asks
+ * until it knows its number (PROTOCOL.md).  Over TCP without a key a listener
+ * expects a HELLO first, so a pipe without `send` is not asked.
  *
  * Memory: struct learner, LEARN_BYTES a link.  Work: learner_poll reads at most
  * LEARN_BYTES a link; learner_ask sends at most 21 bytes a link. */
@@ -23,7 +23,7 @@ enum {
 };
 
 struct learned {
-    uint16_t self; /* who this node is, */
+    uint16_t self; /* number of this node, */
     uint8_t dimension;
     bool host_port;   /* (other than node 0) the host itself says so */
     uint16_t teacher; /* by the account of this node or CUBE_HOST, */
@@ -44,10 +44,10 @@ struct learner {
     uint64_t asked_us; /* the last time */
     bool found;
     struct learned known; /* once it was found */
-    /* Links whose other end has said what it knows of this node, or that it is
-     * learning itself, and so knows nothing. */
+    /* Links whose other end has reported the epoch that it knows of this node,
+     * or is learning its own number and so knows nothing. */
     uint32_t settled;
-    /* Greetings that came in by another link than they should: the last. */
+    /* HELLOs that arrived at a wrong link: their number, and the last. */
     uint32_t misplaced;
     uint8_t misplaced_link, misplaced_expected;
     /* Greetings to a node with another number of links. */
@@ -63,10 +63,9 @@ struct learner {
 void learner_init(struct learner *learner, const struct link_pipe *pipes,
                   unsigned links);
 
-/* Of a board with more sockets than its cube may have dimensions: pipes[0 ..
- * ports - 1] are dimensions 0 .. ports - 1 of whatever cube, up to that
- * dimension; with `host`, pipes[ports] is to the host, if one is there.  At
- * most CUBE_LINKS_MAX pipes in all. */
+/* For a board that may have more sockets than its cube has dimensions. pipes[0
+ * .. ports - 1] are dimensions 0 .. ports - 1.  With `host`, pipes[ports] may
+ * lead to the host.  At most CUBE_LINKS_MAX pipes in all. */
 void learner_init_ports(struct learner *learner, const struct link_pipe *pipes,
                         unsigned ports, bool host);
 
@@ -75,10 +74,10 @@ void learner_init_ports(struct learner *learner, const struct link_pipe *pipes,
  * or opens, answers with a greeting and stays as it is. */
 void learner_ask(struct learner *learner, uint64_t now_us);
 
-/* True: *learned tells; what more the pipes have brought is for the cube.  One
- * of learner_init_ports that asks waits, once it is found, for all its own
- * links to settle, LEARN_ASKS questions long at most: its neighbours may know
- * of different starts of it, and the largest epoch must be among them. */
+/* True: *learned is complete, and further bytes of the pipes are for the cube.
+ * A learner of learner_init_ports that asks then waits for all its own links to
+ * settle, for at most LEARN_ASKS questions: its neighbours may know of
+ * different starts of the node, and it needs the largest epoch. */
 bool learner_poll(struct learner *learner, struct learned *learned);
 
 #endif

@@ -1,19 +1,18 @@
 /* A reliable link over any pipe of bytes: messages arrive once, whole and in
- * order, or the link says that the peer is another one than before.  The pipe
- * may lose, change, insert and repeat bytes, stall and break.  PROTOCOL.md has
+ * order, or the link reports that the peer has started again.  The pipe may
+ * lose, change, insert and repeat bytes, stall and break.  PROTOCOL.md has
  * frame layout, handshake and timers.
  *
- * Memory: link_bytes() bytes that the caller gives: struct link, `window`
- * slots of `frame_payload` bytes each way, one message less one slot so that
- * a message of several frames lies in one piece, and two staging buffers of
- * `staging` encoded frames.  Work: link_poll handles at most window + 2
- * frames each way, and calls the pipe at most 2 window + 5 times.
+ * Memory: link_bytes() bytes that the caller gives: struct link, `window` slots
+ * of `frame_payload` bytes each way, one message less one slot so that a
+ * message of several frames lies in one piece, and two staging buffers of
+ * `staging` encoded frames.  Work: link_poll handles at most window + 2 frames
+ * each way, and calls the pipe at most 2 window + 5 times.
  *
  *     struct link *link = link_init(memory, bytes, &config);
  *     link_poll(link, now_us);
  *     while (link_read(link, &message))
- *         link_release(link);
- */
+ *         link_release(link); */
 #ifndef TRANSPORT_LINK_H
 #define TRANSPORT_LINK_H
 
@@ -32,11 +31,11 @@ enum {
     LINK_AGAIN = -1
 };
 
-/* The bytes beneath a link.  Both functions return at once: the number of bytes
- * taken or got, 0 .. size (0: no room, or no byte, for the present), or
+/* The pipe beneath a link.  Both functions return at once: the number of bytes
+ * sent or received, 0 .. size (0: no room, or no byte, at present), or
  * LINK_PIPE_CLOSED while the other end is gone.  A pipe may work again after
- * LINK_PIPE_CLOSED: the link then shakes hands and goes on where it stood.
- * Sizes are below 2^30. */
+ * LINK_PIPE_CLOSED.  The link then shakes hands and continues.  Sizes are below
+ * 2^30. */
 struct link_pipe {
     void *context;
     int (*send)(void *context, const uint8_t *bytes, size_t size);
@@ -53,9 +52,9 @@ enum link_state {
     LINK_DOWN,    /* the pipe is closed */
     LINK_OPENING, /* shaking hands */
     LINK_UP,
-    LINK_SILENT,  /* up, but nothing was heard for silence_us */
+    LINK_SILENT,  /* up, but nothing has arrived for silence_us */
     LINK_CLOSING, /* link_close: waits for what is on its way */
-    LINK_CLOSED,  /* both ends have said so, or the deadline is over */
+    LINK_CLOSED,  /* both ends have closed, or the deadline is over */
     LINK_REFUSED  /* the peer does not fit: link_peer says who and why */
 };
 
@@ -63,21 +62,21 @@ enum link_refusal {
     LINK_FITS,
     LINK_WRONG_VERSION,
     LINK_WRONG_WIRE,     /* another node, or another of its ports */
-    LINK_WRONG_GREETING, /* the level above differs */
+    LINK_WRONG_GREETING, /* the layer above differs */
     LINK_WRONG_SIZES,    /* its window does not hold a message, or ours its */
     LINK_IN_USE          /* it keeps to another start of this end, or to another
-                            that is in its place; it may come round */
+                            peer; that may change */
 };
 
-/* Who is at the other end, by its own account. */
+/* The peer, as it describes itself. */
 struct link_peer {
-    uint32_t epoch; /* 0: not heard of yet */
+    uint32_t epoch; /* 0: unknown so far */
     uint16_t node;
     uint8_t port;
     uint8_t version, greeting;
     uint16_t window, frame_payload, message_max;
     enum link_refusal refusal;
-    uint32_t in_use; /* times that it said so */
+    uint32_t in_use; /* HELLOs that reported LINK_IN_USE */
 };
 
 struct link_statistics {
@@ -118,19 +117,19 @@ struct link_config {
     /* This start of this end.  No default; 1 .. 2^32 - 1, never repeated. */
     uint32_t epoch;
 
-    /* Who this end is, and which of its ports; who must be at the other end,
-     * and by which port.  No limits. */
+    /* Node and port of this end; node and port that must be at the other end.
+     * No limits. */
     uint16_t node;
     uint8_t port;
     uint8_t peer_port;
     uint16_t peer_node;
 
-    /* What the level above agrees on: the peer's must be the same, unless one
-     * of them is 0.  No limits. */
+    /* A value of the layer above: the peer's must be equal, unless one of the
+     * two is 0.  No limits. */
     uint8_t greeting;
 
-    /* Keep to the peer of now until it was silent for silence_us, and tell
-     * another epoch that the link is in use?  Default: no. */
+    /* Keeps to the present peer until it has been silent for silence_us, and
+     * answers another epoch that the link is in use. Default: no. */
     bool keeps_peer;
 
     /* Frames a direction that may be under way.  No default; 1 ..
@@ -149,22 +148,22 @@ struct link_config {
     uint16_t staging;
 
     /* Microseconds after which a frame that was not acknowledged is sent again:
-     * at least, and at most.  Defaults: 100,000 and 1,000,000; a slow wire
-     * wants more.  The first is no larger than the second.  Round trips that
-     * are measured to take longer are waited for, up to 8 times the second. */
+     * minimum and maximum.  Defaults: 100,000 and 1,000,000; a slow wire needs
+     * more.  The minimum is at most the maximum.  If measured round trips are
+     * longer, the timeout rises to 8 times the maximum. */
     uint32_t timeout_min_us;
     uint32_t timeout_max_us;
 
-    /* Microseconds that an acknowledgement may wait for data to ride on.
-     * Default: 5,000; no limit. */
+    /* Microseconds that an acknowledgement may wait for a data frame that
+     * carries it.  Default: 5,000; no limit. */
     uint32_t ack_delay_us;
 
-    /* Microseconds between greetings while the link is not up.  Default:
-     * 50,000; no limit. */
+    /* Microseconds between HELLOs while the link is not up.  Default: 50,000;
+     * no limit. */
     uint32_t hello_us;
 
-    /* Microseconds after which an end that has nothing to say sends a frame
-     * nevertheless.  Default: 500,000; no limit. */
+    /* Microseconds after which an idle end sends a frame.  Default: 500,000; no
+     * limit. */
     uint32_t keep_alive_us;
 
     /* Microseconds without a frame after which the peer counts as silent.
@@ -172,7 +171,7 @@ struct link_config {
     uint32_t silence_us;
 };
 
-/* PROTOCOL.md's settings for a serial wire: all but pipe, epoch, who is at its
+/* PROTOCOL.md's settings for a serial wire: all fields except pipe, epoch, the
  * ends, window and message_max. */
 void link_for_serial(struct link_config *config, uint32_t baud);
 
@@ -192,23 +191,25 @@ size_t link_bytes(const struct link_config *config);
 
 struct link;
 
-/* A link lives at the start of its memory, which is aligned to 8 bytes and
- * holds link_bytes().  NULL: it does not, or the config is not sound. */
+/* The link is at the start of its memory, which is aligned to 8 bytes and has
+ * at least link_bytes() bytes.  NULL: it has fewer, or the config is not sound.
+ */
 struct link *link_init(void *memory, size_t bytes,
                        const struct link_config *config);
 
-/* Moves bytes and frames. Returns the number of frames handled, in and out.
- * The two halves, for one who has something to do between them. */
+/* Moves bytes and frames.  Returns the number of frames handled, in and out.
+ * _receive and _send are its two halves, for a caller with work between them.
+ */
 int link_poll(struct link *link, uint64_t now_us);
 int link_poll_receive(struct link *link, uint64_t now_us);
 int link_poll_send(struct link *link, uint64_t now_us);
 
-/* As link_poll_receive, for who is about to write and has looked for room: a
- * farewell, which would take it, is passed over.  It comes again. */
+/* As link_poll_receive, for a caller that has checked link_room and is about to
+ * write: a BYE, which would take that room, is ignored.  It comes again. */
 int link_tend_receive(struct link *link, uint64_t now_us);
 
 /* Queues a message made of two parts: 0, or LINK_AGAIN while there is no room.
- * Messages may be queued before the peer was heard. */
+ * Messages may be queued before the peer is known. */
 int link_write(struct link *link, const void *head, size_t head_size,
                const void *data, size_t size);
 
@@ -225,32 +226,31 @@ void link_release(struct link *link);
 /* Drops the messages of which nothing was sent yet; returns how many. */
 unsigned link_forget_unsent(struct link *link);
 
-/* Beside the messages, and ahead of those not sent yet, go state datagrams: 1
- * .. LINK_DATAGRAM_MAX bytes that may be lost and say what is so, not what
- * happened, so that the newest stands for all before it.  link_put_datagram has
- * one sent soon, if the link is up; `bytes` stay where they are, and may change
- * until they go.  With `ask` the peer is told that an answer is wanted. */
+/* Sends a state datagram soon, if the link is up: 1 .. LINK_DATAGRAM_MAX bytes
+ * that go beside the messages, ahead of those not sent yet, and may be lost.  A
+ * datagram describes a state, not an event, so the newest one replaces those
+ * before it.  `bytes` must stay where they are, and may change until they are
+ * sent.  With `ask` the peer is asked for its own datagram. */
 void link_put_datagram(struct link *link, const void *bytes, size_t size,
                        bool ask);
 
-/* The newest datagram that came since the last call, valid until link_poll;
+/* The newest datagram that arrived since the last call, valid until link_poll;
  * false: none. */
 bool link_take_datagram(struct link *link, struct link_message *datagram,
                         bool *ask);
 
-/* Says farewell once all is acknowledged; after deadline_us, or when the peer
- * has said farewell and its answer has left, the state is LINK_CLOSED. */
+/* Sends BYE once everything is acknowledged.  The state is LINK_CLOSED after
+ * deadline_us, or when the peer has sent BYE and the answer to it has left. */
 void link_close(struct link *link, uint64_t deadline_us);
 
-/* True when the peer has acknowledged all that was written. */
+/* True when the peer has acknowledged everything that was written. */
 bool link_idle(const struct link *link);
 
 enum link_state link_state(const struct link *link);
 const struct link_statistics *link_statistics(const struct link *link);
 const struct link_peer *link_peer(const struct link *link);
 
-/* Whether a sound greeting of a link, of whatever version, is whole among these
- * bytes. */
+/* Whether these bytes contain a whole, sound HELLO of any version. */
 bool link_greets(const uint8_t *bytes, size_t size);
 
 /* Microseconds until link_poll must be called again even if no byte comes and

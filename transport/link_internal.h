@@ -1,7 +1,8 @@
-/* The data of a link.  link_session.c (the handshake), link_send.c and
- * link_receive.c (the two windows) call nothing of each other; link.c alone
- * joins them, by what they return.  Not for others.  All read what they need.
- * Who writes, beside link.c:
+/* The data of a link, for its files only.  A link has three parts: the session
+ * (the handshake), the send window (link_send.c) and the receive window; the
+ * first and the last are in link_receive.c.  The parts do not call each other:
+ * link.c joins them by their return values.  All parts may read every field.
+ * link.c and these parts write:
  *
  * - session: candidate, peer ..., session_in and out, intruder, told_...,
  *   kept_us, heard_us, hello_now, hello_us, up, closed, bye_due;
@@ -27,8 +28,8 @@ enum {
 
 enum link_kind { LINK_HELLO = 1, LINK_DATA, LINK_ACK, LINK_BYE, LINK_STATE };
 
-/* LINK_MORE: the message goes on in the next frame.  LINK_ASK: please answer
- * at once. */
+/* LINK_MORE: the message continues in the next frame.  LINK_ASK: requests an
+ * answer at once. */
 enum link_flag { LINK_MORE = 1, LINK_ASK = 2 };
 
 enum link_slot_state { LINK_WAITING, LINK_SENT, LINK_LOST, LINK_ARRIVED };
@@ -130,8 +131,8 @@ struct link {
     bool closing, closed, bye_due;
 };
 
-/* link_config.c: the defaults are filled in; frames of a message of that
- * size. */
+/* In config.c: the config with its defaults; the number of frames of a message
+ * of that size. */
 struct link_config link_complete(const struct link_config *config);
 unsigned link_fragments(const struct link_config *config, size_t size);
 
@@ -181,9 +182,9 @@ static inline unsigned link_slot_of(const struct link *link, unsigned offset) {
                                   link->receive.ready + offset);
 }
 
-/* The receive window of a link: finds frames among the bytes of the pipe,
- * decodes them to where they stay, and says what has happened.  What follows
- * for the handshake and the send window is link.c's. */
+/* The receive window of a link: finds frames in the bytes of the pipe, decodes
+ * them into their slots, and returns what they contain.  The caller, link.c,
+ * applies that to the handshake and the send window. */
 
 enum link_search {
     LINK_NO_FRAME,  /* no whole one is left among the bytes at hand */
@@ -226,10 +227,10 @@ void link_forget_bytes(struct link *link);
  * goes; the first frame is to have that number. */
 void link_receive_reset(struct link *link, uint16_t first);
 
-/* The send window of a link: which frame goes next, what acknowledgements say
- * of those that went, and the timer that sends again.  It calls neither the
- * handshake nor what receives; of the receive window it reads what each frame
- * reports, and notes that it was reported. */
+/* The send window of a link: chooses the next frame, applies acknowledgements,
+ * and runs the retransmission timer.  It calls neither the handshake nor the
+ * receive window.  It reads the credit and acknowledgement that each frame
+ * reports, and records that they were reported. */
 
 enum link_flush {
     LINK_FLUSH_DONE,    /* the pipe has taken all that was staged */
@@ -246,7 +247,7 @@ void link_on_acknowledge(struct link *link, const struct frame_header *header,
  * that much credit. */
 void link_send_reset(struct link *link, uint8_t credit);
 
-/* What was on its way when the pipe broke is not coming. */
+/* The pipe broke: frames that were on their way are lost. */
 void link_send_resume(struct link *link);
 
 /* Retransmission, as long as it is now. */
@@ -256,8 +257,9 @@ uint32_t link_timeout_us(const struct link *link);
 bool link_may_send(const struct link *link);
 bool link_ack_due(const struct link *link);
 
-/* The oldest frame goes again when nothing was heard of it for long; a sender
- * without credits asks, as the frame that brought them may be lost. */
+/* When the timer expires, the oldest frame counts as lost.  A sender without
+ * credit sends a probe, because the frame with the credit may have been lost.
+ */
 void link_run_timer(struct link *link);
 
 /* Whether one more frame of any kind can be staged. */
@@ -274,11 +276,11 @@ void link_forget_staged(struct link *link);
 /* Gives the pipe what is staged. */
 enum link_flush link_flush(struct link *link);
 
-/* The handshake of a link: who is at the other end, and whether what comes is
- * of this session, another, or a new one.  It tells link.c what follows for the
- * two windows, and touches neither. */
+/* The handshake of a link: identifies the peer, and decides whether a frame
+ * belongs to the present session, to another, or begins a new one.  It returns
+ * to link.c what follows for the two windows, and changes neither. */
 
-/* What a frame, or a greeting, is to the session. */
+/* How a frame, or a HELLO, relates to the session. */
 enum link_session {
     LINK_FOREIGN,  /* of another one, or of none */
     LINK_PRESENT,  /* of this one */

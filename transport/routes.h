@@ -1,33 +1,33 @@
-/* Which way a message goes.  While nothing is dead: e-cube, the lowest
- * differing dimension first, and binomial trees.  Else: along one spanning tree
- * of what is left of the cube, rooted at the gateway, the same for all
- * messages.
+/* Routes of messages.  If nothing is dead: e-cube, the lowest differing
+ * dimension first, and binomial trees.  Otherwise all messages go along one
+ * spanning tree of the remaining cube, rooted at the gateway.
  *
  * The tree.  A node's parent is the node without its lowest bit, counted from
- * the gateway.  Where that link is dead, a subtree hangs free; the first of its
- * nodes that has a live link into the tree is tied to it, and the parents
- * between that node and the subtree's root turn round.  Only such parents are
- * remembered.  All nodes come to the same tree, as it follows from the wiring.
+ * the gateway.  If the link to the parent is dead, the node's subtree is
+ * detached.  The first node of the subtree with a live link into the tree is
+ * attached by that link, and the parents between that node and the subtree's
+ * root are reversed.  Only such parents are stored.  All nodes compute the same
+ * tree, because it depends on the wiring only.
  *
  * No deadlock.  In a tree a path goes up and then down.  Number the channels:
  * those to a parent by falling depth, then those to a child by rising depth.
- * Every message moves, and every copy of a message to all is made, from a
- * channel to higher ones, each has buffers of its own, and who reads at the end
- * takes them off; so no circle of waiting can close.  The rule changes with the
- * generation alone, which drops all messages under the old one.
+ * Every message, and every copy of a message to all, goes from a channel to a
+ * higher one.  Each channel has buffers of its own, and the last end reads all
+ * messages.  So no circle of waits can close.  The rule changes only with the
+ * generation, which drops all older messages.
  *
  * Memory: routes_bytes(dimension), whatever the number of nodes: 1.7 KB for 10.
- * Work: a way is a walk from the destination towards the root, at most as many
- * steps as the tree is deep; routes_find looks at each node that hangs free and
- * its links, once for each time that such a subtree is tied. */
+ * Work: a route is a walk from the destination towards the root, of at most as
+ * many steps as the tree is deep. routes_find visits each detached node and its
+ * links once for each time that such a subtree is attached. */
 #ifndef TRANSPORT_ROUTES_H
 #define TRANSPORT_ROUTES_H
 
 #include "cube.h"
 
-/* What the ends of a cube agree on (struct cube_wiring): how it is merged, so
- * that all come to the same whatever the order and number of datagrams, and how
- * it looks as bytes.  PROTOCOL.md has the layout.
+/* The wiring (struct cube_wiring): its merge, so that all ends converge to the
+ * same wiring in any order and number of datagrams, and its form as bytes.
+ * PROTOCOL.md has the layout.
  *
  * Work: at most CUBE_DEAD_MAX^2 comparisons a call. */
 
@@ -47,11 +47,12 @@ bool wiring_same(const struct cube_wiring *a, const struct cube_wiring *b);
 
 /* Whether generation b was begun after a: less than half the circle of 2^32
  * ahead of it (serial numbers, RFC 1982); of two just opposite, the higher
- * number.  0, not told yet, is before all others.  Not transitive where three
- * lie all around the circle: who asks must end by itself. */
+ * number.  0, unknown so far, is before all others.  Not transitive for three
+ * generations all around the circle, so a loop over it must end by another
+ * rule. */
 bool wiring_after(uint32_t b, uint32_t a);
 
-/* The generation behind that one: never 0. */
+/* The generation after that one: never 0. */
 uint32_t wiring_next(uint32_t generation);
 
 /* Whether both are of one generation of one host. */

@@ -1,18 +1,19 @@
 /* Authenticated, fresh and secret bytes over a pipe that strangers can reach,
  * beneath a link: both ends prove that they know the cube's key, and every
  * record carries a number of its direction under keys of this connection alone,
- * made of the cube's key and an exchange (X25519): who learns the key later
- * cannot read what he has recorded.  Both say which node and port they are at,
- * as far as they know.  PROTOCOL.md has the bytes.  A record that is not of the
- * peer's making, or is older than the last one, is as good as lost: the next
- * one is found behind it, and the link above hears of a gap by a zero byte,
- * which ends a frame.  Many in a row fail the connection; the link goes on over
- * the next.
+ * derived from the cube's key and an exchange (X25519).  An attacker who learns
+ * the key later cannot read recorded bytes.  Both ends name their node and
+ * port, as far as they know them.  PROTOCOL.md has the bytes.  A record that
+ * the peer has not made, or that is older than the last one, counts as lost:
+ * the next record is found after it, and a zero byte, which ends a frame, marks
+ * the gap for the link above.  Many such records in a row end the connection;
+ * the link continues over the next one.
  *
  * Work: a shake hashes five short inputs, opens one empty record, and
- * multiplies twice on the curve, where it listens only for who knows the key;
- * all else is linear in the bytes given and taken, and between two good
- * records no more than SECURE_LOST_MAX bytes are opened or skipped in vain. */
+ * multiplies twice on the curve; a listener multiplies only for a caller that
+ * knows the key.  Everything else is linear in the bytes.  Between two good
+ * records at most SECURE_LOST_MAX bytes are skipped, or opened without success.
+ */
 #ifndef TRANSPORT_SECURE_H
 #define TRANSPORT_SECURE_H
 
@@ -22,9 +23,9 @@
 
 #include "link.h"
 
-/* What the secure layer asks of a library that is known for its cryptography:
- * keyed BLAKE2b-256 (RFC 7693), X25519 (RFC 7748) and ChaCha20-Poly1305
- * (RFC 8439).  They are given, so that transport/ stays free of any system;
+/* The primitives that the secure layer needs from a cryptographic library:
+ * keyed BLAKE2b-256 (RFC 7693), X25519 (RFC 7748) and ChaCha20-Poly1305 (RFC
+ * 8439).  The caller gives them, so that transport/ depends on no system;
  * drivers/secure_sodium.h has those of libsodium. */
 
 enum {
@@ -59,9 +60,9 @@ struct secure_suite {
  * number of its start, the number of the draw.  All of these are hashed under
  * the key, so that a draw is new if any of them is.  PROTOCOL.md has the bytes.
  *
- * Without random bytes whoever knows the cube's key and the device can draw the
- * same: a wire has forward secrecy if one of its ends at least has random
- * bytes, or a device that nobody else knows. */
+ * Without random bytes, an attacker who knows the cube's key and the device can
+ * draw the same values.  A wire has forward secrecy if at least one of its ends
+ * has random bytes, or a secret device. */
 
 enum { SECURE_DEVICE_BYTES = 32 };
 
@@ -148,28 +149,29 @@ struct secure_shake {
     size_t out_begin, out_end, in_end;
 };
 
-/* seed: drawn for this connection alone (secure_seed.h); it is the caller's to
- * wipe. */
+/* seed: drawn for this connection alone (secure_seed_draw); the caller wipes
+ * it. */
 void secure_shake_init(struct secure_shake *shake,
                        const struct secure_self *self,
                        const struct secure_seed *seed);
 
-/* Moves bytes: 1 when the peer has proven itself and has what proves us, 0 not
- * yet, -1 it failed, as shake->fault says; then its secrets are wiped. */
+/* Moves bytes.  1: the peer has proven itself, and this end's proof is sent.
+ * 0: not yet. -1: the shake failed for the reason in shake->fault, and its
+ * secrets are wiped. */
 int secure_shake(struct secure_shake *shake, const struct link_pipe *pipe);
 
 /* The wire as the peer sees it, once it has proven itself. */
 struct secure_ends secure_shake_peer(const struct secure_shake *shake);
 
-/* Whether the two ends see another wire: it leads elsewhere than one of them
- * takes it to, by a mistake, or as somebody has joined it to another one.  What
- * an end does not know fits all.  Once the peer has proven itself. */
+/* Whether the two ends disagree about the wire, because it is miswired or was
+ * diverted.  A property that an end does not know fits every value.  Valid once
+ * the peer has proven itself. */
 bool secure_shake_misled(const struct secure_shake *shake);
 
 /* Wipes its secrets; it has failed, if it had not before. */
 void secure_shake_end(struct secure_shake *shake);
 
-/* Whether this is what an end with a key says first. */
+/* Whether these bytes begin as an end with a key begins. */
 bool secure_greets(const uint8_t *bytes, size_t size);
 
 struct secure_records {

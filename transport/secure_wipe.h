@@ -1,5 +1,5 @@
-/* Zeros that a compiler must write, where nobody reads them: over keys that
- * were used, and all that they can be computed from. */
+/* Overwrites used keys, and everything from which they can be computed, with
+ * zeros that the compiler must not leave out. */
 #ifndef TRANSPORT_SECURE_WIPE_H
 #define TRANSPORT_SECURE_WIPE_H
 

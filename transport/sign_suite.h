@@ -1,7 +1,7 @@
-/* What who signs, and who checks a signature, ask of a library that is known
- * for its cryptography: BLAKE2b-256 (RFC 7693) of what comes in parts, and
- * Ed25519 (RFC 8032).  They are given, so that what uses them stays free of any
- * system; drivers/sign_sodium.h has those of libsodium.
+/* The primitives that a signer, and a verifier of signatures, need from a
+ * cryptographic library: BLAKE2b-256 (RFC 7693) of data in parts, and Ed25519
+ * (RFC 8032).  The caller gives them, so that their users depend on no system;
+ * drivers/sign_sodium.h has those of libsodium.
  *
  * Memory: SIGN_HASH_BYTES, the caller's, aligned to 64. */
 #ifndef TRANSPORT_SIGN_SUITE_H

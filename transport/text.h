@@ -1,5 +1,5 @@
-/* Words and figures put together in a text of bounded size, for messages that
- * a user reads: no stdio where there is no system. */
+/* Builds a text of bounded size from words and numbers, for messages to a user,
+ * without stdio. */
 #ifndef TRANSPORT_TEXT_H
 #define TRANSPORT_TEXT_H
 
@@ -18,11 +18,10 @@ struct cube_text cube_text_in(char *data, size_t bytes_max);
 void cube_text_put(struct cube_text *text, const char *words);
 void cube_text_number(struct cube_text *text, uint32_t number);
 
-/* The same, of words that come from elsewhere: a name, a file, a peer.  What a
- * terminal would obey instead of showing - controls, marks that turn the
- * direction of writing, whatever is not UTF-8 - becomes \xNN, byte by byte; the
- * rest stays, so that what is printable already is left alone.  Ends before
- * the first character that does not fit whole. */
+/* The same for words from outside: a name, a file, a peer.  Bytes that a
+ * terminal would not print as they are (controls, marks of the direction of
+ * writing, invalid UTF-8) become \xNN; other characters stay.  Ends before the
+ * first character that does not fit. */
 void cube_text_printable(struct cube_text *text, const char *words);
 
 /* Bytes of the first of `words` that is shown as it is; 0: it is not. */

@@ -1,20 +1,19 @@
-/* Pipes of bytes between ranks of MPI, and sleep for a rank: MPI has no wait
- * with an end to it, and a rank that spins takes the processor from the others.
- * Ranks of one machine wake each other by a word of memory that they share;
- * where a peer is on another machine, a rank looks every MPI_LOOK_US.
+/* Pipes of bytes between ranks of MPI, and a sleep for a rank.  MPI has no wait
+ * with a timeout, and a rank that spins takes the processor from the others.
+ * Ranks of one machine wake each other by a word of shared memory.  A rank with
+ * a peer on another machine polls every MPI_LOOK_US.
  *
- * A rank between costs more than the way is long: two that share processors
- * take 4 to 7 us to hand over 8 bytes, each rank between them 15 us more, and
- * half of the bytes a second (tests/bench/mpi_hops.c).  So pipes lead straight
- * from the host to nodes 0 .. 7, which against one pipe to node 0 takes 15 to
- * 30 % off the time of runs on 8 to 64 nodes; between nodes they are the cube's
- * edges.
+ * Each rank on the way is expensive.  Two ranks that share processors pass 8
+ * bytes in 4 to 7 us; each rank between them adds 15 us and halves the
+ * throughput (tests/bench/mpi_hops.c).  So the host has pipes to nodes 0 .. 7,
+ * which makes runs on 8 to 64 nodes 15 to 30 % shorter than one pipe to node 0.
+ * Pipes between nodes are the cube's edges.
  *
  * Memory: a pipe is MPI_PIPE_SLOTS buffers of MPI_PIPE_BYTES each way, and
  * struct mpi_place one pointer a rank.  MPI itself never holds more than twice
- * that a pipe of bytes that nobody asks for: one message in MPI_PIPE_SLOTS is
- * synchronous, and no slot is used again before its message is complete.
- * Work: send and receive handle at most MPI_PIPE_SLOTS messages a call. */
+ * that in unrequested bytes of a pipe: one message in MPI_PIPE_SLOTS is
+ * synchronous, and no slot is used again before its message is complete.  Work:
+ * send and receive handle at most MPI_PIPE_SLOTS messages a call. */
 #ifndef TRANSPORT_DRIVERS_MPI_H
 #define TRANSPORT_DRIVERS_MPI_H
 

@@ -1,7 +1,7 @@
-/* What Open MPI's look at the machine (hwloc) is not to do: ask an X server for
- * its graphics cards, which takes seconds where "localhost" is no known name,
- * and write to standard error where there is no /sys.  What the user has set
- * stays. */
+/* Settings for hwloc, by which Open MPI examines the machine.  It should not
+ * ask an X server for graphics cards, which takes seconds if the name
+ * "localhost" is unknown, nor write to standard error if there is no /sys.
+ * Settings of the user stay. */
 #ifndef TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H
 #define TRANSPORT_DRIVERS_MPI_ENVIRONMENT_H
 

@@ -1,4 +1,4 @@
-/* The primitives of secure_suite.h from libsodium. */
+/* The primitives of struct secure_suite (transport/secure.h) from libsodium. */
 #ifndef TRANSPORT_DRIVERS_SECURE_SODIUM_H
 #define TRANSPORT_DRIVERS_SECURE_SODIUM_H
 

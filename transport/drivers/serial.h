@@ -1,11 +1,11 @@
 /* Pipes of bytes over serial wires on Linux: any open terminal, be it a real
- * port, a USB adapter or a pseudo-terminal.  What is above the opening is here;
- * serial_port.h finds and opens real ports.
+ * port, a USB adapter or a pseudo-terminal.  This file has the pipe over an
+ * open terminal; serial_port.h finds and opens real ports.
  *
- * No more than SERIAL_AHEAD_BYTES, or on a fast wire the bytes of
- * SERIAL_AHEAD_US, are given to the kernel ahead of the wire, by
- * its own count where it has one and by the clock where the baud rate is given:
- * a link measures the wire then, and not the kernel's queue.
+ * The kernel gets at most SERIAL_AHEAD_BYTES, or on a fast wire the bytes of
+ * SERIAL_AHEAD_US, ahead of the wire, so that a link measures the wire and not
+ * the kernel's queue.  The pipe uses the kernel's count of queued bytes if
+ * there is one, and otherwise, with a baud rate, the clock.
  *
  * Work: at most three system calls a function. */
 #ifndef TRANSPORT_DRIVERS_SERIAL_H

@@ -1,7 +1,7 @@
-/* Wires in virtual time: two ends, a direction each way, with a rate, a
- * latency, the room of a driver's buffer, and all that goes wrong with bytes
- * and frames, drawn from a seed.  The same calls at the same times give the
- * same bytes at the same times, on every machine.
+/* Wires in virtual time.  A wire has two ends and a direction each way, with a
+ * rate, a latency, a driver's buffer, and faults of bytes and frames that are
+ * drawn from a seed.  The same calls at the same times give the same bytes at
+ * the same times, on every machine.
  *
  * Memory: struct sim_wire, and sim_wire_bytes() that the caller gives. */
 #ifndef TRANSPORT_DRIVERS_SIM_H
@@ -16,7 +16,7 @@ enum {
     SIM_BYTES_MIN = 8192
 };
 
-/* What strikes a direction by chance, and what is done to it. */
+/* Random faults of a direction, and faults that the caller causes. */
 enum sim_fault {
     SIM_LOSS,   /* a frame, up to its zero, is not there */
     SIM_FLIP,   /* a bit is the other one */
@@ -31,7 +31,7 @@ enum sim_fault {
     SIM_FAULTS
 };
 
-/* What becomes of one frame where the caller decides. */
+/* What happens to one frame if the caller decides. */
 enum sim_fate { SIM_PASSES, SIM_DROPPED, SIM_SPOILED, SIM_TWICE, SIM_LATE };
 
 struct sim_quality {

@@ -1,5 +1,5 @@
 /* Pipes of bytes over TCP on Linux: pairs of connected sockets on loopback, and
- * what a link needs of a socket.
+ * a link's pipe over a socket.
  *
  * Memory: struct tcp_pipe here, and in the kernel TCP_BUFFER_BYTES asked for
  * each way at each end (the kernel doubles that for its own books, and
@@ -39,12 +39,12 @@ struct link_pipe tcp_link_pipe(struct tcp_pipe *pipe);
  * room; 0 when the other end is gone. */
 short tcp_events(const struct tcp_pipe *pipe);
 
-/* What poll(2) has found: where nothing has come, the next call to receive need
- * not ask the system again. */
+/* The result of poll(2): if no byte has arrived, the next call of receive makes
+ * no system call. */
 void tcp_heard(struct tcp_pipe *pipe, short revents);
 
-/* Where a wire between processes meets: an address and port of TCP, or the path
- * of a socket on the same machine. */
+/* The address of a wire between processes: an address and port of TCP, or the
+ * path of a socket on the same machine. */
 
 enum { TCP_PATH_MAX = 107 }; /* bytes of a path, as the kernel has it */
 

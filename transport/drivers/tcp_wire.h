@@ -1,27 +1,26 @@
-/* A wire over TCP between machines, or over a socket with a path on one (which
- * is the same, but for unix_file.h): one end listens, the other calls, and
- * calls again when the connection breaks, with growing pauses, while the wire's
- * pipe never waits.  With a key both ends prove that they know it before a byte
- * passes, and every record is authenticated (secure.h).  Without one, it is
- * open only if that is asked for, as `insecure`: whoever reaches the address
- * can take the wire over.  At a path the kernel says who calls, and no key is
- * needed.
+/* A wire over TCP between machines, or over a socket with a path on one machine
+ * (unix_file.h).  One end listens.  The other calls, and calls again with
+ * growing pauses when the connection breaks.  The wire's pipe never waits.
+ * With a key both ends prove that they know it before a byte passes, and every
+ * record is authenticated (secure.h).  Without a key the wire works only if
+ * `insecure` is set: anybody who reaches the address can take it over.  At a
+ * path the kernel identifies the caller, and no key is needed.
  *
  * Strangers: at most TCP_CANDIDATES_MAX connections are being proven at a time,
- * each for TCP_PROVE_US at most; the oldest of those that have not begun as the
- * peer does give way.  Where most of them have, TCP_TURNS_MAX are let in every
- * TCP_CROWD_US, so that the peer has time for its proof however many call, and
- * the others wait in the kernel.  The peer's own new connection, once proven,
- * takes the place of the old one; one that has the key and takes this wire for
- * another is taken only while there is none: the link says then who that is.
- * Without a key the proof is a link's greeting; who keeps silent, or begins as
- * one with a key, is taken while there is no better one: the latter learns from
- * the link's greeting what is wrong.  While a connection is in use, others are
- * looked at every TCP_LOOK_US.
+ * each for at most TCP_PROVE_US.  A new connection replaces the oldest one that
+ * has not begun like the peer.  If most of them have, only TCP_TURNS_MAX
+ * connections are accepted every TCP_CROWD_US, so that the peer has time for
+ * its proof, and other callers wait in the kernel.  A new connection that is
+ * proven replaces the old one.  A connection that has the key but is meant for
+ * another wire is taken only if there is none, because the link then reports
+ * its peer.  Without a key the proof is a link's HELLO.  If there is no such
+ * connection, one that sends nothing, or begins as an end with a key, is taken;
+ * the latter learns the fault from the link's HELLO.  While a connection is in
+ * use, others are polled every TCP_LOOK_US.
  *
  * Memory: struct tcp_wire and in the kernel two buffers of TCP_BUFFER_BYTES a
  * connection.  Work: tcp_wire's pipe accepts at most TCP_ACCEPTS_MAX
- * connections a call, and looks at each candidate once. */
+ * connections a call, and polls each candidate once. */
 #ifndef TRANSPORT_DRIVERS_TCP_WIRE_H
 #define TRANSPORT_DRIVERS_TCP_WIRE_H
 
@@ -114,12 +113,12 @@ struct tcp_wire {
 int tcp_wire_open(struct tcp_wire *wire, const struct tcp_wire_config *config);
 void tcp_wire_close(struct tcp_wire *wire);
 
-/* At the end that calls: leaves the connection, and calls again after rest_us,
- * as whoever has the other end needs it for another. */
+/* At the end that calls: closes the connection, and calls again after rest_us,
+ * because the other end needs the wire for another host. */
 void tcp_wire_rest(struct tcp_wire *wire, uint64_t rest_us);
 
-/* Why who was met last is not the peer, and what to do, as texts for the user;
- * NULL: nothing is known against it. */
+/* Why the last connection was not from the peer, and what to do, as texts for
+ * the user; NULL: no reason is known. */
 struct tcp_wire_doubt {
     const char *what, *next;
 };
@@ -131,8 +130,8 @@ struct link_pipe tcp_wire_pipe(struct tcp_wire *wire);
  * many. */
 unsigned tcp_wire_events(const struct tcp_wire *wire, struct pollfd *fds);
 
-/* No longer than so many microseconds may pass before the pipe is used again,
- * whatever comes. */
+/* The pipe must be used again within so many microseconds, even if no byte
+ * comes. */
 uint64_t tcp_wire_wait_us(const struct tcp_wire *wire);
 
 /* What poll(2) has found of it, as tcp_heard. */

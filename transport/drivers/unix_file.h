@@ -1,7 +1,6 @@
-/* What a socket with a path has and one of TCP has not: a file, and a kernel
- * that says who is at the other end.  Such a wire needs no key: the file is for
- * its owner alone, and each end asks whether the other is the same user, or
- * root. */
+/* Sockets with a path: their file, and the kernel's identification of the peer.
+ * Such a wire needs no key, because the file is for its owner only, and each
+ * end checks that the other is the same user, or root. */
 #ifndef TRANSPORT_DRIVERS_UNIX_FILE_H
 #define TRANSPORT_DRIVERS_UNIX_FILE_H
 
@@ -20,7 +19,8 @@ int unix_file_bind(int fd, const struct tcp_address *address);
  * bytes a socket takes 278 before it is full. */
 int unix_file_pair(int fds[2]);
 
-/* Whether who is at the other end of a connection is this user, or root. */
+/* Whether the process at the other end of a connection belongs to this user, or
+ * root. */
 bool unix_file_peer_is_ours(int fd);
 
 /* Removes the file, if it is a socket that nobody listens on. */
@@ -29,8 +29,8 @@ void unix_file_remove(const struct tcp_address *address);
 /* Waiting for files that are ready. */
 
 /* Sleeps until a file is ready, or wait_us are over.  For the first awake_us it
- * stays awake, and gives way to whoever has work: where a processor is free,
- * what comes soon need not wait to be woken for. */
+ * stays awake and yields the processor to others, so that on a free processor a
+ * byte that comes soon does not wait for a wake-up. */
 void wait_files(struct pollfd *fds, nfds_t count, uint64_t wait_us,
                 uint64_t awake_us);
 

@@ -1,10 +1,10 @@
-/* A place's tuples: records one behind the other in the order in which they
- * came, so that what is found first is the oldest, and what is free is in one
- * piece.  A record may be held for a request: nobody else gets it until that is
- * decided.
+/* A place's tuples: records one after the other in the order of their arrival.
+ * So a search finds the oldest first, and free memory is in one piece.  A
+ * record may be held for a request, and no other request gets it until that one
+ * is decided.
  *
- * Memory: the caller's bytes; a record is named by its offset, until one
- * before it is dropped. */
+ * Memory: the caller's bytes; a record is named by its offset, until one before
+ * it is dropped. */
 #ifndef TRANSPORT_TUPLES_SPACE_H
 #define TRANSPORT_TUPLES_SPACE_H
 
@@ -40,15 +40,15 @@ struct tuples_record *tuples_store_at(const struct tuples_store *store,
 const uint8_t *tuples_store_tuple(const struct tuples_store *store,
                                   uint32_t at);
 
-/* The first that matches and that nobody holds. */
+/* The first matching record that is not held. */
 uint32_t tuples_store_find(const struct tuples_store *store,
                            const uint8_t *pattern);
 
-/* Whether one that matches is held for somebody. */
+/* Whether a matching record is held. */
 bool tuples_store_is_held(const struct tuples_store *store,
                           const uint8_t *pattern);
 
-/* That which a request holds. */
+/* The record that a request holds. */
 uint32_t tuples_store_held_by(const struct tuples_store *store, uint32_t row);
 
 void tuples_store_drop(struct tuples_store *store, uint32_t at);
@@ -56,7 +56,7 @@ void tuples_store_drop(struct tuples_store *store, uint32_t at);
 /* What the files of the tuple space share: a message's header, an operation
  * of this place (operation.c), a request of any (request.c), and the store. */
 
-/* TUPLES.md says what each means. */
+/* TUPLES.md defines these. */
 enum tuples_kind {
     /* Of an operation, to a place. */
     TUPLES_ASK = 1,

@@ -1,10 +1,11 @@
-/* A tuple space (Gelernter, 1985) shared out over numbered places, one a node:
- * out, in, rd, inp, rdp and eval.  TUPLES.md says what they mean and what goes
- * between places.
+/* A tuple space (Gelernter, 1985) distributed over numbered places, one in each
+ * node: out, in, rd, inp, rdp and eval.  TUPLES.md defines the calls and the
+ * messages between places.
  *
  * Nothing here waits.  A call begins an operation, whose number is polled until
- * it is no longer TUPLES_PENDING; messages are written in tuples_step alone,
- * and tuples_take always takes one.  It knows no time, and draws nothing.
+ * it is no longer TUPLES_PENDING; messages are written in tuples_step only, and
+ * tuples_take always accepts a message.  The space uses no clock and no random
+ * numbers.
  *
  * Memory: one arena of tuples_arena_bytes(): `store_bytes` of tuples, a buffer
  * for each operation and process of this place, and a request for each of every
@@ -13,15 +14,15 @@
  * TUPLES_STEP_MESSAGES.
  *
  * No deadlock, no loss: each message between two places belongs to one
- * operation, and has its place at the other end before it is sent: a request
- * in the table that has a row for each operation of each place; an answer in
- * the operation that asked, which counts those that are owed to it.  So what
- * comes is taken at once, no link is ever held back, and an answer that a full
- * link puts off waits in its request's row.  A tuple for which a store has no
- * room stays in the buffer of the operation that writes it; the store promises
- * room to those in the order in which they asked, before their tuples come
- * again.  What no place can do is make room that nobody makes: programs say how
- * much they put into the space, and give it a store for that.
+ * operation, and has a slot at the other end before it is sent.  A request has
+ * a row in a table with one row for each operation of each place.  An answer
+ * has a slot in the operation that asked, which counts its outstanding answers.
+ * So a message is always accepted at once, no link is held back, and an answer
+ * that waits for a full link waits in its request's row.  A tuple for which a
+ * store has no room stays in the buffer of the operation that writes it.  The
+ * store promises room to these operations in the order of their requests,
+ * before their tuples come again.  A program must bound what it puts into the
+ * space, and give the space a store for that.
  *
  *     int job = tuples_in(space, &pattern);
  *     while (tuples_poll(space, job, &tuple) == TUPLES_PENDING)
@@ -34,9 +35,9 @@
 #include <stdint.h>
 
 /* Tuples and templates: fields of a type each, with a value (an actual) or, in
- * a template, without one (a formal).  As bytes they are what lies in the store
- * and goes in messages: number of fields, whether keyed, the types, and the
- * values one behind the other; TUPLES.md has the layout.
+ * a template, without one (a formal).  Their form as bytes is that of the store
+ * and of messages: number of fields, whether keyed, the types, and the values
+ * one behind the other; TUPLES.md has the layout.
  *
  * A template matches a tuple that has as many fields, of the same types one by
  * one, and the values of its actuals.  Values are compared as bytes: a double
@@ -100,8 +101,8 @@ struct tuple {
  * them, has no field or too many, or one of an unknown type. */
 size_t tuple_write(const struct tuple *tuple, uint8_t *bytes, size_t room);
 
-/* Reads what tuple_write wrote, and nothing else: false.  Its fields of bytes
- * lie in `bytes`. */
+/* Reads what tuple_write wrote; false for anything else.  Fields of type bytes
+ * point into `bytes`. */
 bool tuple_read(struct tuple *tuple, const uint8_t *bytes, size_t size);
 
 /* Of what tuple_read takes: whether a field is formal, or the first; whether
@@ -186,7 +187,7 @@ struct tuples_statistics {
 
 struct tuples; /* opaque: lives at the start of its arena */
 
-/* 0, and NULL, where a limit is not kept. */
+/* 0 (and NULL from tuples_init) if a limit is broken. */
 size_t tuples_arena_bytes(const struct tuples_config *config);
 
 /* Begins with an empty space, in an arena aligned to 8 bytes.  All places do so
@@ -211,7 +212,7 @@ int tuples_rdp(struct tuples *space, const struct tuple *pattern);
 int tuples_eval(struct tuples *space, uint32_t function,
                 const struct tuple *tuple);
 
-/* The place where a tuple lives that is fit for `out`. */
+/* The place that stores a tuple that is fit for `out`. */
 unsigned tuples_home(const struct tuples *space, const struct tuple *tuple);
 
 /* Tuples that a place has put into the store of this one, and taken out of it;
@@ -222,9 +223,9 @@ struct tuples_account {
 struct tuples_account tuples_account(const struct tuples *space,
                                      uint16_t place);
 
-/* Operations of this place that a place was asked for and has not answered: one
- * that takes its messages does so at its next step, unless it was sent what it
- * has no room for. */
+/* The number of operations of this place to which `place` owes an answer.  A
+ * place that reads its messages answers at its next step, unless it has no
+ * room. */
 unsigned tuples_due(const struct tuples *space, uint16_t place);
 
 /* Operations that may be begun now. */
@@ -238,20 +239,21 @@ bool tuples_is_open(const struct tuples *space, int operation);
 enum tuples_status tuples_poll(const struct tuples *space, int operation,
                                struct tuple *tuple);
 
-/* Closes an operation.  One that is pending goes on unseen, if it is an out or
- * eval, and is given up otherwise: what it would have taken stays. */
+/* Closes an operation.  A pending out or eval continues.  Any other pending
+ * operation is given up, and takes nothing. */
 void tuples_close(struct tuples *space, int operation);
 
-/* Takes a message from another place.  False: no place sends such. */
+/* Takes a message from another place.  False: it is not a message of the space.
+ */
 bool tuples_take(struct tuples *space, uint16_t source, const uint8_t *data,
                  size_t size);
 
-/* Runs each process once, and writes what is owed; the number of messages, and
- * of processes that have ended. */
+/* Runs each process once, and writes outstanding messages.  Returns the number
+ * of messages and of processes that have ended. */
 unsigned tuples_step(struct tuples *space);
 
-/* Operations that are open or still owe something, requests, tuples and
- * processes here: 0 where all pools are empty. */
+/* Operations that are open or have messages to send, requests, tuples and
+ * processes here: 0 if all pools are empty. */
 uint32_t tuples_held(const struct tuples *space);
 
 const struct tuples_statistics *tuples_statistics(const struct tuples *space);
