@@ -1,9 +1,9 @@
-/* What a node, or a board's loader, does about questions.h: it keeps what it is
- * asked until there is room for the answer, sends echoes back and its own out,
- * and knows when it is to restart.
+/* Answers the questions of message.h in a node or a board's loader: keeps a
+ * question until there is room for the answer, returns echoes and sends its
+ * own, and decides when to restart.
  *
- * Memory: struct node_answers, a part of struct node; an answer is made on
- * the stack, CUBE_PAYLOAD_MAX bytes. */
+ * Memory: struct node_answers, a part of struct node; an answer is made on the
+ * stack, CUBE_PAYLOAD_MAX bytes. */
 #ifndef NODE_ANSWERS_H
 #define NODE_ANSWERS_H
 
@@ -36,8 +36,8 @@ struct node_answers {
     uint64_t restart_us;
 };
 
-/* What only its user knows.  A function that is NULL, or returns 0: it has
- * nothing to say, and the answer is empty. */
+/* Answers that only the user of this module has.  If a function is NULL, or
+ * returns 0, the answer is empty. */
 struct node_teller {
     void *context;
     /* Beside what the board fills in. */
@@ -45,36 +45,38 @@ struct node_teller {
     void (*top)(void *context, struct node_top *top);
     bool (*memory)(void *context, struct node_ready_message *map);
     void (*totals)(void *context, struct node_finished_message *totals);
-    /* Text behind the board's own; how many bytes. */
+    /* Appends to the board's own text; returns the number of bytes. */
     size_t (*log)(void *context, char *text, size_t size);
 };
 
-/* counted: of the same node, whose cube is there. */
+/* counted: of the same node; its cube exists. */
 void node_answers_init(struct node_answers *answers,
                        const struct node_board *board,
                        struct node_counted *counted);
 
-/* A new generation: what was asked in another is not answered. */
+/* A new generation: questions of the old one are not answered. */
 void node_answers_forget(struct node_answers *answers);
 
-/* Whether it is a message for this module; then it is taken. */
+/* _is_for: whether a message is for this module. _take: takes such a message.
+ */
 bool node_answers_is_for(const struct cube_message *message);
 void node_answers_take(struct node_answers *answers,
                        const struct cube_message *message, uint64_t now_us);
 
-/* Sends what there is room for; how many. */
+/* Sends what there is room for; returns the number of messages. */
 unsigned node_answers_send(struct node_answers *answers,
                            const struct node_teller *teller, uint64_t now_us);
 
 /* A field of struct node_who: the name, cut to `size`, zeros behind it. */
 void node_who_name(uint8_t *field, size_t size, const char *name);
 
-/* What is answered to NODE_LINKS: of how many links. */
+/* The answer to NODE_LINKS; returns the number of links. */
 unsigned node_answers_links(const struct node_answers *answers,
                             struct node_link_state state[CUBE_LINKS_MAX]);
 
-/* Not NODE_RESET_OVER: it is time to restart, so that board.reset gets this.
- * Neighbours have, or had the time to get, what was on its way. */
+/* If not NODE_RESET_OVER, it is time to restart, with this value for
+ * board.reset.  By then neighbours have received what was on its way, or had
+ * the time to. */
 enum node_reset node_answers_restart(const struct node_answers *answers,
                                      uint64_t now_us);
 

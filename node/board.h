@@ -1,6 +1,6 @@
-/* All that a node asks of the place where it runs.  A new board fills this
- * struct, calls node_start once and node_step until it is stopped, and needs
- * nothing of other rooms but a driver of transport/drivers, where one fits.
+/* The interface between a node and its board.  A new board fills this struct,
+ * and calls node_start once and node_step until the node is stopped.  It needs
+ * nothing from other rooms except, if one fits, a driver of transport/drivers.
  *
  * Work: every function returns at once, but for idle, which sleeps until its
  * time is over or a byte comes.
@@ -8,8 +8,7 @@
  *     struct node *node = node_start(&board, &why);
  *     while (node_step(node) != NODE_STOPPED)
  *         board.idle(board.context, node_wait_us(node));
- *     board.reset(board.context, 0);
- */
+ *     board.reset(board.context, 0); */
 #ifndef NODE_BOARD_H
 #define NODE_BOARD_H
 
@@ -20,7 +19,7 @@
 #include "transport/cube.h"
 #include "transport/secure.h"
 
-/* Who the node is, as its board was told. */
+/* The node's identity, as its board was told or has learnt. */
 struct node_identity {
     /* Its number, 0 .. 2^dimension - 1. */
     uint16_t self;
@@ -39,8 +38,9 @@ struct node_identity {
     /* This node has a host port, at link `dimension`; node 0 always has. */
     bool host_port;
 
-    /* Nodes 0 .. host_ports - 1 have host ports, the same on all: a power of
-     * two, 2 .. CUBE_HOST_PORTS_MAX; 0: node 0 has, and who has host_port. */
+    /* Nodes 0 .. host_ports - 1 have host ports: a power of two, 2 ..
+     * CUBE_HOST_PORTS_MAX, the same on all nodes.  0: node 0 has one, and a
+     * node with host_port. */
     uint8_t host_ports;
 
     /* Microseconds after which a link that is down or silent is given up for
@@ -51,7 +51,7 @@ struct node_identity {
     uint32_t serial_baud;
 };
 
-/* What a board measures of itself, since its start. */
+/* Measurements of a board since its start. */
 struct node_gauges {
     uint32_t stack_bytes;      /* that the node's stack has, */
     uint32_t stack_high_water; /* and that were ever in use */
@@ -66,15 +66,16 @@ enum node_reset {
     NODE_RESET_STAY        /* and a loader not to start an image */
 };
 
-struct node_who;     /* questions.h */
-struct node_counted; /* counted.h */
+struct node_who;     /* message.h */
+struct node_counted; /* common.h */
 
 struct node_board {
     void *context;
     struct node_identity identity;
-    /* Where what never comes again is from: random bytes, or the device and the
-     * number of its start.  identity.h draws the epoch from it, and keyed wires
-     * their nonces.  All 0: the board is told its epoch, and has no keys. */
+    /* The source of values that never repeat: random bytes, or the device and
+     * the number of its start. identity.h draws the epoch from it, and keyed
+     * wires their nonces.  All 0: the board is told its epoch, and has no keys.
+     */
     struct secure_source source;
     /* Sends and receives bytes on link i: 0 .. dimension - 1 to the neighbours;
      * node 0, and the one with host_port, have the host at link `dimension`. */
@@ -86,28 +87,30 @@ struct node_board {
     /* Sleeps until bytes can be received, or sent where a link had no room,
      * but no longer than wait_us. */
     void (*idle)(void *context, uint64_t wait_us);
-    /* Bit i: whoever is at the other end of link i could not prove that it has
-     * this node's key.  NULL: the wires have no keys. */
+    /* Bit i: the peer on link i could not prove that it knows this node's key.
+     * NULL: the wires have no keys. */
     uint32_t (*refused)(void *context);
     /* NULL: there is nothing to tell. */
     void (*gauges)(void *context, struct node_gauges *gauges);
-    /* What the board is, over what a process of Linux is, and zeros elsewhere;
-     * NULL: it is one. */
+    /* Fills in the board's fields; before the call, *who describes a process of
+     * Linux.  NULL: the board is one. */
     void (*who)(void *context, struct node_who *who);
-    /* What the board has to say of its starts and faults: text, lines ended by
-     * \n, at most `size` bytes; how many.  NULL: nothing. */
+    /* Writes the board's log of its starts and faults: text, lines ended by \n,
+     * at most `size` bytes.  Returns the number of bytes.  NULL: the board has
+     * no log. */
     size_t (*log)(void *context, char *text, size_t size);
-    /* Bytes that link d had no room for since the start.  NULL: not known. */
+    /* Bytes that arrived on link d and were dropped for lack of room since the
+     * start.  NULL: not known. */
     uint32_t (*lost)(void *context, unsigned d);
     /* Replaces cube_write for all messages of the node's role, with the same
      * return values.  For tests: a node that alters its own messages.  NULL:
      * cube_write. */
     int (*write)(void *context, struct node_counted *counted, uint16_t dest,
                  uint8_t type, const void *data, size_t size);
-    /* The node's end, for the reason of enum node_reset: a fresh start, or
-     * where there is a system, an exit with this status. */
+    /* Ends the node, for the reason of enum node_reset: a fresh start or, with
+     * an operating system, an exit with this status. */
     void (*reset)(void *context, int status);
-    void *arena;        /* aligned to NODE_ALIGNMENT bytes: arena.h */
+    void *arena;        /* aligned to NODE_ALIGNMENT bytes: common.h */
     size_t arena_bytes; /* with fixed_bytes, below 4 GiB */
     size_t fixed_bytes; /* data memory outside the arena, stack included, which
                            has 48 KiB at least: an insertion takes up to 40 */

@@ -1,4 +1,4 @@
-/* What the host and the nodes say to each other: message types and their
+/* The messages between the host and the nodes, and between nodes: types and
  * layouts.  All numbers little-endian, structs without padding, so that a node
  * copies them as they are (a machine of another byte order refuses to start).
  *
@@ -19,7 +19,7 @@
 enum {
     NODE_PROTOCOL = 12,             /* both ends must agree */
     NODE_PAGES_A_REQUEST = 64,      /* page numbers in one NODE_PAGE_REQUEST */
-    NODE_PAGES_IN_FLIGHT_MAX = 256, /* a node has asked for and not got, */
+    NODE_PAGES_IN_FLIGHT_MAX = 256, /* requested and not arrived, */
     NODE_PAGES_LENT_MAX = 8,        /* and of another node of an exchange */
     NODE_FAULT_TEXT_MAX = 200,      /* bytes */
     NODE_FACES_A_MESSAGE = 128, /* faces in one NODE_SPILL or NODE_UNSPILL */
@@ -42,11 +42,11 @@ enum node_message_type {
     NODE_PING,        /* struct node_ping_message: asks for NODE_PONG */
     NODE_REGIONS,     /* struct node_regions_message, then first bricks */
     NODE_OUT,         /* struct incode_job: to be put into the tuple space */
-    NODE_PAGE_TO_ALL, /* as NODE_PAGE, to all, who have not asked for it */
-    NODE_QUESTION,    /* struct node_question_message: questions.h */
+    NODE_PAGE_TO_ALL, /* as NODE_PAGE, to all, without a request */
+    NODE_QUESTION,    /* struct node_question_message, below */
     NODE_RESTART,     /* struct node_restart_message */
-    /* From the host to a board's loader: loader/messages.h.  The node program
-     * passes them over. */
+    /* From the host to a board's loader: loader/image.h.  The node program
+     * ignores them. */
     NODE_IMAGE_BEGIN,
     NODE_IMAGE_BLOCK,
     NODE_IMAGE_ASK,
@@ -61,10 +61,10 @@ enum node_message_type {
     NODE_FAULT,           /* text without a final 0 */
     NODE_PONG,            /* struct node_pong_message */
     NODE_TAKEN,           /* struct node_taken_message */
-    NODE_PAGE_PASSED,     /* uint32 node, then numbers of the pages that it has
-                             asked the sender for, who has them not */
-    NODE_ANSWER,          /* struct node_answer_head, then what was asked for */
-    NODE_IMAGE_STATE,     /* of a loader: loader/messages.h */
+    NODE_PAGE_PASSED,     /* uint32 node, then the pages that it requested from
+                             the sender, which has evicted them */
+    NODE_ANSWER,          /* struct node_answer_head, then the answer */
+    NODE_IMAGE_STATE,     /* of a loader: loader/image.h */
     NODE_WRONG_PAGE,      /* struct node_wrong_page_message */
     /* From a face manager to a builder, and back: incode/paper/list.h. */
     NODE_LIST = 64, /* struct incode_list, as much as is in use */
@@ -75,7 +75,7 @@ enum node_message_type {
     NODE_SHARE = 80,  /* struct node_shared, one after another */
     NODE_WAVE,        /* struct node_wave_message */
     NODE_WAVE_ANSWER, /* struct node_wave_answer_message */
-    NODE_LOAN_ASK,    /* nothing: has nothing to do */
+    NODE_LOAN_ASK,    /* nothing: the sender has no work */
     NODE_LOAN,        /* struct incode_loan, as much as is in use */
     NODE_LOAN_FOUND,  /* struct node_found_message, likewise */
     /* From a node to another, in whatever role, and back at once: a trace. */
@@ -99,9 +99,9 @@ enum node_role_number {
 /* No page: see struct node_pong_message. */
 #define NODE_AWAITS_OTHERS (INCODE_NONE - 1)
 
-/* Counted messages are all that go between the host and one node, NODE_STOP
- * apart; both sides count them anew in each generation of the cube's wiring.
- * They arrive in order, so any that is missing has been lost for good. */
+/* Counted messages are all messages between the host and one node except
+ * NODE_STOP.  Both sides count them from 0 in each generation of the cube's
+ * wiring.  They arrive in order, so a missing message is lost. */
 struct node_ping_message {
     uint32_t sent; /* counted messages to this node before this one */
 };
@@ -112,21 +112,21 @@ struct node_pong_message {
     uint32_t received; /* from the host before that ping */
     uint32_t sent;     /* to the host before this one */
     uint32_t links;    /* bit d: link d has been up since this start */
-    uint32_t silent;   /* bit d: nothing was heard by link d for a second, which
-                          was up; a pong goes unasked where that changes */
-    uint32_t refused;  /* bit d: who is at the other end has not its key */
+    uint32_t silent;   /* bit d: link d has been up, and silent for a second; a
+                          change is reported by a pong without a ping */
+    uint32_t refused;  /* bit d: the peer on link d does not know the key */
     uint32_t work;     /* steps and messages of its role since this start: a
                           change is progress, of whatever size */
-    uint32_t awaited;  /* a page that it has asked for and not got: who keeps it
-                          holds the node up; or NODE_AWAITS_OTHERS: it has
-                          nothing to do until they get on; or INCODE_NONE */
-    uint32_t owing;    /* a node that owes it answers, or a page that the host
-                          does not, or CUBE_HOST: likewise */
+    uint32_t awaited;  /* the page that it waits for: its keeper blocks the
+                          node; or NODE_AWAITS_OTHERS: it has no work until
+                          other nodes make progress; or INCODE_NONE */
+    uint32_t owing;    /* the node that blocks this one: it has not sent its
+                          answers, or the page; CUBE_HOST: none */
 };
 
-/* Begins a node's role; sent once a generation to each node.  There are no
- * defaults: the host fills in every field, and 0 in what is reserved.  What is
- * out of its limits is a fault that the node reports. */
+/* Begins a node's role; sent to each node once in a generation.  There are no
+ * defaults: the host fills in every field; reserved ones are 0.  A node reports
+ * a field that is out of its limits as a fault. */
 struct node_setup_message {
     /* NODE_PROTOCOL, that of the node as well.  The first field in every
      * version. */
@@ -135,9 +135,9 @@ struct node_setup_message {
     /* Nodes of the cube: 2^dimension, as the node's board has it. */
     uint16_t nodes;
 
-    /* Nodes that keep pages: nodes 1 .. holders do, in turn (keepers.h); less
-     * than `nodes`.  0: the host sends all pages.  A holder is one of them, and
-     * a worker is none. */
+    /* The number of nodes that keep pages: nodes 1 .. holders, in turn
+     * (node_keeper); less than `nodes`.  0: the host sends all pages.  A node
+     * with the role holder is one of them; a worker is not. */
     uint16_t holders;
 
     /* NODE_RESULT messages that the node may send before the first NODE_CREDIT,
@@ -152,8 +152,8 @@ struct node_setup_message {
     /* The points and how to search them: incode/triangulator.h. */
     struct incode_setup setup;
 
-    /* What follows is a face manager's or a builder's, and else 0.  Of a
-     * builder: its manager, another node. */
+    /* The following fields are for a face manager or a builder, and otherwise
+     * 0.  Of a builder: its manager, another node. */
     uint16_t manager;
 
     /* Of a manager: faces a list, 1 to INCODE_LIST_MAX (incode/paper/list.h).
@@ -208,8 +208,8 @@ struct node_wrong_page_message {
 
 /* A range of bricks, for a worker or a face manager that has no other. */
 struct node_job_message {
-    /* Of this job, 1 or more and of no other job of the run: results of another
-     * epoch are not counted. */
+    /* Number of this job, at least 1 and of no other job of the run.  Results
+     * of another epoch are dropped. */
     uint32_t epoch;
 
     uint32_t reserved; /* 0 */
@@ -219,9 +219,9 @@ struct node_job_message {
     struct incode_job job;
 };
 
-/* `sent`, here and below: counted messages to the receiver before this one.
- * Where it has had fewer, some were lost, and this one does not count: what
- * follows from a part alone would be wrong. */
+/* `sent`, here and below: counted messages to the receiver before this one.  If
+ * the receiver has counted fewer, some were lost, and it drops this one,
+ * because a part of the results alone would be wrong. */
 struct node_result_header {
     uint32_t epoch;
     uint32_t sent;
@@ -245,10 +245,10 @@ struct node_spill_header {
     uint32_t sent;  /* NODE_UNSPILL and its request */
 };
 
-/* To all nodes.  The bricks with which regions `first`, `first` + 1 .. begin,
- * `count` of them, follow: of each node, and after the last one of a node that
- * there is not.  Then all pages from `to_all` on come to all, from the last one
- * down. */
+/* To all nodes.  The first bricks of `count` regions follow, from region
+ * `first` on: one for each node, and at the end the brick after the last
+ * region.  Then all pages from `to_all` on are sent to all nodes, the last one
+ * first. */
 struct node_regions_message {
     uint32_t first, count;
     uint32_t to_all;
@@ -261,8 +261,8 @@ struct node_shared {
 };
 
 enum node_wave_command {
-    NODE_WAVE_READY = 1, /* who can receive from others answers */
-    NODE_WAVE_COUNT,     /* who is quiet answers */
+    NODE_WAVE_READY = 1, /* answered by nodes that are ready to receive */
+    NODE_WAVE_COUNT,     /* answered by nodes that are quiet */
     NODE_WAVE_SEED       /* the same, and tries first tetrahedra before */
 };
 
@@ -279,7 +279,7 @@ struct node_wave_answer_message {
     uint64_t left;           /* bricks that are not committed */
 };
 
-/* What was found of a loan; again: its borrower asks for another. */
+/* The tetrahedra found on a loan. again: the borrower asks for another loan. */
 struct node_found_message {
     uint32_t again;
     struct incode_found found;
@@ -330,7 +330,7 @@ struct node_finished_message {
     uint32_t stack_bytes;         /* struct node_gauges of the board; 0 where */
     uint32_t stack_high_water;    /* it has none */
     uint32_t overruns;
-    uint32_t look_us_max; /* longest between two looks at the links, while the
+    uint32_t look_us_max; /* longest between two polls of the links, while the
                              node was not idle */
     struct incode_statistics statistics;
 };
@@ -374,11 +374,10 @@ static_assert(sizeof(struct node_spill_header) +
                   CUBE_PAYLOAD_MAX,
               "a spill fits a message");
 
-/* What a person asks of a node, by the host: who it is, how its links are, how
- * full its memory, what it last said; and what it is told to do but compute.
- * All of them are asked and answered in any role and in none, in the midst of a
- * run as well; a board's loader answers NODE_WHO, NODE_LINKS, NODE_LOG and
- * NODE_PROBE.  Both ends count these messages as all others (message.h). */
+/* Questions of a person to a node, through the host: its identity, links,
+ * memory and log; and orders other than jobs.  A node answers them in any role
+ * or none, also during a run.  A board's loader answers NODE_WHO, NODE_LINKS,
+ * NODE_LOG and NODE_PROBE.  Both ends count these messages like all others. */
 
 enum node_question {
     NODE_WHO = 1, /* struct node_who */
@@ -438,19 +437,19 @@ struct node_who {
 struct node_link_state {
     uint8_t state;     /* enum link_state */
     uint8_t refusal;   /* enum link_refusal */
-    uint8_t peer_port; /* who is there, where that is known */
+    uint8_t peer_port; /* of the peer, if it is known */
     uint8_t dead;      /* given up for the run */
     uint16_t peer_node;
     uint16_t reserved; /* 0 */
     uint32_t rtt_us;   /* smoothed; 0: not measured */
     uint32_t frames_in, frames_out, retransmitted;
     uint32_t bad;  /* frames that came and were damaged */
-    uint32_t lost; /* bytes that a driver had no room for; UINT32_MAX: it
-                      does not know */
+    uint32_t lost; /* bytes that a driver dropped for lack of room;
+                      UINT32_MAX: unknown */
     uint64_t bytes_in, bytes_out; /* on the wire */
 };
 
-/* What moves while a node works. */
+/* Values that change while a node works. */
 struct node_top {
     uint32_t role;
     uint32_t work;         /* as in struct node_pong_message */
@@ -477,7 +476,7 @@ enum node_restart {
                                image before it is told to */
 };
 
-/* A process ends, for who started it to start it again. */
+/* A process ends, and the program that started it starts it again. */
 struct node_restart_message {
     uint32_t what; /* enum node_restart */
 };

@@ -3,13 +3,12 @@
  * board sleeps when a step had nothing to do.
  *
  * Work: a step handles the frames that links hold, then lets the role compute
- * for NODE_PACE_US (pace.h) and send what may leave.
+ * for NODE_PACE_US (common.h) and send what may leave.
  *
  *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)
  *         if (event == NODE_IDLE)
- *             board.idle(board.context, node_wait_us(node));
- */
+ *             board.idle(board.context, node_wait_us(node)); */
 #ifndef NODE_NODE_H
 #define NODE_NODE_H
 
@@ -35,10 +34,11 @@ size_t node_arena_needed(const struct node_identity *identity, size_t memory,
 
 enum node_event node_step(struct node *node);
 
-/* A step in its parts, for who times nodes by their work and has their links
- * beside their processors: they are not tended in the midst of work then. Moves
- * frames, passes on messages of others and takes its own; lets the role
- * compute: how much was done. */
+/* The parts of a step, for a simulator that times nodes by their work, and
+ * whose links work beside the processors: then links are not polled during
+ * work. node_receive moves frames, forwards messages of other nodes and takes
+ * the node's own. node_work lets the role compute.  Both return how much was
+ * done. */
 unsigned node_receive(struct node *node);
 unsigned node_work(struct node *node);
 
@@ -48,7 +48,8 @@ enum node_event node_send(struct node *node, unsigned moved);
 /* Microseconds until node_step must be called even if no byte comes. */
 uint64_t node_wait_us(const struct node *node);
 
-/* State of its links, for a board's own console: of how many. */
+/* State of its links, for a board's own console.  Returns the number of links.
+ */
 unsigned node_links(const struct node *node,
                     struct node_link_state state[CUBE_LINKS_MAX]);
 
@@ -58,9 +59,9 @@ bool node_has_met(const struct node *node);
 /* Slots of the role's queues that are in use: 0 when no job is open. */
 uint32_t node_held(const struct node *node);
 
-/* Its statistics since its start, as a report to the host has them but for
- * what the board and the links know, and its messages: for who times nodes by
- * their work. */
+/* For a simulator that times nodes by their work: the node's statistics since
+ * its start, as in a report to the host but without those of the board and the
+ * links; and its messages. */
 void node_account(const struct node *node,
                   struct node_finished_message *totals);
 const struct cube_statistics *node_messages(const struct node *node);

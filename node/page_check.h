@@ -62,7 +62,7 @@ bool node_page_check_take(struct node_page_check *check,
                           struct node_page *page);
 
 /* Reports to the host that `sender` has sent a page that it should not have
- * sent.  One report waits at a time: the first. */
+ * sent.  Only the first report is kept until it is sent. */
 void node_page_check_report(struct node_page_check *check, uint16_t sender,
                             uint32_t page);
 

@@ -1,5 +1,5 @@
-/* Tetrahedra as bytes: how finished stars and committed bricks travel from a
- * node to the host.
+/* Tetrahedra as bytes: the form in which finished stars and committed bricks
+ * travel from a node to the host.
  *
  * A batch is a row of records.  The first byte of a record is its head: bits
  * 0-1 the kind (0 tetrahedron, 1 star, 2 commit, 3 finder), then two bits for
@@ -53,7 +53,7 @@ int node_result_finder(struct node_result_writer *writer, uint16_t node);
 size_t node_result_star(struct node_result_writer *writer, uint32_t vertex,
                         const uint32_t (*apexes)[3], size_t count);
 
-/* Returns 1, or 0 where it might not fit. */
+/* Returns 1, or 0 if the record might not fit. */
 int node_result_commit(struct node_result_writer *writer, uint32_t brick);
 
 struct node_result_reader {
@@ -68,7 +68,7 @@ enum node_result_event {
     NODE_RESULT_ROWS,   /* `*count` rows, perhaps few or 0; read on */
     NODE_RESULT_COMMIT, /* `*count` rows, and then reader->brick committed */
     NODE_RESULT_END,    /* `*count` rows, the last */
-    NODE_RESULT_GARBAGE /* not such a batch; reading is over */
+    NODE_RESULT_GARBAGE /* not a batch; reading is over */
 };
 
 /* sender: below `nodes`. */
@@ -82,8 +82,8 @@ enum node_result_event node_result_read(struct node_result_reader *reader,
                                         uint32_t (*rows)[4], size_t rows_max,
                                         size_t *count);
 
-/* Messages of a node that wait for credit or for room on their link: a ring of
- * message buffers that are filled in place and leave in order.
+/* The outbox: messages of a node that wait for credit or for room on their
+ * link, in a ring of buffers that are filled in place and leave in order.
  *
  * Memory: NODE_OUTBOX_BYTES(slots), from the node's arena. */
 
@@ -109,8 +109,8 @@ static inline uint32_t node_outbox_free(const struct node_outbox *box) {
     return box->slot_count - box->used;
 }
 
-/* The buffer of the next message; there must be a free slot.  The same one
- * until it is closed. */
+/* The buffer of the next message, the same until it is closed.  There must be a
+ * free slot. */
 uint8_t *node_outbox_open(struct node_outbox *box);
 void node_outbox_close(struct node_outbox *box, uint8_t type, size_t size);
 

@@ -1,6 +1,6 @@
-/* A flash chip behind its rules: a sector is erased to 0xFF as a whole, a page
- * is programmed by clearing bits, and what is cleared stays so until the sector
- * is erased.  Bytes are counted from the flash's beginning. */
+/* A flash chip and its rules: a sector is erased to 0xFF as a whole, a page is
+ * programmed by clearing bits, and what is cleared stays so until the sector is
+ * erased.  Bytes are counted from the flash's beginning. */
 #ifndef NODE_LOADER_FLASH_H
 #define NODE_LOADER_FLASH_H
 
@@ -16,24 +16,24 @@ struct loader_flash {
     /* Within a page.  False: the flash does not hold these bytes now. */
     bool (*program)(void *context, uint32_t at, const void *bytes, size_t size);
     bool (*erase)(void *context, uint32_t sector);
-    /* A power of two, a page at most: a program that loses power may take with
-     * it all between two multiples of this.  0: nothing but its own bytes. */
+    /* A power of two, at most a page.  If power is lost while bytes are
+     * programmed, all bytes between two multiples of this may be lost with
+     * them.  0: only those bytes. */
     uint32_t torn_bytes;
     const char *worn; /* why it may take nothing any more, for its user */
 };
 
-/* How far apart things of so many bytes are, of which one must not take others
- * with it. */
+/* The distance between items of so many bytes, so that a loss of power destroys
+ * only one. */
 static inline uint32_t loader_flash_apart(const struct loader_flash *flash,
                                           uint32_t bytes) {
     return bytes > flash->torn_bytes ? bytes : flash->torn_bytes;
 }
 
 /* A flash on a memory card, or any device of blocks of 512 bytes: in a
- * partition of type DA, which no system takes for files.  The card erases
- * nothing and programs nothing: a block is written as a whole, and may hold
- * anything where power is lost meanwhile, which the flash's torn_bytes says.
- */
+ * partition of type DA, which no system takes for files.  A card writes a block
+ * as a whole.  If power is lost meanwhile, the block may hold anything; so the
+ * flash's torn_bytes is a block. */
 
 enum {
     LOADER_CARD_BLOCK = 512,
@@ -56,15 +56,16 @@ struct loader_card {
     uint8_t bytes[LOADER_CARD_BLOCK];
 };
 
-/* Finds the first partition that is large enough.  The flash does, where it was
- * not found so far. */
+/* Finds the first partition that is large enough.  The flash's functions call
+ * this if none has been found so far. */
 bool loader_card_open(struct loader_card *card);
 
 /* A new card: its table, with that partition alone.  The device has
  * LOADER_CARD_FIRST + LOADER_CARD_BLOCKS blocks at least. */
 bool loader_card_format(struct loader_card *card);
 
-/* Of a card without one, all bytes are 0xff and nothing is taken. */
+/* The flash's functions.  On a card without a partition all bytes are 0xff, and
+ * programming fails. */
 void loader_card_read(void *context, uint32_t at, void *bytes, size_t size);
 bool loader_card_program(void *context, uint32_t at, const void *bytes,
                          size_t size);
@@ -90,9 +91,9 @@ bool loader_card_store(void *memory, uint32_t block, const uint8_t *bytes);
                 "4 MB, or it is worn"                                          \
     }
 
-/* A flash in memory that keeps its bytes over a loss of power, or stands for
- * one that does: with a flash's rules, so that what is written for it is right
- * on a chip.
+/* A flash in memory that keeps its bytes without power, or stands for such
+ * memory.  It enforces a flash's rules, so code that works with it works with a
+ * chip.
  *
  * Memory: the caller's, LOADER_RAM_SECTORS sectors. */
 

@@ -1,6 +1,6 @@
-/* A board's program as a file, and byte for byte as a slot of its flash holds
- * it: a header of a flash's page, which says what it is and who has signed it,
- * and the code behind it.
+/* A board's program as a file, and byte for byte in a slot of its flash: a
+ * header of one page, which describes and signs the image, and the code after
+ * it.
  *
  * | offset | bytes | field |
  * |---|---|---|
@@ -44,7 +44,7 @@ enum loader_fault {
     LOADER_WRONG_SIGNATURE,
     LOADER_WRONG_DIGEST, /* the code is not what was signed */
     LOADER_WORN,         /* the flash does not hold what it was given */
-    LOADER_TOO_OFTEN,    /* too many transfers, or false ones: budget.h */
+    LOADER_TOO_OFTEN,    /* too many transfers, or false ones: slots.h */
     LOADER_FAULTS
 };
 
@@ -57,7 +57,7 @@ struct loader_image {
     uint8_t signature[SIGN_BYTES];
 };
 
-/* LOADER_NO_IMAGE: these are not the header of one that has code. */
+/* LOADER_NO_IMAGE: the bytes are not the header of an image with code. */
 enum loader_fault loader_image_unpack(struct loader_image *image,
                                       const uint8_t bytes[LOADER_HEADER_BYTES]);
 void loader_image_pack(const struct loader_image *image,
@@ -71,12 +71,12 @@ enum loader_fault loader_image_signed(const uint8_t bytes[LOADER_HEADER_BYTES],
 /* "it is signed with another key", for a message; NULL: LOADER_GOOD. */
 const char *loader_fault_text(enum loader_fault fault);
 
-/* What the host and boards' loaders say to each other to bring an image to
- * boards, all at once: BEGIN and the BLOCKs go to all nodes along the cube's
- * tree; who does not want them passes them over.  A loader that is busy with
- * its flash leaves what comes unread, which holds up the links behind it, and
- * so the host.  Then each is asked what it lacks, and those blocks go again.
- * Whatever is repeated changes nothing. */
+/* The messages by which the host brings an image to all boards at once.  BEGIN
+ * and the BLOCKs go to all nodes along the cube's tree; a node that does not
+ * need them ignores them.  A loader that is busy with its flash leaves messages
+ * unread, which holds back the links behind it, and so the host.  Then the host
+ * asks each loader which blocks it lacks, and sends these again.  A repeated
+ * message changes nothing. */
 
 enum {
     LOADER_BLOCK_BYTES = 1536, /* of an image, the last may have fewer; a whole
@@ -86,9 +86,9 @@ enum {
     LOADER_MAP_BYTES = LOADER_BLOCKS_MAX / 8
 };
 
-/* To all: an image is to come.  Block 0 begins with the header, which comes
- * here already: a board that it is for, and that does not have it, makes a slot
- * ready, or goes on with one in which parts of the same image are. */
+/* To all: announces an image.  It has the header with which block 0 begins.  A
+ * board that the image is for, and that does not have it, prepares a slot, or
+ * continues with a slot that has parts of the same image. */
 struct loader_begin_message {
     uint32_t transfer; /* of this session of the host: any number but 0 */
     uint32_t bytes;    /* of the image, its header included */
@@ -104,8 +104,9 @@ struct loader_block_message {
     uint32_t crc;   /* CRC-32C of its bytes */
 };
 
-/* To all, or to one: NODE_IMAGE_STATE is wanted.  It also comes unasked, once
- * all blocks are there, or verified, or the image is refused. */
+/* To all, or to one: requests NODE_IMAGE_STATE.  A loader also sends it without
+ * a request when all blocks have arrived or are verified, or when it refuses
+ * the image. */
 struct loader_ask_message {
     uint32_t transfer;
 };
@@ -143,8 +144,8 @@ struct loader_state_message {
     uint8_t map[LOADER_MAP_BYTES]; /* block i: bit i % 8 of byte i / 8 */
 };
 
-/* So much of it goes: of the map what says something, as answers of many come
- * over one wire. */
+/* The bytes of it that are sent: only the used part of the map, because the
+ * answers of many boards go over one wire. */
 static inline uint32_t
 loader_state_bytes(const struct loader_state_message *state) {
     uint32_t map = state->phase == LOADER_TAKES ? (state->blocks + 7) / 8 : 0;

@@ -1,20 +1,20 @@
-/* An image on its way into the slot that is not in use, block by block, so that
- * power may be lost at any moment: what starts is good, and what was held is
- * still held.
+/* Takes an image into the slot that is not in use, block by block.  Power may
+ * be lost at any moment: a board still starts only good images, and keeps the
+ * blocks that it has.
  *
- * First the slot loses its header; then its journal gets the header of what is
- * coming.  A block is programmed, read back, and its CRC is put into the
- * journal as its mark: after a loss of power a block is held if its mark is the
- * CRC of what the flash holds.  A sector is erased when the first block comes
- * that needs it.  The header's page follows when the digest is right, and then
- * the record that the next start is of this slot.
+ * First the slot's header is erased.  Then the slot's journal gets the new
+ * image's header.  A block is programmed and read back, and its CRC is written
+ * to the journal as its mark.  After a loss of power, a block counts as held if
+ * its mark is the CRC of its bytes in the flash.  A sector is erased when the
+ * first block arrives that needs it.  When the digest is right, the header's
+ * page is written, and then the record that the next start is of this slot.
  *
  * Nothing is erased or programmed before the header's signature has been
  * verified.  How often a slot is made ready, and how often a false signature is
- * verified, is limited (budget.h).
+ * verified, is limited (slots.h).
  *
- * Work: a step erases a sector, programs a block, looks at 4 blocks, hashes a
- * slice, or proves a signature. */
+ * Work: a step erases a sector, programs a block, checks 4 blocks, hashes a
+ * slice, or verifies a signature. */
 #ifndef NODE_LOADER_INCOMING_H
 #define NODE_LOADER_INCOMING_H
 
@@ -23,7 +23,7 @@
 #include "slots.h"
 #include "image.h"
 
-/* A look at a slot, slice by slice: whether its image may be started. */
+/* Checks a slot, slice by slice: whether its image may be started. */
 
 struct loader_look {
     alignas(64) uint8_t hash[SIGN_HASH_BYTES];
@@ -36,11 +36,12 @@ struct loader_look {
 void loader_look_begin(struct loader_look *look, struct loader_slots *slots,
                        unsigned slot);
 
-/* False: it is over, and slots->fault of the slot says how. */
+/* False: the check is over, and slots->fault of the slot is its result. */
 bool loader_look_step(struct loader_look *look, struct loader_slots *slots);
 
-/* The parts of it, for an image whose header is not in the slot yet: of the
- * header's LOADER_NAMED_BYTES, then slice by slice; false: *good tells. */
+/* The same for an image whose header is not in the slot yet: begins with the
+ * header's LOADER_NAMED_BYTES, then goes slice by slice.  False: the check is
+ * over, and *good is its result. */
 void loader_look_hash(struct loader_look *look,
                       const struct loader_slots *slots,
                       const uint8_t header[LOADER_HEADER_BYTES],
@@ -48,9 +49,9 @@ void loader_look_hash(struct loader_look *look,
 bool loader_look_slice(struct loader_look *look,
                        const struct loader_slots *slots, bool *good);
 
-/* Whether a copy of a good slot's code, in memory where it is to run, is what
- * was signed, whatever the flash gives by now; else the slot is good no more.
- */
+/* Whether a copy of a good slot's code, in the memory where it will run, is
+ * what was signed, whatever the flash returns by now.  Otherwise the slot is
+ * not good any more. */
 bool loader_look_copy(struct loader_look *look, struct loader_slots *slots,
                       unsigned slot, const uint8_t *copy);
 
@@ -88,15 +89,15 @@ struct loader_incoming {
 void loader_incoming_init(struct loader_incoming *incoming,
                           struct loader_slots *slots);
 
-/* What follows is told by `phase`, once it is not busy.  To be called while it
- * is not: bytes: of the image in all.  An image that is being taken already
- * goes on where it is. */
+/* Begins an image of `bytes` bytes in all.  These three functions may be called
+ * while it is not busy; `phase` has the result when it is not busy again.  An
+ * image that is being taken already continues. */
 void loader_incoming_begin(struct loader_incoming *incoming,
                            const uint8_t header[LOADER_HEADER_BYTES],
                            uint32_t bytes);
 
-/* Block `number`, if it is wanted: what has another size or CRC, or is held,
- * is passed over. */
+/* Takes block `number`.  A block of a wrong size or CRC, or one that is held,
+ * is ignored. */
 void loader_incoming_block(struct loader_incoming *incoming, uint32_t number,
                            const uint8_t *bytes, uint32_t size, uint32_t crc);
 

@@ -1,7 +1,7 @@
-/* The boot loader of a bare board as a node of its cube: it passes on what is
- * for others, says who it is, and takes an image (messages.h) into the slot
- * that is not in use.  It never starts one: a board whose loader has been on
- * its links restarts, so that an epoch is used once. */
+/* The boot loader of a bare board as a node of its cube: it forwards messages
+ * for other nodes, reports its identity, and takes an image (image.h) into the
+ * slot that is not in use.  It never starts an image: a board whose loader has
+ * used its links restarts, because an epoch is used once. */
 #ifndef NODE_LOADER_LOADER_H
 #define NODE_LOADER_LOADER_H
 

@@ -1,14 +1,14 @@
-/* Two slots for images in a board's flash, one of them in use, and which of
- * them the next start is of.  An image that was brought is on trial: a start of
- * it that ends in a fault, or the third in a row that neither confirms it nor
- * lasts, falls back to the other.  What is confirmed is left only when it is
- * good no more.
+/* Two slots for images in a board's flash, one of them in use, and the choice
+ * of the slot for the next start.  A new image is on trial.  After a start of
+ * it that ends in a fault, or the third start in a row that neither confirms it
+ * nor lasts, the board falls back to the other slot.  A confirmed image stays
+ * in use as long as it is good.
  *
- * Of the flash, sectors 0 and 1 are boots.h's, 2 and 3 hold this state, 4 the
- * board's serial number; slots begin at sector 16, where there are 64, else at
- * sector 5, and take half of the rest each, 1 MB at most.  A slot is the image
- * byte for byte, its header's page written last; the last sectors of a slot are
- * the journal of what is coming (incoming.h).
+ * Sectors 0 and 1 of the flash count starts, 2 and 3 hold this state, and 4 the
+ * board's serial number.  Slots begin at sector 16 if the flash has 64 sectors,
+ * otherwise at sector 5.  Each takes half of the rest, at most 1 MB.  A slot is
+ * the image byte for byte, its header's page written last; the last sectors of
+ * a slot are the journal of what is coming (incoming.h).
  *
  * Memory: struct loader_slots; a hash of SIGN_HASH_BYTES on the stack. */
 #ifndef NODE_LOADER_SLOTS_H
@@ -20,10 +20,10 @@
 #include "flash.h"
 #include "image.h"
 
-/* Limits on what messages can order that wears a board's flash or keeps its
- * loader busy: a number of times at once, then one in each period, whatever
- * orders it.  The counts are in memory that outlasts a restart.  Only a loss of
- * power resets them, and no message can cause that.
+/* Limits on actions that messages can request and that wear a board's flash or
+ * keep its loader busy: a number of times at once, then one in each period,
+ * whatever requests them.  The counts are in memory that outlasts a restart.
+ * Only a loss of power resets them, and no message can cause that.
  *
  * |            | at once | then one in | what it bounds |
  * |------------|---------|-------------|----------------|
@@ -63,10 +63,11 @@ bool loader_budget_has(const struct loader_budget *budget,
                        enum loader_expense what);
 bool loader_budget_take(struct loader_budget *budget, enum loader_expense what);
 
-/* Records of one size in two sectors of a flash, one behind the other, in
- * turns, each with a number larger than all before: the newest one counts.  One
- * that was not written whole, as power was lost, is passed over, and its number
- * too, as it may be read as whole one day. */
+/* Records of one size in two sectors of a flash.  They are written one after
+ * the other, alternating between the sectors, each with a number larger than
+ * all before.  The newest record is valid.  A record that was torn by a loss of
+ * power is skipped, and so is its number, because the record may be read as
+ * whole later. */
 
 enum {
     LOADER_RECORD_OWN = 12, /* bytes of a record that are not its body */
@@ -81,8 +82,8 @@ struct loader_records {
                        page */
 };
 
-/* Where things are in a board's flash, whatever its sectors and pages: see
- * slots.h. */
+/* The layout of a board's flash, for any size of sectors and pages: see the
+ * top. */
 
 enum {
     LOADER_STATE_SECTOR = 2, /* and the next */
@@ -134,7 +135,7 @@ enum {
     LOADER_SLICE_BYTES = 1024 /* that are hashed at a time */
 };
 
-/* What the board takes, and from whom. */
+/* Which images the board accepts. */
 struct loader_rules {
     const struct loader_flash *flash;
     const struct sign_suite *suite;
@@ -176,10 +177,10 @@ static inline void loader_slots_alive(const struct loader_slots *slots) {
         slots->rules->alive();
 }
 
-/* A board's start, before all else: counts it (boots.h), opens, and chooses.
- * LOADER_SLOTS as well where the flash takes no record of it: *boot is 0 then,
- * and the board waits in its loader, which says why, as it would do nothing but
- * restart without a number of its own. */
+/* The first call at a board's start: counts the start (loader_boots_next),
+ * opens the slots, and chooses one.  If the flash takes no record of the start,
+ * it returns LOADER_SLOTS, and *boot is 0.  Then the board waits in its loader,
+ * which reports why: without a number of its own it could only restart. */
 unsigned loader_slots_start(struct loader_slots *slots,
                             const struct loader_rules *rules, bool ended_badly,
                             uint32_t *boot);
@@ -189,62 +190,60 @@ unsigned loader_slots_start(struct loader_slots *slots,
  * back then, if it is on trial.  Once a start. */
 unsigned loader_slots_choose(struct loader_slots *slots, bool ended_badly);
 
-/* What a loader with these rules has against a header, its signature apart; the
- * header is in *image then, but with LOADER_NO_IMAGE. */
+/* Why a loader with these rules refuses a header, the signature apart. *image
+ * is the header, except with LOADER_NO_IMAGE. */
 enum loader_fault loader_slots_suits(const struct loader_slots *slots,
                                      const uint8_t header[LOADER_HEADER_BYTES],
                                      struct loader_image *image);
 
-/* The next start is of this one, or of none.  False: the flash does not take
- * the record. */
+/* Sets the slot of the next start, or none.  False: the flash does not take the
+ * record. */
 bool loader_slots_use(struct loader_slots *slots, unsigned slot, bool trial);
 
 /* Counts a start of the slot in use, if it is on trial, right before the jump.
  * False: the flash does not take the record; it must not be started. */
 bool loader_slots_try(struct loader_slots *slots);
 
-/* Of the image that runs, from this slot, and before it is on its links, as it
- * reads two sectors: whether it has to tell that it has come up, and the state
- * that says so.  It needs nothing else of the loader. */
+/* For the running image from this slot, before it uses its links, because it
+ * reads two sectors: whether it must confirm that it has come up, and the state
+ * for that.  The image needs nothing else of the loader. */
 bool loader_slots_unconfirmed(const struct loader_flash *flash, unsigned slot,
                               struct loader_state *up);
 
-/* It has come up.  False: the flash does not take the record. */
+/* The running image has come up.  False: the flash does not take the record. */
 bool loader_slots_confirm(const struct loader_flash *flash,
                           const struct loader_state *up);
 
 /* Where its code is in the flash. */
 uint32_t loader_slots_code(const struct loader_slots *slots, unsigned slot);
 
-/* Of the same, as soon as it has run for so long that no start of it can be
- * called one that failed: those before count no more, as a person may turn a
- * board off and on that is not wired yet.  It is still on trial, and a start
- * that ends in a fault falls back.  False: the flash does not take the record.
- */
+/* For the running image, when it has run for LOADER_LIVED_US: earlier starts do
+ * not count as failures any more, because a person may turn an unwired board
+ * off and on.  The image is still on trial, and a start that ends in a fault
+ * falls back.  False: the flash does not take the record. */
 bool loader_slots_lived(const struct loader_flash *flash, unsigned slot);
 
-/* Puts an image, checked by the caller, into slot 0 of a flash that no board
- * is using, and makes it the one in use: for who makes boards' chips.  False:
- * it does not fit. */
+/* Puts an image, checked by the caller, into slot 0 of a flash that no board is
+ * using, and makes it the one in use: for the host, which makes chips of
+ * emulated boards.  False: it does not fit. */
 bool loader_slots_install(const struct loader_flash *flash,
                           const uint8_t *image, uint32_t bytes);
 
-/* The board's serial number; false: it has none, and it is zeros.  It is given
- * once, and whatever is told later changes nothing; false: the flash does not
- * take it. */
+/* _serial: the board's serial number; false: it has none, and serial is zeros.
+ * _name: gives the number once; later calls change nothing.  False: the flash
+ * does not take it. */
 bool loader_slots_serial(const struct loader_flash *flash,
                          uint8_t serial[LOADER_SERIAL_BYTES]);
 bool loader_slots_name(const struct loader_flash *flash,
                        const uint8_t serial[LOADER_SERIAL_BYTES]);
 
-/* The number of a board's start, which never comes again: records in the first
- * two sectors of its flash, one behind the other, in turns.  A record that was
- * not written whole, as power was lost, is passed over, and its number too. */
+/* The number of a board's start, which is never used again: records, as above,
+ * in the first two sectors of its flash. */
 
 enum { LOADER_BOOT_BYTES = 16 /* of a record: it divides a page */ };
 
-/* 1 at the first start, and larger than ever before at each: recorded before it
- * is told.  False: it could not be. */
+/* 1 at the first start, and larger at each later one.  It is recorded before it
+ * is returned.  False: it could not be recorded. */
 bool loader_boots_next(const struct loader_flash *flash, uint32_t *boot);
 
 #endif

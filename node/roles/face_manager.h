@@ -1,7 +1,7 @@
-/* What is the same in all face managers, whatever carries their lists
- * (carrier.h): jobs from the host, a front that lends its faces
- * (incode/paper/manager.h), results and spilled faces to the host.  A role that
- * has one calls these functions with its own. */
+/* The common part of all face managers, with any carrier of lists (lists.h):
+ * jobs from the host, a front that lends its faces (incode/paper/manager.h),
+ * results and spilled faces to the host.  The functions of such a role call
+ * these. */
 #ifndef NODE_FACE_MANAGER_H
 #define NODE_FACE_MANAGER_H
 
@@ -24,11 +24,11 @@ struct node_face_manager {
     struct incode_manager manager;
 };
 
-/* Bytes beside the struct that suffice, in a node of so much memory. */
+/* Bytes that suffice beside the struct, in a node of so much memory. */
 size_t node_face_manager_min(size_t memory);
 
-/* memory: aligned to NODE_ALIGNMENT.  counted and fault stay.  False: it has
- * told why. */
+/* memory: aligned to NODE_ALIGNMENT.  counted and fault must outlive it.
+ * False: *fault is set. */
 bool node_face_manager_start(struct node_face_manager *f, void *memory,
                              size_t bytes,
                              const struct node_setup_message *setup,

@@ -1,6 +1,7 @@
 /* The holder's role in the strategy `sequential`: keeps pages for a worker, and
- * asks the host for those that it does not have.  Whose a page is, keepers.h
- * says; there it has the frame of its place, modulo their number. */
+ * requests missing pages from the host. common.h defines which holder keeps a
+ * page, and the page's index there; its frame is the index modulo the number of
+ * frames. */
 #ifndef NODE_HOLDER_H
 #define NODE_HOLDER_H
 

@@ -1,11 +1,12 @@
-/* Pages between the nodes of an exchange.  A page of points belongs to who has
- * its brick, one of boxes to who has its first brick; that node gets it of the
- * host, others ask that node for it.  What it has given up it leaves to the
- * host to send, so that nobody waits for more than one node; and some pages
- * come to all, unasked.
+/* Pages between the nodes of an exchange.  A page of points belongs to the node
+ * that has its brick, a page of boxes to the node that has its first brick.
+ * This node requests the page from the host; others request it from this node.
+ * If it has evicted the page, it passes the request on to the host, so no node
+ * waits for more than one other.  Some pages are sent to all nodes without a
+ * request.
  *
- * Memory: node_lending_bytes of the role's arena: each other node may have
- * asked for NODE_PAGES_LENT_MAX pages and not got them. */
+ * Memory: node_lending_bytes of the role's arena.  Each other node may have
+ * NODE_PAGES_LENT_MAX requests outstanding. */
 #ifndef NODE_LENDING_H
 #define NODE_LENDING_H
 
@@ -18,11 +19,11 @@
 #include "node/page_check.h"
 #include "incode/lending.h"
 
-/* Tetrahedra on their way to other nodes, for an exchange: small batches, each
- * for one node, that leave as soon as the link has room.
+/* Tetrahedra on their way to other nodes of an exchange, in small batches, each
+ * for one node.  A batch leaves as soon as the link has room.
  *
- * Memory: node_shares_bytes of the role's arena: NODE_SHARE_BATCHES batches
- * of NODE_SHARES_A_BATCH, and the first brick of each node's region. */
+ * Memory: node_shares_bytes of the role's arena: NODE_SHARE_BATCHES batches of
+ * NODE_SHARES_A_BATCH, and the first brick of each node's region. */
 
 enum { NODE_SHARE_BATCHES = 48, NODE_SHARES_A_BATCH = 32 };
 
@@ -93,15 +94,15 @@ void node_lending_init(struct node_lending *lending, void *memory,
                        const struct node_shares *shares,
                        struct node_counted *counted, struct node_fault *fault);
 
-/* Regions are known: from that page on all come unasked. */
+/* Regions are known: all pages from that one on are sent without a request. */
 void node_lending_to_all(struct node_lending *lending, uint32_t first);
 
-/* Whom to ask for a page, once regions are known: a node, CUBE_HOST, or
- * NODE_LENDING_COMES: nobody, as it comes to all. */
+/* From where to request a page, once regions are known: a node, CUBE_HOST, or
+ * NODE_LENDING_COMES: no request, because it is sent to all. */
 uint16_t node_lending_keeper(const struct node_lending *lending, uint32_t page);
 
-/* How many pages may be asked of that keeper now; that so many were; and that
- * one of them has come. */
+/* _room: how many pages may be requested from that keeper now. _asked: so many
+ * were requested. _came: one of them has arrived. */
 uint32_t node_lending_room(const struct node_lending *lending, uint16_t keeper);
 void node_lending_asked(struct node_lending *lending, uint16_t keeper,
                         uint32_t pages);
@@ -123,25 +124,25 @@ uint32_t node_lending_take_to_all(struct node_lending *lending,
 unsigned node_lending_send(struct node_lending *lending,
                            struct incode_triangulator *triangulator);
 
-/* Work that moves while the nodes of an exchange run: who has nothing to do
- * asks the others, one after another, his neighbours first; who has many ready
- * vertices lends a run of them to one that has asked (incode/front/exchange.h),
- * and uses what comes back.
+/* Loans of work between the nodes of an exchange.  A node that has nothing to
+ * do asks the other nodes one after another, its neighbours first.  A node with
+ * many ready vertices lends a run of them to a node that has asked
+ * (incode/front/exchange.h), and uses the tetrahedra that come back.
  *
- * A node asks each other node once, and again when it has been lent something
- * and is through with it, so that asks are as few as nodes and loans.  An ask
- * stays with who is asked until it can be met; nobody waits for it, nothing is
- * repeated by time, and no node is awake for it.  A loan that comes when there
- * is no place for it, as others came first, goes back as it was.
+ * A node asks each other node once, and again after it has returned a loan from
+ * it, so the number of requests is bounded by the nodes and the loans.  The
+ * asked node keeps a request until it can lend.  No node waits for a request,
+ * and none is repeated by time.  A loan that arrives when there is no slot for
+ * it is returned unchanged.
  *
- * The lender is not quiet (waves.h) while a loan is out, and the borrower tells
- * nothing to others, so loans are not counted for the end.  A lender waits for
- * a borrower at most, a borrower for pages alone: there is no circle.
+ * The lender is not quiet (waves.h) while a loan is out, and the borrower sends
+ * to the lender only, so waves do not count loans.  A lender waits only for a
+ * borrower, and a borrower only for pages, so there is no circle.
  *
- * Memory: the struct, about 12 KB, with a place for each loan that may be out
- * and what comes back of it, NODE_LOANS_OUT, and for those that are borrowed,
- * NODE_LOANS_IN; and node_loans_bytes of the role's arena, a bit a node for
- * who has asked, who is asked, and whose loan goes back. */
+ * Memory: the struct, about 12 KB, with slots for NODE_LOANS_OUT loans that are
+ * out and their answers, and for NODE_LOANS_IN borrowed loans; and
+ * node_loans_bytes of the role's arena: three bits for each node, whether it
+ * has asked, was asked, and gets its loan back. */
 
 enum { NODE_LOANS_OUT = 4, NODE_LOANS_IN = 2 };
 
@@ -189,11 +190,12 @@ void node_loans_init(struct node_loans *loans, void *memory,
 void node_loans_take(struct node_loans *loans,
                      const struct cube_message *message);
 
-/* The borrower whose loan `use` goes on with: it found what `use` emits. */
+/* The borrower of the loan that node_loans_use works on: it found the
+ * tetrahedra that are emitted. */
 uint16_t node_loans_finder(const struct node_loans *loans);
 
-/* A step with what came back, or with what is borrowed, of about so many units;
- * false: there is nothing to do. */
+/* A step of about so many units, with a loan that came back (_use) or is
+ * borrowed (_help).  False: there is nothing to do. */
 bool node_loans_use(struct node_loans *loans, struct incode_triangulator *t,
                     uint32_t units);
 bool node_loans_help(struct node_loans *loans, struct incode_triangulator *t,

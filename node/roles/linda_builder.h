@@ -1,6 +1,6 @@
-/* A tetrahedron builder of the Linda program (figure 9 of the paper): once eval
- * has started it, takes lists of faces from the tuple space and puts answers,
- * until it takes the end. */
+/* A tetrahedron builder of the Linda program (figure 9 of the paper): after
+ * eval has started it, it takes lists of faces from the tuple space and puts
+ * answers, until it takes the end. */
 #ifndef NODE_LINDA_BUILDER_H
 #define NODE_LINDA_BUILDER_H
 

@@ -1,6 +1,6 @@
-/* The face manager of the Linda program (figure 8 of the paper): lends its
- * faces as tuples, which builders that it has started by eval take when they
- * like (linda_builder.h), and stops them at the end. */
+/* The face manager of the Linda program (figure 8 of the paper): starts the
+ * builders by eval (linda_builder.h), lends its faces as tuples, which the
+ * builders take, and stops the builders at the end. */
 #ifndef NODE_LINDA_MANAGER_H
 #define NODE_LINDA_MANAGER_H
 

@@ -11,21 +11,21 @@
 #include "node/message.h"
 #include "node/result.h"
 
-/* What carries lists of faces from a face manager to tetrahedron builders, and
- * answers back: messages from node to node (lists.h), or a tuple space.  Each
- * end sees the same: a manager sends struct incode_list and is sent struct
- * incode_answers, a builder the other way round, as many bytes of them as are
- * in use (incode/paper/list.h). */
+/* A carrier brings lists of faces from a face manager to tetrahedron builders,
+ * and answers back: by messages from node to node (below), or through a tuple
+ * space.  Both ends have the same interface.  A manager sends struct
+ * incode_list and receives struct incode_answers, a builder the reverse; only
+ * the used bytes travel (incode/paper/list.h). */
 
 struct node_carrier {
     void *context;
-    /* Whether it takes something to send now.  It must have room for what is
-     * sent back before it does. */
+    /* Whether it can send now.  It reserves room for the reply before it sends.
+     */
     bool (*has_room)(void *context);
     /* Sends, where it has room. */
     void (*send)(void *context, const void *data, size_t size);
-    /* What was sent to this end and waits, one of them: the same until it is
-     * dropped; NULL: nothing. */
+    /* The first message that waits at this end, the same until it is dropped;
+     * NULL: none. */
     const void *(*first)(void *context, size_t *size);
     void (*drop)(void *context);
 };
@@ -44,12 +44,13 @@ struct node_lists {
     uint64_t bytes_in, bytes_out;
 };
 
-/* Bytes for so many messages that wait. */
+/* Bytes for so many waiting messages. */
 size_t node_lists_bytes(uint32_t places);
 
 /* sends: NODE_LIST (a manager, each_max lists a builder) or NODE_ANSWERS (a
- * builder, to one manager, a place for each list that this may send).  memory:
- * aligned to NODE_ALIGNMENT.  counted and fault stay. */
+ * builder, to one manager, with a slot for each list that the manager may
+ * send). memory: aligned to NODE_ALIGNMENT. counted and fault must outlive it.
+ */
 void node_lists_init(struct node_lists *lists, void *memory, uint32_t places,
                      uint8_t sends, uint32_t each_max,
                      struct node_counted *counted, struct node_fault *fault);
@@ -59,14 +60,14 @@ void node_lists_add(struct node_lists *lists, uint16_t peer);
 
 struct node_carrier node_lists_carrier(struct node_lists *lists);
 
-/* NODE_LIST or NODE_ANSWERS; what is not sound is a fault. */
+/* NODE_LIST or NODE_ANSWERS; an unsound message is a fault. */
 void node_lists_take(struct node_lists *lists,
                      const struct cube_message *message);
 
-/* A peer that owes answers; CUBE_HOST: none does. */
+/* A peer whose answers are outstanding; CUBE_HOST: there is none. */
 uint16_t node_lists_owing(const struct node_lists *lists);
 
-/* Messages that wait. */
+/* Waiting messages. */
 uint32_t node_lists_held(const struct node_lists *lists);
 
 #endif

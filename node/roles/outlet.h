@@ -1,6 +1,6 @@
-/* What a role with a front sends to the host, and takes back: finished
- * tetrahedra and commits under credit, and spilled faces.  It is the front's
- * outside (incode/front/job.h). */
+/* The messages of a role with a front to the host: finished tetrahedra and
+ * commits under credit, and spilled faces, which come back.  It is the front's
+ * struct incode_front_outside (incode/front/job.h). */
 #ifndef NODE_OUTLET_H
 #define NODE_OUTLET_H
 
@@ -22,7 +22,7 @@ struct node_outlet {
     uint64_t bytes_out;
 };
 
-/* Bytes for a role whose arena, or memory as a whole, has so many. */
+/* Bytes for a role whose arena, or whole memory, has so many bytes. */
 size_t node_outlet_bytes(size_t bytes);
 
 /* memory: aligned to NODE_ALIGNMENT, node_outlet_bytes(bytes) of it.  counted
@@ -34,34 +34,35 @@ void node_outlet_init(struct node_outlet *outlet, void *memory, size_t bytes,
 /* As a front sees it. */
 struct incode_front_outside node_outlet_outside(struct node_outlet *outlet);
 
-/* A job begins: what leaves from now on is of its epoch. */
+/* A job begins: messages from now on have its epoch. */
 void node_outlet_begin(struct node_outlet *outlet, uint32_t epoch);
 
 /* The tetrahedra that the front emits from now on were found by that node;
  * before the first call, by this node. */
 void node_outlet_found_by(struct node_outlet *outlet, uint16_t node);
 
-/* Whether it takes the results of a step; without room, a front waits. */
+/* Whether there is room for the results of a step.  Without room, a front
+ * waits. */
 bool node_outlet_has_room(const struct node_outlet *outlet);
 
-/* No more results are to come: the last message of them may leave. */
+/* There are no more results: their last message may leave. */
 void node_outlet_close(struct node_outlet *outlet);
 
-/* NODE_CREDIT; what is not sound is a fault. */
+/* NODE_CREDIT; an unsound message is a fault. */
 void node_outlet_take_credit(struct node_outlet *outlet, const uint8_t *data,
                              size_t size);
 
-/* NODE_UNSPILL: true with *header and its faces, for incode_front_unspill;
- * false where it is of another job, or not sound, which is a fault. */
+/* NODE_UNSPILL: true with *header and its faces, for incode_front_unspill.
+ * False: it is of another job, or unsound, which is a fault. */
 bool node_outlet_take_unspill(struct node_outlet *outlet, const uint8_t *data,
                               size_t size, struct node_spill_header *header,
                               struct incode_face faces[NODE_FACES_A_MESSAGE]);
 
-/* The front knows of no such faces. */
+/* The front has refused the faces: a fault. */
 void node_outlet_refuse_unspill(struct node_outlet *outlet, uint32_t brick);
 
-/* Whether what may leave is so little that it can wait for more: results alone,
- * and there is room for as many again. */
+/* Whether the messages that may leave are so few that they can wait for more:
+ * only results, with room for as many again. */
 bool node_outlet_few(const struct node_outlet *outlet);
 
 /* Sends what may leave; the number of messages. */

@@ -26,29 +26,30 @@ struct node_role {
      * `memory` bytes in all. */
     size_t (*arena_min)(size_t memory, const struct node_setup_message *setup);
 
-    /* Begins anew, in an arena aligned to NODE_ALIGNMENT with anything in it.
-     * counted and fault stay: the one sends its messages, the other takes what
-     * keeps it from going on, now or later.  False: it has told so. */
+    /* Begins the role in an arena that is aligned to NODE_ALIGNMENT and not
+     * cleared.  The role sends its messages by counted, and reports by fault
+     * why it cannot continue, now or later; both outlive it.  False: *fault is
+     * set. */
     bool (*start)(void *self, size_t bytes,
                   const struct node_setup_message *setup,
                   struct node_counted *counted, struct node_fault *fault);
 
-    /* Takes a message of any type that the node does not answer itself: it must
-     * not hold back what it cannot serve yet, but for what follows. */
+    /* Takes a message of any type that the node does not answer itself.  It
+     * must take every message at once, except as `may_take` permits. */
     void (*message)(void *self, const struct cube_message *message,
                     uint64_t now_us);
 
-    /* Whether it takes this message now: one that it does not stays on its
-     * link, and holds back what comes behind.  It may say so only for as long
-     * as messages to the host have no room, as those always get some.  NULL: it
-     * takes all. */
+    /* Whether the role takes this message now.  Otherwise the message stays on
+     * its link, and holds back those behind it.  The role may refuse only while
+     * there is no room for messages to the host, which always get room in time.
+     * NULL: it takes all. */
     bool (*may_take)(void *self, const struct cube_message *message);
 
-    /* Computes for as long as the pace has it; the number of steps that did
-     * something. */
+    /* Computes for as long as the pace permits.  Returns the number of steps
+     * that did something. */
     unsigned (*work)(void *self, struct node_pace *pace);
 
-    /* Sends what may leave; the number of messages. */
+    /* Sends what may leave.  Returns the number of messages. */
     unsigned (*send)(void *self);
 
     /* The epoch of the job whose last result has left, so that its statistics
@@ -59,11 +60,12 @@ struct node_role {
      * 0, and never after a fault. */
     void (*end)(void *self, uint64_t now_us);
 
-    /* A page that it has asked for and not got; INCODE_NONE: there is none. */
+    /* The page that blocks the role: requested and not arrived.  INCODE_NONE:
+     * there is none. */
     uint32_t (*awaited)(const void *self);
 
-    /* A node that owes it answers to a list; CUBE_HOST: none.  NULL: it has no
-     * lists. */
+    /* A node whose answers to a list are outstanding; CUBE_HOST: none.  NULL:
+     * the role has no lists. */
     uint32_t (*owing)(const void *self);
 
     /* Slots of its queues in use; 0 when no job is open. */
@@ -74,7 +76,8 @@ struct node_role {
     void (*totals)(const void *self, struct node_finished_message *totals,
                    uint64_t now_us);
 
-    /* How full its tables are now; what it has not, stays. */
+    /* How full its tables are now.  Fields of tables that it does not have
+     * stay. */
     void (*gauge)(const void *self, struct incode_gauge *gauge);
 
     /* Fills in `tables` and `pages` of the memory map. */

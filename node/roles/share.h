@@ -1,13 +1,13 @@
-/* A node's share of the tuple space (transport/tuples), and how roles use it:
- * a carrier of lists and answers (carrier.h) as tuples (kind, bytes), and the
+/* A node's share of the tuple space (transport/tuples), and its use by roles: a
+ * carrier of lists and answers (lists.h) as tuples (kind, bytes), and the
  * process that eval starts here.
  *
  * The places are the manager and its builders, as the setup names them, in the
- * order of their numbers.  Kinds are numbers chosen so that, as keys, they have
- * their tuples live with the manager, who is the other end of all of them: a
- * list is one message away from its builder, and the manager sees who has taken
- * one and put no answer.  Its store never fills: as many lists are out at a
- * time as it holds of the largest tuple. */
+ * order of their numbers.  Kinds are keys, chosen so that all tuples are stored
+ * at the manager, which is one end of every transfer.  So a list reaches its
+ * builder in one message, and the manager knows which node has taken a list and
+ * has not answered.  Its store never fills: the number of lists that are out is
+ * bounded by the largest tuples that it holds. */
 #ifndef NODE_SHARE_H
 #define NODE_SHARE_H
 
@@ -46,7 +46,7 @@ struct node_share {
     int taking[NODE_SHARE_TAKES_MAX];  /* its operations, or -1 */
     uint32_t out, out_max;             /* jobs without an answer */
     uint32_t taken;                    /* by the carrier */
-    bool ended;                        /* it was told the end */
+    bool ended;                        /* it has taken the end */
     uint64_t bytes_in, bytes_out;
     uint16_t places;
     uint16_t node_of[NODE_BUILDERS_MAX + 1]; /* places, in rising order */
@@ -55,7 +55,7 @@ struct node_share {
 /* Bytes beside the struct, for a sound setup; 0: it is not sound. */
 size_t node_share_bytes(const struct node_setup_message *setup);
 
-/* memory: aligned to NODE_ALIGNMENT.  False: told why. */
+/* memory: aligned to NODE_ALIGNMENT.  False: *fault is set. */
 bool node_share_init(struct node_share *share, void *memory,
                      const struct node_setup_message *setup,
                      tuples_function *process, void *role,
@@ -65,8 +65,8 @@ bool node_share_init(struct node_share *share, void *memory,
 void node_share_take(struct node_share *share,
                      const struct cube_message *message);
 
-/* Puts tuples of one kind, and takes those of the other, of which it asks for
- * so many at a time, 1 .. NODE_SHARE_TAKES_MAX. */
+/* Puts tuples of one kind, and takes those of the other, with up to takes_max
+ * requests at a time, 1 .. NODE_SHARE_TAKES_MAX. */
 struct node_carrier node_share_carrier(struct node_share *share,
                                        enum node_share_kind puts,
                                        enum node_share_kind takes,
@@ -77,25 +77,25 @@ struct node_carrier node_share_carrier(struct node_share *share,
  * there is none. */
 uint16_t node_share_owing(const struct node_share *share);
 
-/* Takes no more: what is asked for is given up. */
+/* Takes no more tuples: pending requests are given up. */
 void node_share_stop(struct node_share *share);
 
-/* Begins what is due once for each other place, as long as more than so many
- * operations are left: eval of the process there, or out of the end.  It goes
- * on unseen.  False: nothing is due, or may begin. */
+/* _eval_all: an eval of the process at each other place. _end_all: an out of
+ * the end for each.  A call begins as many of these operations as leave `kept`
+ * operations free, and closes each at once.  False: none was begun. */
 bool node_share_eval_all(struct node_share *share, uint32_t *count,
                          unsigned kept);
 bool node_share_end_all(struct node_share *share, uint32_t *count,
                         unsigned kept);
 
-/* Takes a tuple (kind, number) or (kind, bytes) by an operation of that number,
- * begun where it is -1, and that again when the tuple has come: true.  `into`
- * takes its bytes, of which there must be as many. */
+/* Takes a tuple (kind, number) or (kind, bytes) by *operation, which begins if
+ * it is -1.  True: the tuple has come, and *operation is -1 again.  `into` gets
+ * the tuple's bytes, which must be `size`. */
 bool node_share_in_worker(struct node_share *share, int *operation);
 bool node_share_in_bytes(struct node_share *share, enum node_share_kind kind,
                          int *operation, void *into, size_t size);
 
-/* Puts one; false: as many operations are open as may be. */
+/* Puts a tuple; false: no operation is free. */
 bool node_share_out_bytes(struct node_share *share, enum node_share_kind kind,
                           const void *data, size_t size);
 

@@ -1,7 +1,6 @@
-/* What is the same in all tetrahedron builders, whatever carries their lists
- * (carrier.h): a maker that answers them (incode/paper/builder.h), and the
- * pages that it asks for.  A role that has one calls these functions with its
- * own. */
+/* The common part of all tetrahedron builders, with any carrier of lists
+ * (lists.h): a maker that answers them (incode/paper/builder.h), and its page
+ * requests.  The functions of such a role call these. */
 #ifndef NODE_TETRA_BUILDER_H
 #define NODE_TETRA_BUILDER_H
 
@@ -21,8 +20,8 @@ struct node_tetra_builder {
 /* Bytes beside the struct that suffice for this setup. */
 size_t node_tetra_builder_min(const struct node_setup_message *setup);
 
-/* memory: aligned to NODE_ALIGNMENT.  counted and fault stay.  False: it has
- * told why. */
+/* memory: aligned to NODE_ALIGNMENT.  counted and fault must outlive it.
+ * False: *fault is set. */
 bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
                               size_t bytes,
                               const struct node_setup_message *setup,
@@ -30,8 +29,8 @@ bool node_tetra_builder_start(struct node_tetra_builder *t, void *memory,
                               struct node_counted *counted,
                               struct node_fault *fault);
 
-/* Messages of the host or a holder: a page.  Credit is passed over, as it has
- * no results.  False: it is another one. */
+/* Messages of the host or a holder: a page.  Credit is ignored, because the
+ * role has no results.  False: another message. */
 bool node_tetra_builder_message(struct node_tetra_builder *t,
                                 const struct cube_message *message);
 

@@ -1,5 +1,5 @@
-/* What roles with a triangulator have in common: its job, its pages, what it
- * gives away, and the time that it has. */
+/* The common part of all roles with a triangulator: its job, its pages, its
+ * results, and its time. */
 #ifndef NODE_TRIANGULATION_H
 #define NODE_TRIANGULATION_H
 
@@ -26,8 +26,8 @@ struct node_jobs {
 void node_jobs_init(struct node_jobs *jobs, uint32_t bricks,
                     struct node_fault *fault);
 
-/* NODE_JOB: true with *job, which is open from now on; false: it is not sound,
- * or not the time for it, which is a fault. */
+/* NODE_JOB: true with *job, which is open from now on.  False: it is unsound,
+ * or another job is open, which is a fault. */
 bool node_jobs_take(struct node_jobs *jobs, const struct cube_message *message,
                     uint64_t now_us, struct incode_job *job);
 
@@ -68,8 +68,8 @@ size_t node_triangulation_min(size_t memory,
                               const struct node_setup_message *setup);
 
 /* Begins in the arena, of which the first `own` bytes are the role's.  peers,
- * lending: of an exchange, or share = NULL, and NULL.  What is given stays.
- * False: it does not fit, which is a fault. */
+ * lending: of an exchange, or share = NULL, and NULL.  All arguments must
+ * outlive it.  False: it does not fit, which is a fault. */
 bool node_triangulation_start(struct node_triangulation *t, void *arena,
                               size_t bytes, size_t own,
                               const struct node_setup_message *setup,
@@ -83,9 +83,9 @@ bool node_triangulation_message(struct node_triangulation *t,
                                 const struct cube_message *message,
                                 uint64_t now_us);
 
-/* For roles that have other work too: a step of at most so many units; false:
- * there is nothing to do.  context: the struct.  And after some of them, what
- * the last one has left goes out. */
+/* For roles that have other work too. _step: a step of at most so many units;
+ * false: there is nothing to do; context: the struct. _close: after some steps,
+ * sends what the last one has left. */
 bool node_triangulation_step(void *context, uint32_t units, uint32_t *spent);
 void node_triangulation_close(struct node_triangulation *t);
 

@@ -1,22 +1,24 @@
-/* Whether all nodes of a cube have nothing to do: waves along the binomial tree
- * of node 0, in which the parent of node i is i & (i - 1).  A wave goes down
- * from node 0 at once; its answers come up, each when a node is quiet and has
- * those of its children, with what all of them have sent to others and had from
- * them.  Two waves with the same sums, as much received as sent, mean that the
- * whole cube was quiet between them, and nothing was under way (the four
- * counters of Mattern, Distributed Computing 2:161-175, 1987).
+/* Detects that all nodes of a cube have nothing to do, by waves along the
+ * binomial tree of node 0, in which the parent of node i is i & (i - 1).  A
+ * wave goes down from node 0 at once.  A node answers when it is quiet and has
+ * its children's answers.  The answer has the sums of tetrahedra that this
+ * subtree has sent to other nodes and received from them.  If two waves have
+ * the same sums, and as much was received as sent, the whole cube was quiet
+ * between them, and nothing was under way (the four counters of Mattern,
+ * Distributed Computing 2:161-175, 1987).
  *
- * The first wave is the barrier at the start: it is answered by who is ready to
- * receive.  The next lets all begin.  Where the cube is quiet and work is left,
- * one tells all to seed; where that has been, it is stuck.
+ * The first wave is the barrier at the start: a node answers it when it is
+ * ready to receive.  The next lets all nodes begin.  If the cube is quiet and
+ * work is left, a wave orders all nodes to try first tetrahedra.  If that has
+ * been done, the cube is stuck, which is a fault.
  *
- * A tetrahedron that was sent and does not come, although no link has lost it,
- * would have waves go round for ever.  Links may be slow, but the nodes answer
- * waves meanwhile, and each takes what has come before it does; so where
- * the sums have differed and not changed for NODE_WAVES_UNCHANGED waves and for
- * NODE_WAVES_UNCHANGED_US, which no living link keeps a frame for, it is a
- * fault.  One of the two is not enough: waves are quick where links are, and a
- * node that stands still answers none. */
+ * If a tetrahedron was sent and does not arrive, although no link has lost it,
+ * waves would go on for ever.  Links may be slow, but nodes answer waves
+ * meanwhile, and each node takes the messages that have arrived before it
+ * answers.  So it is a fault if sent and received differ and have not changed
+ * for NODE_WAVES_UNCHANGED waves and for NODE_WAVES_UNCHANGED_US; no living
+ * link keeps a frame that long.  Neither condition alone is enough: waves are
+ * fast on fast links, and a node that is stopped answers none. */
 #ifndef NODE_WAVES_H
 #define NODE_WAVES_H
 
@@ -43,9 +45,9 @@ struct node_waves {
     uint8_t command;    /* of the wave: enum node_wave_command */
     bool begun;         /* the barrier is passed */
     bool open;          /* this node has not answered */
-    uint16_t to_tell;   /* children that have not been told */
+    uint16_t to_tell;   /* children without this wave so far */
     uint16_t to_answer; /* children that have not answered */
-    bool seeded;        /* at node 0: all have been told to */
+    bool seeded;        /* at node 0: the cube has been ordered to */
     bool over;          /* at node 0: no work is left */
     struct node_wave_answer_message sum, before;
     uint64_t now_us; /* the node's clock, for the caller to set */
@@ -61,8 +63,9 @@ void node_waves_init(struct node_waves *waves,
 /* At node 0: the first wave. */
 void node_waves_begin(struct node_waves *waves);
 
-/* Passes on what is to be; the number of messages.  At node 0, *command is what
- * the cube is told that this node has to follow as well, or 0. */
+/* Forwards waves and answers; returns the number of messages.  At node 0,
+ * *command is the command of a wave that this node must follow as well, or 0.
+ */
 unsigned node_waves_send(struct node_waves *waves,
                          const struct node_waves_state *state,
                          uint8_t *command);

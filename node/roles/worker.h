@@ -3,7 +3,7 @@
  * host gives credit, commits among them in order; lists that spill go to the
  * host and come back.
  *
- * Work: `work` closes at most NODE_STEPS stars, fewer where the time does not
+ * Work: `work` closes at most NODE_STEPS stars, fewer if the time does not
  * suffice, and `send` sends what the link takes. */
 #ifndef NODE_WORKER_H
 #define NODE_WORKER_H
