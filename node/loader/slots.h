@@ -27,7 +27,7 @@
  *
  * |            | at once | then one in | what it bounds |
  * |------------|---------|-------------|----------------|
- * | starts     |   1,000 | 60 s        | records in boots.h's two sectors |
+ * | starts     |   1,000 | 60 s        | records in the first two sectors |
  * | transfers  |     100 | 4 h         | erasures of a slot: 3 of each sector a
  * |            |         |             | transfer |
  * | false      |       6 | 10 s        | proofs of signatures that were false |
