@@ -8,7 +8,8 @@
  *     struct node *node = node_start(&board, &why);
  *     while (node_step(node) != NODE_STOPPED)
  *         board.idle(board.context, node_wait_us(node));
- *     board.reset(board.context, 0); */
+ *     board.reset(board.context, 0);
+ */
 #ifndef NODE_BOARD_H
 #define NODE_BOARD_H
 

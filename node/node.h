@@ -8,7 +8,8 @@
  *     struct node *node = node_start(&board, &why);
  *     while ((event = node_step(node)) != NODE_STOPPED)
  *         if (event == NODE_IDLE)
- *             board.idle(board.context, node_wait_us(node)); */
+ *             board.idle(board.context, node_wait_us(node));
+ */
 #ifndef NODE_NODE_H
 #define NODE_NODE_H
 

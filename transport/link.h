@@ -12,7 +12,8 @@
  *     struct link *link = link_init(memory, bytes, &config);
  *     link_poll(link, now_us);
  *     while (link_read(link, &message))
- *         link_release(link); */
+ *         link_release(link);
+ */
 #ifndef TRANSPORT_LINK_H
 #define TRANSPORT_LINK_H
 

@@ -11,7 +11,8 @@
  *     struct incode_tetrahedra t;
  *     if (incode_delaunay(xyz, 1000, NULL, &t) == INCODE_OK)
  *         count = t.count;
- *     incode_tetrahedra_free(&t); */
+ *     incode_tetrahedra_free(&t);
+ */
 #ifndef INCODE_H
 #define INCODE_H
 
@@ -26,17 +27,15 @@ extern "C" {
 /* incode_status_text(status) explains each. */
 enum incode_status {
     INCODE_OK = 0,
-    INCODE_NO_MEMORY, /* out of memory, or of memory_max; or no thread can start
-                       */
+    INCODE_NO_MEMORY,    /* memory or memory_max too small, or no thread */
     INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, reserved that is not NULL */
-    INCODE_NOT_FINITE,   /* row out->at has a coordinate that is NaN or infinite
-                          */
+    INCODE_NOT_FINITE,   /* row out->at has a NaN or infinite coordinate */
     INCODE_TOO_FEW,      /* fewer than four distinct points */
     INCODE_FLAT,         /* all points on one plane or line */
-    INCODE_TOO_MANY,  /* too many points or tetrahedra: see incode_delaunay */
-    INCODE_IO,        /* of streams */
-    INCODE_CANCELLED, /* `progress` returned false */
-    INCODE_INTERNAL   /* a defect: please report */
+    INCODE_TOO_MANY,     /* too many points or tetrahedra: see below */
+    INCODE_IO,           /* of streams */
+    INCODE_CANCELLED,    /* `progress` returned false */
+    INCODE_INTERNAL      /* a defect: please report */
 };
 
 enum {

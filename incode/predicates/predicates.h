@@ -5,7 +5,8 @@
  *
  *     struct incode_tally tally = {0};
  *     if (incode_orient3d(&tally, a, b, c, d) > 0)
- *         inside = incode_in_sphere(&tally, a, b, c, d, e) > 0; */
+ *         inside = incode_in_sphere(&tally, a, b, c, d, e) > 0;
+ */
 #ifndef INCODE_PREDICATES_H
 #define INCODE_PREDICATES_H
 
