@@ -33,7 +33,7 @@ struct bare_node {
 /* Time, UARTs and guard. */
 void bare_node_begin(struct bare_node *bare, bool loader);
 
-/* Waits if there were too many starts of late (budget.h).  Called by the first
+/* Waits if there were too many starts of late (slots.h).  Called by the first
  * program that runs, before the start is counted in the flash. */
 void bare_node_may_start(struct bare_node *bare);
 

@@ -63,7 +63,8 @@ struct link_pipe linux_wire_pipe(struct linux_wire *wire);
 uint32_t linux_wires_refused(const struct linux_wire *wires, unsigned count);
 
 /* Sleeps until bytes have come, or room for them where there was none, but no
- * longer than wait_us; awake_us: as in wait.h.  At most CUBE_LINKS_MAX wires.
+ * longer than wait_us; awake_us: as in unix_file.h.  At most CUBE_LINKS_MAX
+ * wires.
  */
 void linux_wires_idle(struct linux_wire *wires, unsigned count,
                       uint64_t wait_us, uint64_t awake_us);
