@@ -63,7 +63,7 @@ struct node_gauges {
 /* Why a node ends: what board.reset gets. */
 enum node_reset {
     NODE_RESET_OVER = 0,   /* the run is over */
-    NODE_RESET_AGAIN = 16, /* it was told to begin anew */
+    NODE_RESET_AGAIN = 16, /* it is to begin anew */
     NODE_RESET_STAY        /* and a loader not to start an image */
 };
 

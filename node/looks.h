@@ -26,7 +26,7 @@ struct node_looks {
     uint32_t units;
     uint64_t unit_ns;
     bool working; /* no poll since that look */
-    bool tends;   /* in the midst of work; set by who has a clock for that */
+    bool tends;   /* during work; set by a caller that has a clock */
 };
 
 void node_looks_init(struct node_looks *looks, const struct node_board *board,

@@ -25,7 +25,7 @@ enum {
     NODE_FACES_A_MESSAGE = 128, /* faces in one NODE_SPILL or NODE_UNSPILL */
     NODE_REGIONS_A_MESSAGE = 256,
     NODE_BUILDERS_MAX = 1023, /* of a face manager */
-    NODE_OUT_MAX = 6,         /* regions put and not taken, or not told of */
+    NODE_OUT_MAX = 6,         /* regions put and not known to be taken */
     NODE_TABLES_MAX = 8       /* of a role, in its memory map */
 };
 
@@ -324,7 +324,7 @@ struct node_finished_message {
     uint64_t busy_us; /* processor time of the node */
     uint64_t bytes_in, bytes_out; /* payload of messages, at this node */
     uint64_t pages_held;          /* for other nodes: sent from its frames, */
-    uint64_t pages_forwarded;     /* and asked for, or left, to the host */
+    uint64_t pages_forwarded;     /* requested from, or left to, the host */
     uint64_t retransmitted;       /* frames on all links */
     uint64_t memory_high_water;   /* bytes ever in use, `fixed` included */
     uint32_t stack_bytes;         /* struct node_gauges of the board; 0 where */
@@ -473,7 +473,7 @@ struct node_echo_message {
 enum node_restart {
     NODE_RESTART_PLAIN = 1, /* begins anew, as after a reset */
     NODE_RESTART_STAY       /* and its loader, if it has one, does not start an
-                               image before it is told to */
+                               image before an order */
 };
 
 /* A process ends, and the program that started it starts it again. */

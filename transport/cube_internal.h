@@ -25,8 +25,8 @@ struct cube_arrival {
 /* The state of a neighbour. */
 struct cube_neighbour {
     uint64_t comings;  /* times that the link came up, as of the last look */
-    uint64_t told_us;  /* when it was last told our wiring */
-    bool agreed;       /* it has said what we would say */
+    uint64_t told_us;  /* when our wiring was last sent to it */
+    bool agreed;       /* it has sent the same wiring */
     bool together;     /* it is known to have been in our generation when it */
     uint16_t since;    /* was to send this frame next */
     uint64_t frames;   /* received, as of the last look */
@@ -48,7 +48,7 @@ struct cube {
     uint16_t stamp;     /* of messages: wiring_stamp */
     bool tending;       /* messages of others leave some room to this node's */
     bool again;         /* a message waits only for that turn to pass */
-    uint8_t datagram[WIRING_BYTES_MAX]; /* the wiring, as it is told */
+    uint8_t datagram[WIRING_BYTES_MAX]; /* the wiring, as it is sent */
     size_t datagram_size;
     uint64_t now_us;    /* of the last poll */
     uint64_t looked_us; /* when links were looked at last */

@@ -56,7 +56,7 @@ enum link_state {
     LINK_SILENT,  /* up, but nothing has arrived for silence_us */
     LINK_CLOSING, /* link_close: waits for what is on its way */
     LINK_CLOSED,  /* both ends have closed, or the deadline is over */
-    LINK_REFUSED  /* the peer does not fit: link_peer says who and why */
+    LINK_REFUSED  /* the peer does not fit: see link_peer */
 };
 
 enum link_refusal {
@@ -88,7 +88,7 @@ struct link_statistics {
     uint64_t retransmitted;                    /* data frames sent again */
     uint64_t timeouts;    /* retransmission timer ran out */
     uint64_t acks_sent;   /* frames that carry nothing else */
-    uint64_t probes_sent; /* asked for credits that may have been lost */
+    uint64_t probes_sent; /* requests for credit that may have been lost */
     uint64_t hellos_sent;
     uint64_t datagrams_sent;
     uint64_t bad_header;       /* frames with a false header check */

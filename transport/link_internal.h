@@ -122,7 +122,7 @@ struct link {
     uint16_t peer_window;
     uint32_t peer_epoch; /* of the session; 0: none yet */
     uint32_t session_in, session_out;
-    uint32_t intruder; /* epoch that is to be told of the present one; 0 */
+    uint32_t intruder; /* epoch to be answered that the link is in use; 0 */
     uint64_t kept_us;  /* when the present session was heard last */
     uint32_t told_by;  /* the start of the peer that said that it is in use, */
     uint64_t told_us;  /* and when */

@@ -68,7 +68,7 @@ enum { SECURE_DEVICE_BYTES = 32 };
 
 /* As a board fills it in: random, or device and boot, or all. */
 struct secure_source {
-    /* Fills in bytes that nobody can guess; false: it cannot.  NULL: the board
+    /* Fills in bytes that cannot be guessed; false: it cannot.  NULL: the board
      * has no generator. */
     bool (*random)(void *context, uint8_t *bytes, size_t size);
     void *context;
@@ -140,7 +140,7 @@ struct secure_keys {
 
 struct secure_shake {
     struct secure_self self;
-    bool greeted; /* the peer has, as one who knows the key */
+    bool greeted; /* the peer has, with the key */
     bool derived, proven;
     enum secure_fault fault;
     uint8_t secret[SECURE_KEY_BYTES]; /* of the exchange */

@@ -94,7 +94,7 @@ struct incode_maker_counts {
 struct incode_maker {
     enum incode_index index;
     uint32_t sweep;     /* index `naive`: the brick last looked at */
-    uint32_t ahead;     /* bricks below have been asked for, or so many */
+    uint32_t ahead;     /* bricks below have been requested, or so many */
     uint32_t lookahead; /* so many before the one at work, at most */
     bool walks_down;    /* the last walk of a search did */
     double lo[3], hi[3];

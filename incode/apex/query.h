@@ -31,7 +31,7 @@ struct incode_query {
     bool shrinking;      /* APEX: the box is that of the best's sphere */
     bool round;          /* APEX: what matters lies in the ball below */
     bool lens;           /* round: it is less than the sphere (sphere.h) */
-    bool large;          /* round, and the sphere itself tells of boxes, too */
+    bool large;          /* round, and the sphere itself excludes boxes, too */
     bool done;           /* not what lies within [done_lo, done_hi] */
     bool yields;         /* the walk is suspended where the walker has no more
                             units left, with INCODE_NONE missing */

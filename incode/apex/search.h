@@ -65,7 +65,7 @@ struct incode_make {
     bool bare;           /* the best's sphere and place in store are not set */
     double rb[3], rc[3]; /* b and c relative to v */
     struct incode_sphere sphere;
-    bool doubtful; /* no local sphere tells where the apex is */
+    bool doubtful; /* no local sphere bounds the apex */
     bool regular;  /* the face is neither thin nor out of the range of floats */
     struct incode_pencil pencil; /* of a regular face */
     struct incode_near_degenerate degenerate;

@@ -62,8 +62,8 @@ struct incode_afl {
     uint32_t touched_max; /* at a time; entries from here on were never used */
     uint32_t crowded;     /* a vertex with a long list, or INCODE_NONE */
     uint32_t wide[INCODE_AFL_WIDE]; /* vertices whose lists are spread */
-    uint32_t wide_count, wide_next; /* the next one to be asked to give way */
-    bool still; /* set by who walks the heads: no list is spread meanwhile */
+    uint32_t wide_count, wide_next; /* the next list to be joined again */
+    bool still; /* set while heads are walked: no list is spread */
     uint64_t searches, looks; /* for twins; faces looked at, then or to hold */
     const char *fault; /* NULL, or a static string: what the faces that it
                           was given cannot be */

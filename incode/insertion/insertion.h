@@ -300,7 +300,7 @@ enum incode_step incode_insertion_step(struct incode_insertion *n);
  * cells that are final. region.c emits and releases them. */
 
 enum {
-    INCODE_INSERTION_AHEAD = 16, /* bricks asked for together */
+    INCODE_INSERTION_AHEAD = 16, /* bricks requested together */
     INCODE_INSERTION_STEPS = 64, /* a call, at most */
     INCODE_INSERTION_UNITS = 4,  /* of work, a point */
     INCODE_INSERTION_CELLS = 16  /* looked at as a unit of work */

@@ -32,7 +32,7 @@ struct incode_frame {
     alignas(64) union incode_page page;
     uint32_t number; /* the page */
     uint8_t count;   /* points of a brick */
-    uint64_t label;  /* its user's, who may send it on with the page */
+    uint64_t label;  /* the user's, which may be sent with the page */
 };
 
 static_assert(sizeof(struct incode_frame) == 1600,

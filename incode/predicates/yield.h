@@ -17,7 +17,7 @@
 enum incode_step {
     INCODE_WORKED,   /* not yet done: call again */
     INCODE_WAITING,  /* for a page, an answer, or room outside */
-    INCODE_FINISHED, /* done: what was asked for is there */
+    INCODE_FINISHED, /* done: the result is there */
     INCODE_AGAIN,    /* not done: begin again at the vertex, without waiting */
     INCODE_FULL,     /* it does not fit the memory that is given */
     INCODE_BROKEN    /* an invariant failed: see the module's `fault` */

@@ -40,7 +40,7 @@ enum loader_fault {
     LOADER_WRONG_ADDRESS,
     LOADER_TOO_OLD, /* its number, where there is no way back */
     LOADER_UNSIGNED,
-    LOADER_WRONG_KEY, /* signed by somebody else */
+    LOADER_WRONG_KEY, /* signed with another key */
     LOADER_WRONG_SIGNATURE,
     LOADER_WRONG_DIGEST, /* the code is not what was signed */
     LOADER_WORN,         /* the flash does not hold what it was given */
@@ -92,8 +92,8 @@ enum {
 struct loader_begin_message {
     uint32_t transfer; /* of this session of the host: any number but 0 */
     uint32_t bytes;    /* of the image, its header included */
-    uint8_t nodes[CUBE_NODES_MAX / 8]; /* who is meant: node i in bit i % 8 of
-                                          byte i / 8 */
+    uint8_t nodes[CUBE_NODES_MAX / 8]; /* addressed nodes: node i in bit i % 8
+                                          of byte i / 8 */
     uint8_t header[LOADER_HEADER_BYTES];
 };
 

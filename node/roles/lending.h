@@ -80,7 +80,7 @@ struct node_lending {
         uint32_t page, node;
     } * queue;
     uint32_t queued, queue_max;
-    uint8_t *asked; /* [nodes] pages that each has been asked for */
+    uint8_t *asked; /* [nodes] pages requested from each */
     uint64_t sent, passed;
     uint64_t bytes_out;
 };

@@ -38,7 +38,7 @@ struct node_lists {
     uint32_t out;      /* lists sent, and not answered: all of them, */
     uint32_t each_max; /* at most so many of a peer, */
     uint32_t next;     /* the peer to be looked at first */
-    uint32_t peers;    /* who they go to */
+    uint32_t peers;    /* nodes to which they go */
     uint16_t peer[NODE_BUILDERS_MAX];
     uint8_t owed[NODE_BUILDERS_MAX]; /* by each peer */
     uint64_t bytes_in, bytes_out;

@@ -16,7 +16,7 @@
 #include "node/page_check.h"
 
 enum {
-    NODE_WANTED_MAX = NODE_PAGES_A_REQUEST, /* pages not yet asked for */
+    NODE_WANTED_MAX = NODE_PAGES_A_REQUEST, /* pages not yet requested */
     NODE_REQUESTS_FEW = 8                   /* fewer may wait for others */
 };
 

@@ -48,7 +48,7 @@ struct mpi_order {
 enum { MPI_TAG_ORDER, MPI_TAG_ENDED, MPI_TAG_PIPES };
 
 struct mpi_place {
-    MPI_Comm comm;  /* of all ranks, and of nobody else */
+    MPI_Comm comm;  /* of all ranks, for this program only */
     MPI_Comm local; /* those of this machine */
     MPI_Win window; /* a word of each of them: */
     _Atomic uint32_t *bell[MPI_RANKS_MAX]; /* it sleeps; NULL: elsewhere */

@@ -21,7 +21,7 @@ enum sim_fault {
     SIM_LOSS,   /* a frame, up to its zero, is not there */
     SIM_FLIP,   /* a bit is the other one */
     SIM_DELETE, /* a byte is not there */
-    SIM_INSERT, /* a byte that nobody sent */
+    SIM_INSERT, /* a byte that was not sent */
     SIM_REPEAT, /* a byte comes twice */
     SIM_BURST,  /* burst_bytes of noise */
     SIM_STALL,  /* nothing for stall_us */

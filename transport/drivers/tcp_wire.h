@@ -32,7 +32,7 @@
 enum {
     TCP_CANDIDATES_MAX = 16,
     TCP_ACCEPTS_MAX = 16,
-    TCP_TURNS_MAX = 4,  /* of those, in the place of one who began well */
+    TCP_TURNS_MAX = 4,  /* of those, that replace one that began well */
     TCP_QUEUE_MAX = 64, /* that wait to be let in */
     TCP_WIRE_FDS_MAX = TCP_CANDIDATES_MAX + 2,
     TCP_FIRST_BYTES = 256, /* within which a greeting must be */
@@ -44,7 +44,7 @@ enum {
     TCP_CROWD_US = 1000,
     TCP_SILENT_MS = 5000,       /* with bytes that are not acknowledged */
     TCP_PAUSE_MIN_US = 20000,   /* before the next call, doubled each time */
-    TCP_PAUSE_AWAY_US = 40000,  /* up to this by one who had no place, */
+    TCP_PAUSE_AWAY_US = 40000,  /* up to this if it got no slot, */
     TCP_PAUSE_MAX_US = 1000000, /* else up to this */
     TCP_OTHER_KEY_US = 5000000  /* nobody with another key, or with a key where
                                    this end has none: it is gone */
@@ -88,9 +88,9 @@ struct tcp_wire {
     struct tcp_wire_config config;
     int listener;                /* -1: none */
     struct tcp_pipe tcp;         /* the connection; fd -1: none */
-    bool proven;                 /* it has shown who it is */
+    bool proven;                 /* the peer is proven */
     bool replaced;               /* by a newer one: the link hears of a break */
-    bool quiet;                  /* nobody called when it was last waited for */
+    bool quiet;                  /* no call came during the last wait */
     bool other_key;              /* the last one met has another key, */
     bool lone_key;               /* or only one of both has a key; */
     uint64_t other_key_us;       /* when that was met last */

@@ -131,7 +131,7 @@ struct tuples_operation {
     bool has_tuple;
     uint16_t due;    /* answers */
     uint16_t owed;   /* messages */
-    uint16_t cursor; /* where to look for the next that is owed */
+    uint16_t cursor; /* where the search for the next one begins */
     uint16_t best;   /* the place whose tuple it holds */
     uint16_t size, pattern_size;
     uint32_t serial;

@@ -135,7 +135,7 @@ enum {
 
 enum tuples_status {
     TUPLES_PENDING,
-    TUPLES_DONE, /* and the tuple is there, if one was asked for */
+    TUPLES_DONE, /* with the tuple, if one was requested */
     TUPLES_NO,   /* of inp and rdp: there was none */
     TUPLES_ENDED /* its generation has */
 };
