@@ -81,9 +81,10 @@ struct incode_tetrahedra {
 
 /* Triangulates xyz[3 * points]: x, y, z of each row, read and not written.
  * `out` need not be initialised.  On an error only `at` has a meaning, and
- * `out` owns no memory.  At most 2^32 - 2 points, less the empty slots of
- * bricks.  With neighbours or hull, at most 2^32 - 2 tetrahedra.  The caller's
- * rounding mode and flush-to-zero are restored.
+ * `out` owns no memory.  At most 2^32 - 2 rows, and at most 2^32 - 2^16
+ * distinct points, less the empty slots of bricks.  With neighbours or hull, at
+ * most 2^32 - 2 tetrahedra.  The caller's rounding mode and flush-to-zero are
+ * restored.
  *
  * Memory: about 170 bytes a point at most, 108 of which are the result's.
  * Work: O(n log n) for points in a volume; the count of tetrahedra may grow
