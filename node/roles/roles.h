@@ -27,9 +27,8 @@ struct node_role {
     size_t (*arena_min)(size_t memory, const struct node_setup_message *setup);
 
     /* Begins the role in an arena that is aligned to NODE_ALIGNMENT and not
-     * cleared.  The role sends its messages by counted, and reports by fault
-     * why it cannot continue, now or later; both outlive it.  False: *fault is
-     * set. */
+     * cleared. counted sends its messages, fault takes its faults, now and
+     * later; both outlive it.  False: *fault is set. */
     bool (*start)(void *self, size_t bytes,
                   const struct node_setup_message *setup,
                   struct node_counted *counted, struct node_fault *fault);
@@ -39,10 +38,9 @@ struct node_role {
     void (*message)(void *self, const struct cube_message *message,
                     uint64_t now_us);
 
-    /* Whether the role takes this message now.  Otherwise the message stays on
-     * its link, and holds back those behind it.  The role may refuse only while
-     * there is no room for messages to the host, which always get room in time.
-     * NULL: it takes all. */
+    /* Whether the role takes this message now.  Otherwise it stays on its link,
+     * and holds back those behind it.  The role may refuse only while messages
+     * to the host have no room; they always get some.  NULL: it takes all. */
     bool (*may_take)(void *self, const struct cube_message *message);
 
     /* Computes for as long as the pace permits.  Returns the number of steps
@@ -76,8 +74,7 @@ struct node_role {
     void (*totals)(const void *self, struct node_finished_message *totals,
                    uint64_t now_us);
 
-    /* How full its tables are now.  Fields of tables that it does not have
-     * stay. */
+    /* How full its tables are now.  Other fields stay. */
     void (*gauge)(const void *self, struct incode_gauge *gauge);
 
     /* Fills in `tables` and `pages` of the memory map. */
