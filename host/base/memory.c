@@ -10,25 +10,28 @@
 
 #include "parallel.h"
 
-/* Huge pages need their own alignment; below this size they do not matter. */
-static const size_t huge = (size_t)2 << 20;
+/* Huge pages need their own alignment.  An array that has a part of one takes
+ * it whole: a fault for each of its pages costs more than clearing it. */
+enum { PAGE = 4096, HUGE = 2 << 20, HUGE_FROM = 256 << 10 };
+
+/* What an array takes. */
+static size_t space_of(size_t bytes) {
+    size_t unit = bytes < HUGE_FROM ? PAGE : HUGE;
+    return (bytes + (bytes == 0) + unit - 1) / unit * unit;
+}
 
 /* Address space, aligned to huge pages where it is large enough. */
 static void *reserve(size_t bytes) {
-    size_t extra = bytes >= 2 * huge ? huge : 0;
-    char *space = mmap(NULL, bytes + extra, PROT_READ | PROT_WRITE,
+    size_t size = space_of(bytes), extra = size >= HUGE ? HUGE : 0;
+    char *space = mmap(NULL, size + extra, PROT_READ | PROT_WRITE,
                        MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     if (space == MAP_FAILED)
         return NULL;
-    if (extra == 0)
-        return space;
-    size_t skip = (huge - (uintptr_t)space % huge) % huge;
+    size_t skip = extra == 0 ? 0 : (HUGE - (uintptr_t)space % HUGE) % HUGE;
     if (skip > 0)
         (void)munmap(space, skip);
-    if (extra > skip) {
-        size_t page = 4096, end = (bytes + page - 1) / page * page;
-        (void)munmap(space + skip + end, extra - skip);
-    }
+    if (extra > skip)
+        (void)munmap(space + skip + size, extra - skip);
     return space + skip;
 }
 
@@ -56,16 +59,14 @@ void *host_map(size_t bytes) {
         return NULL;
     void *array = reserve(bytes);
     if (array != NULL)
-        (void)madvise(array, bytes, MADV_HUGEPAGE);
+        (void)madvise(array, space_of(bytes), MADV_HUGEPAGE);
     else
         refund(bytes);
     return array;
 }
 
 static void *move(void *old, size_t old_bytes, size_t bytes) {
-    enum { PAGE = 4096 };
-    size_t from = (old_bytes + (old_bytes == 0) + PAGE - 1) / PAGE * PAGE;
-    size_t to = (bytes + (bytes == 0) + PAGE - 1) / PAGE * PAGE;
+    size_t from = space_of(old_bytes), to = space_of(bytes);
     if (to <= from) { /* which cannot fail */
         if (to < from)
             (void)munmap((char *)old + to, from - to);
@@ -114,7 +115,7 @@ void *host_remap(void *old, size_t old_bytes, size_t bytes) {
 void host_unmap(void *array, size_t bytes) {
     bytes = bytes == 0 ? 1 : bytes;
     if (array != NULL) {
-        (void)munmap(array, bytes);
+        (void)munmap(array, space_of(bytes));
         refund(bytes);
     }
 }
