@@ -151,15 +151,19 @@ static int choose_points(struct incode_triangulator *t) {
     return all || fits(t, own) ? is_surface(t, t->job.first + own / 2) : 0;
 }
 
-/* Begins the job; false: a page is missing, or on its way. */
-static bool choose(struct incode_triangulator *t) {
+/* Begins the job, unless a page is missing, or on its way. */
+static enum incode_step choose(struct incode_triangulator *t) {
     int points = choose_points(t);
+    if (points == 0 && incode_insertion_is_alone(&t->insertion)) {
+        t->phase = INCODE_PHASE_IDLE;
+        return INCODE_FULL;
+    }
     if (points < 0 || !incode_arena_turn(t, points == 1))
-        return false;
+        return INCODE_WAITING;
     t->phase = points == 1 ? INCODE_PHASE_POINTS : INCODE_PHASE_FACES;
     if (points == 0)
         incode_front_start(&t->front, &t->job);
-    return true;
+    return INCODE_WORKED;
 }
 
 void incode_triangulator_start(struct incode_triangulator *t,
@@ -427,7 +431,12 @@ static enum incode_step insert_points(struct incode_triangulator *t) {
     case INCODE_FINISHED:
         t->phase = INCODE_PHASE_IDLE;
         return INCODE_FINISHED;
-    case INCODE_FULL: /* and so it will be for the next job */
+    case INCODE_FULL:
+        if (incode_insertion_is_alone(&t->insertion)) {
+            t->phase = INCODE_PHASE_IDLE;
+            return INCODE_FULL;
+        }
+        /* And so it will be for the next job. */
         t->build = INCODE_BUILD_FACES;
         t->phase = INCODE_PHASE_CHOOSE;
         if (t->insertion.emitted) {
@@ -460,7 +469,7 @@ static enum incode_step step(struct incode_triangulator *t) {
     enum incode_step r = INCODE_FINISHED;
     switch (t->phase) {
     case INCODE_PHASE_CHOOSE:
-        return choose(t) ? INCODE_WORKED : INCODE_WAITING;
+        return choose(t);
     case INCODE_PHASE_POINTS:
         return insert_points(t);
     case INCODE_PHASE_HANDOVER:
@@ -511,10 +520,12 @@ void incode_triangulator_statistics(const struct incode_triangulator *t,
     const struct incode_insertion *insertion = &t->insertion;
     const struct incode_pager *pager = &maker->pager;
     *s = (struct incode_statistics){
-        .tetrahedra_built = front->counts.built + insertion->kept,
+        .tetrahedra_built =
+            front->counts.built + insertion->kept + insertion->left,
         .tetrahedra_kept = front->counts.kept + insertion->kept,
         .tetrahedra_by_points = insertion->kept,
-        .make_tetra_calls = maker->counts.calls + insertion->kept,
+        .make_tetra_calls =
+            maker->counts.calls + insertion->kept + insertion->left,
         .hull_facets = front->counts.hull_facets,
         .candidates = maker->counts.candidates,
         .tree_searches = maker->counts.tree_searches,

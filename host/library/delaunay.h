@@ -2,8 +2,10 @@
  * in order, by a triangulator of the core for each thread, without messages.
  *
  * Each thread takes region after region, copies pages straight from the order,
- * and appends tetrahedra to a list of its own.  The lists are put together when
- * all regions are done. */
+ * and appends tetrahedra to a list of its own.  A region is triangulated alone.
+ * What another region's points may change is not kept: the points of such
+ * tetrahedra, the seam, are triangulated once more when all regions are done,
+ * and the lists are put together. */
 #ifndef HOST_DELAUNAY_H
 #define HOST_DELAUNAY_H
 

@@ -45,8 +45,10 @@ enum {
 };
 
 struct incode_options { /* all zero: the defaults */
-    unsigned threads;   /* 0: one a processor that this process may use */
-    unsigned flags;     /* what else is wanted */
+    /* 0: one a processor that this process may use, at most one for 6,000
+     * points. */
+    unsigned threads;
+    unsigned flags; /* what else is wanted */
     /* Called from the calling thread, at least ten times a second and once at
      * the end; false cancels.  No exception or longjmp may leave it. */
     bool (*progress)(void *context, double done /* 0 to 1 */);

@@ -21,7 +21,8 @@
 enum {
     PROGRESS_MS = 40,
     POLL_ROWS = 1 << 16,
-    FORK_ROWS = 1 << 16 /* fewer rows are not worth a thread */
+    THREAD_POINTS = 6000, /* fewer a thread take longer than on one */
+    FORK_ROWS = 1 << 16   /* fewer rows are not worth a thread */
 };
 
 /* One call of incode_delaunay. */
@@ -375,6 +376,12 @@ static void run_watched(struct work *w, const struct incode_options *options,
     }
 }
 
+/* One a processor, as far as they gain time. */
+static unsigned threads_for(uint64_t points) {
+    uint64_t most = 1 + points / THREAD_POINTS, threads = host_processors();
+    return (unsigned)(threads < most ? threads : most);
+}
+
 static bool are_valid(const struct incode_options *o) {
     const unsigned known = INCODE_NEIGHBORS | INCODE_HULL | INCODE_ANY_ORDER;
     for (unsigned i = 0; i < 4; i++)
@@ -399,7 +406,7 @@ enum incode_status incode_delaunay(const double *xyz, uint64_t points,
     fenv_t theirs;
     (void)fegetenv(&theirs);
     (void)fesetenv(FE_DFL_ENV);
-    unsigned threads = o->threads == 0 ? host_processors() : o->threads;
+    unsigned threads = o->threads == 0 ? threads_for(points) : o->threads;
     struct work w = {
         .xyz = xyz,
         .rows = points,

@@ -67,7 +67,9 @@ static void map_part(void *context, unsigned part) {
 
 static void map_rows(uint32_t (*to)[4], const uint32_t (*from)[4],
                      uint64_t count, const uint32_t *map) {
-    struct mapping m = {to, from, count, map, host_threads()};
+    enum { FORK_ROWS = 1 << 14 }; /* fewer are not worth a thread */
+    struct mapping m = {to, from, count, map,
+                        count < FORK_ROWS ? 1 : host_threads()};
     host_fork_all(m.parts, map_part, &m);
 }
 

@@ -38,6 +38,11 @@ struct incode_front_outside {
      * incode_front_unspill, the last of them with `last` set.  False: not now.
      */
     bool (*unspill)(void *context, uint32_t brick);
+    /* NULL, or the region is triangulated alone, point by point: no point of
+     * another region is inserted, and this takes, instead of emit, each
+     * tetrahedron whose sphere may hold one.  An index is INCODE_NONE: beyond
+     * the facet of the others there may be one. */
+    void (*left)(void *context, const uint32_t v[4]);
 };
 
 enum { INCODE_TAKEN_MAX = 128 }; /* tetrahedra of another front at a time */

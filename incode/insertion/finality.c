@@ -6,8 +6,12 @@
  * points looks up the cells that it would make give way.  First one brick for
  * each cell, as that often settles it, then all that are still reached.
  *
- * When all own bricks have been taken in, a point of another's brick that lies
- * in the sphere of a cell at an own point is inserted, and that closes the
+ * A region alone goes no further.  Of what is final among its own points, the
+ * boxes and points of other regions tell what is final among all; the rest is
+ * left to who knows those points.
+ *
+ * Else, when all own bricks have been taken in, a point of another's brick that
+ * lies in the sphere of a cell at an own point is inserted, and that closes the
  * stars of all own points in one visit: a new cell at such a point p is on a
  * facet at p between a cell that gives way and one that stays, and its sphere
  * is within the two's (Edelsbrunner, Combinatorica 10, 1990), both at p, too.
@@ -15,6 +19,7 @@
  * the own bricks go first, as the cells at their sides are large.  Before that,
  * and where these points do not fit, they are only shown to the cells, and
  * those that hold none are final. */
+#include <assert.h>
 #include <stdalign.h>
 #include <string.h>
 
@@ -87,14 +92,20 @@ static void bound(struct incode_insertion *n) {
 enum incode_step incode_insertion_rest(struct incode_insertion *n) {
     struct incode_insertion_work *work = n->work;
     size_t bits = (n->maker->tree.bricks + 63) / 64 * sizeof(uint64_t);
-    if (!incode_rest_set(&work->rest, n->maker, n->own_first, n->from,
-                         n->own_last))
+    bool alone = incode_insertion_is_alone(n);
+    if (!(alone
+              ? incode_rest_set_own(&work->rest, n->maker, n->from, n->own_last)
+              : incode_rest_set(&work->rest, n->maker, n->own_first, n->from,
+                                n->own_last)))
         return INCODE_WAITING;
     n->closing = n->from == n->own_last && !n->squeezed;
     n->shown = false;
     memset(n->touched, 0, bits);
     memset(n->passed, 0, bits);
+    n->apart = false;
     incode_look_init(&work->look, n->maker, n->passed, n->touched);
+    work->look.first = incode_insertion_base(n);
+    work->look.end = incode_insertion_end(n);
     bool near = n->closing && n->thorough;
     uint32_t frames = n->maker->pager.frame_count;
     bool roomy = frames >= SOUGHT_FRAMES || frames >= n->maker->tree.bricks / 2;
@@ -129,13 +140,20 @@ static uint32_t some_cells(const struct incode_insertion *n) {
     return cells - n->cell < JUDGED ? cells : n->cell + JUDGED;
 }
 
+/* Of work, to test a cell against the rest, at most INCODE_YIELD_OVER. */
+static uint32_t units_of(const struct incode_insertion *n) {
+    enum { BOXES = 8 };
+    static_assert(1 + INCODE_REST_MAX / BOXES <= INCODE_YIELD_OVER,
+                  "one test is not too much at a time");
+    return 1 + n->work->rest.count / BOXES;
+}
+
 enum incode_step incode_insertion_judge(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
-    uint32_t units = 2 + n->work->rest.count / 2; /* of 4 cells */
+    uint32_t units = units_of(n);
     for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
-        if (n->cell % 4 == 0)
-            incode_maker_yield(n->maker, units);
+        incode_maker_yield(n->maker, units);
         if (incode_cell_is_free(c))
             continue;
         bool final = !incode_rest_reaches(&n->work->rest, x, c);
@@ -168,6 +186,8 @@ static bool is_wanted(const struct incode_insertion *n,
     unsigned proved = incode_cell_proved(c);
     if (incode_cell_is_free(c) || proved == FINAL)
         return false;
+    if (n->apart)
+        return proved == REACHED;
     if (n->round == 1 && !n->closing)
         return proved == REACHED;
     return n->squeezed || is_at_own(n, c);
@@ -188,7 +208,7 @@ static void note(struct incode_insertion *n) {
 enum incode_step incode_insertion_look(struct incode_insertion *n) {
     const struct incode_complex *x = &n->complex;
     struct incode_look *look = &n->work->look;
-    uint32_t end = look->at == 0 ? some_cells(n) : n->cell;
+    uint32_t end = look->at == look->first ? some_cells(n) : n->cell;
     for (; n->cell < end && !incode_look_is_full(look); n->cell++) {
         yield_at(n, n->cell);
         if (is_wanted(n, incode_complex_cell(x, n->cell)))
@@ -202,10 +222,14 @@ enum incode_step incode_insertion_look(struct incode_insertion *n) {
         return r == INCODE_WORKED ? INCODE_WORKED : INCODE_WAITING;
     note(n);
     bool bounded = look->bounded;
-    incode_look_begin(look, look->every, n->own_first, n->from);
+    incode_look_begin(look, look->every, look->pass_first, look->pass_last);
     look->bounded = bounded;
     if (n->cell < x->cells)
         return INCODE_WORKED;
+    if (n->apart) {
+        incode_insertion_begin_list(n);
+        return INCODE_WORKED;
+    }
     /* Without a visit, those that are reached stay. */
     n->shown =
         n->thorough || n->round == 1 || n->final < cells_left(n) / LEAST_SHARE;
@@ -410,7 +434,49 @@ enum incode_step incode_insertion_settle(struct incode_insertion *n) {
     if (!n->closing && n->final < cells_left(n) / LEAST_SHARE)
         return INCODE_FULL;
     n->closed = n->closing && (n->shown || n->final == cells_left(n));
-    incode_insertion_begin_list(n);
+    if (incode_insertion_is_alone(n))
+        n->stage = INCODE_INSERTION_OTHERS;
+    else
+        incode_insertion_begin_list(n);
+    return INCODE_WORKED;
+}
+
+/* ---- a region alone ---- */
+
+/* Begins to tell which of the cells that are final among the own points are so
+ * among all. */
+enum incode_step incode_insertion_others(struct incode_insertion *n) {
+    struct incode_look *look = &n->work->look;
+    if (!incode_rest_set(&n->work->rest, n->maker, n->own_first, n->own_last,
+                         n->own_last))
+        return INCODE_WAITING;
+    incode_look_init(look, n->maker, n->passed, n->touched);
+    incode_look_begin(look, false, n->own_first, n->own_last);
+    look->closely = true;
+    n->apart = true;
+    n->reached = 0;
+    go_on(n, INCODE_INSERTION_APART);
+    return INCODE_WORKED;
+}
+
+enum incode_step incode_insertion_apart(struct incode_insertion *n) {
+    const struct incode_complex *x = &n->complex;
+    uint32_t units = units_of(n);
+    for (uint32_t end = some_cells(n); n->cell < end; n->cell++) {
+        struct incode_cell *c = incode_complex_cell(x, n->cell);
+        incode_maker_yield(n->maker, units);
+        if (incode_cell_is_free(c) || incode_cell_proved(c) != FINAL ||
+            !incode_rest_reaches(&n->work->rest, x, c))
+            continue;
+        incode_cell_set_proved(c, REACHED);
+        n->reached++;
+    }
+    if (n->cell < x->cells)
+        return INCODE_WORKED;
+    if (n->reached > 0)
+        go_on(n, INCODE_INSERTION_LOOK);
+    else
+        incode_insertion_begin_list(n);
     return INCODE_WORKED;
 }
 

@@ -69,6 +69,7 @@ static void begin_job(struct incode_insertion *n, bool whole) {
     n->from = n->to = n->own_first;
     n->sampled = n->thorough = false;
     n->most = whole ? bricks : divide(n);
+    bricks = incode_insertion_end(n) - incode_insertion_base(n);
     n->sample_step = 1 + bricks / (1 + n->complex.points_kept / SAMPLE_SHARE);
     n->stage = INCODE_INSERTION_CHOOSE;
 }
@@ -79,10 +80,12 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
     uint32_t bricks = n->maker->tree.bricks, words = (bricks + 63) / 64;
     size_t bits = words * sizeof(uint64_t), before = 2 * bits;
     size_t known = bricks * sizeof *n->inserted;
-    uint64_t points = (uint64_t)bricks * INCODE_BRICK_POINTS;
+    uint64_t points = (uint64_t)(last - first) * INCODE_BRICK_POINTS;
     INCODE_ASSERT(first < last && last <= bricks &&
                   bytes >= before + INCODE_INSERTION_LEAST);
-    bool whole = last - first == bricks &&
+    n->own_first = first;
+    n->own_last = last;
+    bool whole = incode_insertion_owns_all(n) &&
                  points <= INCODE_COMPLEX_POINTS_MAX &&
                  before + incode_insertion_bytes(points) <= bytes;
     n->committed = committed;
@@ -94,7 +97,8 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
         before + known + INCODE_INSERTION_LEAST <= bytes) {
         n->inserted = n->passed + words;
         before += known;
-        if (2 * known <= bytes / INCODE_INSERTION_KNOWN) {
+        if (2 * known <= bytes / INCODE_INSERTION_KNOWN &&
+            before + known + INCODE_INSERTION_LEAST <= bytes) {
             n->sought = n->inserted + bricks;
             before += known;
         }
@@ -104,8 +108,6 @@ void incode_insertion_start(struct incode_insertion *n, uint64_t *committed,
     before += sizeof *n->work;
     incode_complex_init(&n->complex, (uint8_t *)memory + before,
                         bytes - before);
-    n->own_first = first;
-    n->own_last = last;
     n->emitted = n->squeezed = n->closed = false;
     begin_job(n, whole);
 }
@@ -176,7 +178,11 @@ static enum incode_step choose(struct incode_insertion *n) {
         n->stage = INCODE_INSERTION_REST;
         return INCODE_WORKED;
     }
-    while (last - first > 1 &&
+    if (n->whole) {
+        first = n->own_first;
+        last = n->own_last;
+    }
+    while (!n->whole && last - first > 1 &&
            (first != n->from || last - first > most || last > n->own_last)) {
         uint32_t cut = first + incode_bricks_cut(first, last - first);
         if (n->from < cut)
@@ -248,7 +254,7 @@ static bool is_of_four(const struct incode_insertion *n, uint32_t id) {
 static enum incode_step sample(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
-    uint32_t bricks = n->maker->tree.bricks;
+    uint32_t bricks = incode_insertion_end(n);
     uint32_t brick = past_own(n, n->brick), id = brick * INCODE_BRICK_POINTS;
     if (brick >= bricks) {
         n->stage = INCODE_INSERTION_CHOOSE;
@@ -351,7 +357,7 @@ static enum incode_step find_four(struct incode_insertion *n) {
     n->four_count += four[2] != 0;
     four[3] = four[2] == 0 ? 0 : find_off(n, all / 4 * 3, four, 3);
     n->four_count += four[3] != 0;
-    n->brick = 0;
+    n->brick = incode_insertion_base(n);
     return begin_with(n);
 }
 
@@ -363,7 +369,7 @@ static enum incode_step span(struct incode_insertion *n) {
     struct incode_complex *x = &n->complex;
     struct incode_pager *pager = &n->maker->pager;
     const struct incode_complex_point *q = x->point;
-    uint32_t bricks = n->maker->tree.bricks;
+    uint32_t bricks = incode_insertion_end(n);
     n->brick = past_own(n, n->brick);
     if (n->brick >= bricks)
         return INCODE_FULL;
@@ -437,7 +443,7 @@ static enum incode_step insert(struct incode_insertion *n) {
     n->stage = is_short(n) ? INCODE_INSERTION_REST : INCODE_INSERTION_CHOOSE;
     if (!n->sampled) { /* after the first bricks */
         n->sampled = true;
-        n->brick = 0;
+        n->brick = incode_insertion_base(n);
         n->stage = INCODE_INSERTION_SAMPLE;
     }
     return INCODE_WORKED;
@@ -469,6 +475,10 @@ static enum incode_step step(struct incode_insertion *n) {
         return incode_insertion_visit(n);
     case INCODE_INSERTION_SETTLE:
         return incode_insertion_settle(n);
+    case INCODE_INSERTION_OTHERS:
+        return incode_insertion_others(n);
+    case INCODE_INSERTION_APART:
+        return incode_insertion_apart(n);
     case INCODE_INSERTION_LIST:
         return incode_insertion_list(n);
     case INCODE_INSERTION_EMIT:

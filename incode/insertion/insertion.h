@@ -107,14 +107,17 @@ struct incode_look {
     /* A word a brick, a bit a point: those of a brick that is wanted which a
      * cell may reach, of all cells so far; or NULL. */
     uint64_t *sought;
-    bool every; /* all bricks that a cell reaches, not one */
-    uint32_t pass_first, pass_last; /* bricks that are passed, too, */
+    bool every;          /* all bricks that a cell reaches, not one */
+    bool closely;        /* a brick is reached where a point of it is */
+    uint32_t first, end; /* no bricks but these, */
+    uint32_t pass_first, pass_last; /* of which these are passed, too, */
     bool bounded;                   /* and those outside this box */
     double lo[3], hi[3];
     uint32_t at;    /* bricks before it have been looked at */
     uint32_t pages; /* left in this call */
     uint32_t count;
-    uint64_t reached; /* a bit a cell */
+    uint64_t reached;                 /* a bit a cell */
+    uint8_t tried[INCODE_LOOK_CELLS]; /* bricks, closely */
     uint32_t cell[INCODE_LOOK_CELLS];
     struct incode_regions regions;
 };
@@ -175,6 +178,10 @@ struct incode_rest {
 bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
                      uint32_t first, uint32_t from, uint32_t last);
 
+/* The own bricks [from, last) alone. */
+bool incode_rest_set_own(struct incode_rest *rest, struct incode_maker *maker,
+                         uint32_t from, uint32_t last);
+
 /* Whether a point of the rest may lie in the sphere of a cell, or beyond its
  * facet or in its plane, as far as the rest's boxes tell. */
 bool incode_rest_reaches(const struct incode_rest *rest,
@@ -189,11 +196,33 @@ enum {
     INCODE_INSERTION_KNOWN = 32        /* part of the memory, below */
 };
 
+enum incode_insertion_stage {
+    INCODE_INSERTION_CHOOSE,
+    INCODE_INSERTION_LOAD,
+    INCODE_INSERTION_BEGIN,
+    INCODE_INSERTION_SPAN,
+    INCODE_INSERTION_INSERT,
+    INCODE_INSERTION_SAMPLE,
+    INCODE_INSERTION_REST,
+    INCODE_INSERTION_JUDGE,
+    INCODE_INSERTION_LOOK,
+    INCODE_INSERTION_VISIT,
+    INCODE_INSERTION_SETTLE,
+    INCODE_INSERTION_OTHERS,
+    INCODE_INSERTION_APART,
+    INCODE_INSERTION_LIST,
+    INCODE_INSERTION_EMIT,
+    INCODE_INSERTION_RELEASE,
+    INCODE_INSERTION_COMMIT,
+    INCODE_INSERTION_DONE
+};
+
 struct incode_insertion {
     struct incode_complex complex;
     struct incode_maker *maker;
     struct incode_front_outside outside;
-    uint64_t kept, vertices; /* tetrahedra emitted, points inserted */
+    uint64_t kept, left, vertices; /* tetrahedra emitted, or left to others;
+                                      points inserted */
     uint64_t releases;
     size_t used; /* most bytes of the memory so far, of all jobs */
 
@@ -220,25 +249,10 @@ struct incode_insertion {
     bool thorough; /* boxes alone are not enough */
     bool large;    /* the cavities of points near by */
     bool shown;    /* points to come, to the cells */
+    bool apart;    /* a region alone: what is final is told from what others'
+                      points may reach */
 
-    enum incode_insertion_stage {
-        INCODE_INSERTION_CHOOSE,
-        INCODE_INSERTION_LOAD,
-        INCODE_INSERTION_BEGIN,
-        INCODE_INSERTION_SPAN,
-        INCODE_INSERTION_INSERT,
-        INCODE_INSERTION_SAMPLE,
-        INCODE_INSERTION_REST,
-        INCODE_INSERTION_JUDGE,
-        INCODE_INSERTION_LOOK,
-        INCODE_INSERTION_VISIT,
-        INCODE_INSERTION_SETTLE,
-        INCODE_INSERTION_LIST,
-        INCODE_INSERTION_EMIT,
-        INCODE_INSERTION_RELEASE,
-        INCODE_INSERTION_COMMIT,
-        INCODE_INSERTION_DONE
-    } stage;
+    enum incode_insertion_stage stage;
     /* Own bricks [from, to) are being inserted; all before them are. */
     uint32_t from, to;
     uint32_t sample_step; /* one point of so many bricks to come */
@@ -314,6 +328,8 @@ enum incode_step incode_insertion_judge(struct incode_insertion *n);
 enum incode_step incode_insertion_look(struct incode_insertion *n);
 enum incode_step incode_insertion_visit(struct incode_insertion *n);
 enum incode_step incode_insertion_settle(struct incode_insertion *n);
+enum incode_step incode_insertion_others(struct incode_insertion *n);
+enum incode_step incode_insertion_apart(struct incode_insertion *n);
 
 /* Begins to emit the cells that are proved. */
 void incode_insertion_begin_list(struct incode_insertion *n);
@@ -344,9 +360,24 @@ static inline bool incode_insertion_has_noted(const struct incode_insertion *n,
             1) != 0;
 }
 
-/* Whether the own bricks are all bricks of the set. */
+/* Whether no point of others' bricks is inserted. */
+static inline bool incode_insertion_is_alone(const struct incode_insertion *n) {
+    return n->outside.left != NULL;
+}
+
+/* The bricks whose points may be inserted: [base, end). */
+static inline uint32_t incode_insertion_base(const struct incode_insertion *n) {
+    return incode_insertion_is_alone(n) ? n->own_first : 0;
+}
+
+static inline uint32_t incode_insertion_end(const struct incode_insertion *n) {
+    return incode_insertion_is_alone(n) ? n->own_last : n->maker->tree.bricks;
+}
+
+/* Whether these are the own ones. */
 static inline bool incode_insertion_owns_all(const struct incode_insertion *n) {
-    return n->own_last - n->own_first == n->maker->tree.bricks;
+    return n->own_last - n->own_first ==
+           incode_insertion_end(n) - incode_insertion_base(n);
 }
 
 /* The fall back to faces, when an insertion does not fit any more.  The faces

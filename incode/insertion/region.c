@@ -392,6 +392,17 @@ void incode_insertion_begin_list(struct incode_insertion *n) {
     n->stage = INCODE_INSERTION_LIST;
 }
 
+/* Leaves a cell to those who know others' points. */
+static void leave(struct incode_insertion *n, const struct incode_cell *c) {
+    const struct incode_complex *x = &n->complex;
+    uint32_t v[4];
+    for (unsigned i = 0; i < 4; i++)
+        v[i] = c->v[i] == INCODE_COMPLEX_INFINITE ? INCODE_NONE
+                                                  : x->point[c->v[i]].id;
+    n->outside.left(n->outside.context, v);
+    n->left += !incode_cell_is_infinite(c);
+}
+
 /* Lists some final tetrahedra by the vertex that owns them; the triangulation
  * is set right when they are released. */
 enum incode_step incode_insertion_list(struct incode_insertion *n) {
@@ -402,8 +413,13 @@ enum incode_step incode_insertion_list(struct incode_insertion *n) {
     incode_maker_yield(n->maker, INCODE_INSERTION_CELLS / 4);
     for (; n->cell < end; n->cell++) {
         struct incode_cell *c = incode_complex_cell(x, n->cell);
-        if (incode_cell_is_free(c) || incode_cell_proved(c) == 0 ||
-            incode_cell_is_infinite(c))
+        if (incode_cell_is_free(c) || incode_cell_proved(c) == 0)
+            continue;
+        if (n->apart && incode_cell_proved(c) != INCODE_CELL_FINAL) {
+            leave(n, c);
+            continue;
+        }
+        if (incode_cell_is_infinite(c))
             continue;
         struct incode_complex_point *owner = &x->point[c->v[owner_of(x, c)]];
         if (!is_own(n, owner->id))

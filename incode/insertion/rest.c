@@ -9,7 +9,10 @@
 
 /* --- rest ----------------------------------------------------------------- */
 
-enum { FRAMES_LEFT = 2 /* to others */ };
+enum {
+    FRAMES_LEFT = 2, /* to others */
+    PAGE_UNITS = 4   /* of work, to unpack a page of boxes */
+};
 
 #define CUT_MOST 0.0625 /* of an edge of the own bricks' box */
 
@@ -75,6 +78,7 @@ static bool add(struct incode_rest *rest, struct incode_maker *maker,
         &maker->pager, tree->base[level + 1] + first / INCODE_FANOUT);
     if (f == NULL)
         return false;
+    incode_maker_yield(maker, PAGE_UNITS);
     incode_boxes_axes(&f->page.boxes, lo, hi);
     uint64_t span = span_of(level);
     for (; first < last; first++) {
@@ -189,8 +193,26 @@ bool incode_rest_set(struct incode_rest *rest, struct incode_maker *maker,
     return true;
 }
 
+bool incode_rest_set_own(struct incode_rest *rest, struct incode_maker *maker,
+                         uint32_t from, uint32_t last) {
+    rest->own_first = rest->own_last = 0;
+    rest->count = rest->spare = 0;
+    for (int d = 0; d < 3; d++) { /* no ball is within */
+        rest->own_lo[d] = __builtin_inf();
+        rest->own_hi[d] = -__builtin_inf();
+    }
+    if (!add_bricks(rest, maker, from, last))
+        return false;
+    rest->inner = rest->count;
+    fill_up(rest);
+    return true;
+}
+
 /* Whether a ball lies within the box of the own bricks, and so apart from all
- * boxes but the first. */
+ * boxes but the first.  These may touch the own one, as both comparisons are
+ * strict.  A gap is wrong by u of itself, and its square by 3 u in all; the
+ * radius has room for 32 u of itself (set_ball), of which it has used 3 u, and
+ * is at least 2^-450, so that no square underflows that counts. */
 static bool is_within(const struct incode_rest *rest,
                       const struct incode_region *r) {
     bool within = true;
@@ -246,7 +268,8 @@ bool incode_rest_reaches(const struct incode_rest *rest,
 enum {
     PAGES = INCODE_LEVELS_MAX + 16, /* a call */
     ADD_UNITS = 16,                 /* of work: twice the precision, perhaps */
-    BRICK_UNITS = 8                 /* its points and a sphere */
+    BRICK_UNITS = 8,                /* its points and a sphere */
+    CLOSELY_MOST = 48               /* bricks, for each cell */
 };
 
 void incode_look_init(struct incode_look *look, struct incode_maker *maker,
@@ -261,6 +284,9 @@ void incode_look_init(struct incode_look *look, struct incode_maker *maker,
     look->passed = passed;
     look->wanted = wanted;
     look->sought = NULL;
+    look->closely = false;
+    look->first = 0;
+    look->end = maker->tree.bricks;
 }
 
 void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
@@ -269,9 +295,10 @@ void incode_look_begin(struct incode_look *look, bool every, uint32_t first,
     look->pass_first = first;
     look->pass_last = last;
     look->bounded = false;
-    look->at = 0;
+    look->at = look->first;
     look->count = 0;
     look->reached = 0;
+    memset(look->tried, 0, sizeof look->tried);
 }
 
 void incode_look_add(struct incode_look *look, const struct incode_complex *x,
@@ -312,13 +339,35 @@ static uint64_t meeting(const struct incode_look *look,
 /* Whether bricks [first, end) need no look. */
 static bool is_passed(const struct incode_look *look, uint32_t first,
                       uint32_t end) {
-    if (end <= look->at ||
+    if (end <= look->at || first >= look->end ||
         (first >= look->pass_first && end <= look->pass_last))
         return true;
     bool all = look->sought == NULL || look->sought[first] == ~UINT64_C(0);
     return end - first == 1 &&
            (is_set(look->passed, first) ||
             (look->every && all && is_set(look->wanted, first)));
+}
+
+/* Drops those of some cells that reach no point of a brick; false: its page is
+ * missing.  A cell whose sphere passes close to the points of many bricks, as
+ * do all of points on one sphere, is taken to reach one of them. */
+static bool reach_points(struct incode_look *look, uint32_t brick,
+                         uint64_t *cells) {
+    const struct incode_frame *f = incode_pager_get(&look->maker->pager, brick);
+    if (f == NULL)
+        return false;
+    uint64_t all = ~UINT64_C(0) >> (INCODE_BRICK_POINTS - f->count);
+    for (uint64_t left = *cells; left != 0; left &= left - 1) {
+        unsigned i = (unsigned)__builtin_ctzll(left);
+        if (look->tried[i] == CLOSELY_MOST)
+            continue;
+        look->tried[i]++;
+        incode_maker_yield(look->maker, BRICK_UNITS);
+        if ((all & incode_regions_points(&look->regions, i, &f->page.brick)) ==
+            0)
+            *cells &= ~(UINT64_C(1) << i);
+    }
+    return true;
 }
 
 /* Notes that some cells may reach a brick, or, where that is asked for, those
@@ -371,7 +420,7 @@ static enum incode_step look_below(struct incode_look *look, uint32_t level,
     uint32_t first = index * INCODE_FANOUT;
     uint32_t count = tree->count[level - 1] - first;
     count = count < INCODE_FANOUT ? count : INCODE_FANOUT;
-    incode_maker_yield(look->maker, 4);
+    incode_maker_yield(look->maker, PAGE_UNITS);
     incode_boxes_axes(&boxes, lo, hi);
     for (uint32_t i = 0; i < count; i++) {
         uint64_t end = (first + i + 1) * span;
@@ -391,6 +440,8 @@ static enum incode_step look_below(struct incode_look *look, uint32_t level,
                 return r;
         }
         if (met != 0 && level == 1) {
+            if (look->closely && !reach_points(look, first + i, &met))
+                return INCODE_WAITING;
             if (!want(look, first + i, met))
                 return INCODE_WAITING;
             look->reached |= met;

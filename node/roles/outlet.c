@@ -179,9 +179,9 @@ static bool outside_unspill(void *context, uint32_t brick) {
 }
 
 struct incode_front_outside node_outlet_outside(struct node_outlet *outlet) {
-    return (struct incode_front_outside){outlet,        outside_emit_room,
-                                         outside_emit,  outside_commit,
-                                         outside_spill, outside_unspill};
+    return (struct incode_front_outside){
+        outlet,        outside_emit_room, outside_emit, outside_commit,
+        outside_spill, outside_unspill,   NULL};
 }
 
 bool node_outlet_has_room(const struct node_outlet *outlet) {

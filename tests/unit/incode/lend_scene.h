@@ -160,9 +160,9 @@ static inline void lend_open(struct lend *s, const double *xyz, uint64_t n) {
     world->owner_rule = INCODE_OWNER_LOWEST;
     solo_order(world, xyz, n);
     solo_set_up(world);
-    const struct incode_front_outside outside = {world,      solo_emit_room,
-                                                 solo_emit,  solo_commit,
-                                                 solo_spill, solo_unspill};
+    const struct incode_front_outside outside = {
+        world,      solo_emit_room, solo_emit, solo_commit,
+        solo_spill, solo_unspill,   NULL};
     const struct incode_yield yield = {0};
     size_t bytes =
         s->world.memory == 0 ? incode_manager_min() : s->world.memory;

@@ -289,12 +289,12 @@ static inline void solo_make(struct solo *s,
     s->arena = aligned_alloc(64, s->memory + SOLO_GUARD);
     assert_non_null(s->arena);
     memset(s->arena, 0xa5, s->memory + SOLO_GUARD);
-    const struct incode_outside outside = {.pages = {s, solo_request},
-                                           .front = {s, solo_emit_room,
-                                                     solo_emit, solo_commit,
-                                                     solo_spill, solo_unspill},
-                                           .peers = *peers,
-                                           .yield = s->yield};
+    const struct incode_outside outside = {
+        .pages = {s, solo_request},
+        .front = {s, solo_emit_room, solo_emit, solo_commit, solo_spill,
+                  solo_unspill, NULL},
+        .peers = *peers,
+        .yield = s->yield};
     const char *why = "";
     s->t = incode_triangulator_init(s->arena, s->memory, &s->setup, &outside,
                                     &why);

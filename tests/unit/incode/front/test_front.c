@@ -305,8 +305,8 @@ static void number(struct host_points *points, bool hub) {
 static void open_world(struct world *w, const char *kind, uint64_t n) {
     const struct incode_front_share share = {INCODE_FACES_MIN,
                                              INCODE_ENTRIES_MIN};
-    const struct incode_front_outside outside = {w,      emit_room, emit,
-                                                 commit, spill,     unspill};
+    const struct incode_front_outside outside = {w,     emit_room, emit, commit,
+                                                 spill, unspill,   NULL};
     struct host_error error = {0};
     if (host_gen(kind, n, 3, &w->points, &error) != 0)
         fail_msg("%s", error.text);

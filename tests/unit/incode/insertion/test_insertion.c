@@ -69,7 +69,7 @@ static void open_points(const double *xyz, uint64_t n) {
     world.room = ROOM_MANY;
     solo_open(&world.solo, xyz, n);
     const struct incode_front_outside outside = {
-        &world.solo, emit_room, emit, commit, solo_spill, solo_unspill};
+        &world.solo, emit_room, emit, commit, solo_spill, solo_unspill, NULL};
     incode_insertion_init(&world.n, &world.solo.t->maker, &outside);
 }
 
@@ -485,7 +485,7 @@ static void expect_no_space(const double (*p)[3], uint32_t n) {
     const struct incode_outside outside = {.pages = {&bare, bare_request},
                                            .front = {&world.solo, emit_room,
                                                      emit, commit, solo_spill,
-                                                     solo_unspill}};
+                                                     solo_unspill, NULL}};
     const char *why = "";
     memset(&world, 0, sizeof world);
     world.solo.arena = aligned_alloc(64, 1 << 20);
