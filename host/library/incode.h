@@ -107,8 +107,13 @@ void incode_tetrahedra_free(struct incode_tetrahedra *t);
  * On an error, `found` has no meaning; INCODE_NOT_FINITE: *at is the number of
  * a query with a NaN or infinite coordinate.
  *
- * Memory: 16 bytes a query, and the stars of vertices and edges that queries
- * lie on, up to 16 bytes a tetrahedron and thread. */
+ * Memory: 32 bytes a query, at most 32 MB; and for each thread 3 KB, and up to
+ * 24 bytes for each tetrahedron of the largest star of a vertex that a query
+ * is on.  Up to 32 queries take memory for a star of more than 128 tetrahedra
+ * alone.
+ * Work of a query, where points are spread evenly: O(log queries) to put them
+ * in order, and O(1 + (points / queries)^(1/3)) steps; O(points^(1/4)) for a
+ * query alone. */
 enum incode_status
 incode_locate(const double *xyz /* [3 * points] */, uint64_t points,
               const struct incode_tetrahedra *t,
