@@ -88,10 +88,11 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit points planted bare arithmetic fuzzers run check test \
+.PHONY: all unit points planted bare arithmetic fuzzers python \
+	python-files run check test \
 	test-full bench firmware nodes cross fuzz lint install uninstall clean \
-	compdb hooks \
-	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
+	compdb hooks help deps deps-run deps-python deps-nodes deps-test deps-bench \
+	deps-full FORCE
 
 programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 	$(nodes)
@@ -117,7 +118,7 @@ $(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
-include host/library/library.mk
+include host/library/library.mk host/library/python/python.mk
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
 $(BUILD)/%.a: $(BUILD)/lists

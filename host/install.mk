@@ -9,6 +9,13 @@ made_images  = $(wildcard $(images))
 made_loaders = $(wildcard $(images:$(BUILD)/firmware/%=$(BUILD)/firmware/loader/%))
 # Likewise programs of nodes that make nodes has made.
 made_nodes   = $(wildcard $(node_programs))
+# Likewise the Python package that make python has made.  PYTHONDIR is that folder
+# under PREFIX which Python looks in where PREFIX is /usr/local.
+PYTHONDIR ?= $(PREFIX)/$(shell $(PYTHON) -c 'import re, sysconfig; \
+	print(re.search("lib[^/]*/python.*", sysconfig.get_path("platlib"))[0])' \
+	2> /dev/null)
+python_to  = $(DESTDIR)$(PYTHONDIR)/incode
+made_python = $(wildcard $(package_all))
 # The library, its header and what pkg-config tells of it.
 header     = $(DESTDIR)$(PREFIX)/include
 library_to = $(DESTDIR)$(PREFIX)/lib
@@ -16,7 +23,7 @@ VERSION   := $(shell sed -n 's/.*NODE_VERSION "\(.*\)"/\1/p' node/version.h)
 # Documents, what they show, and examples, in folders as here.
 doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
 documents := $(wildcard *.md LICENSE incode/*.md boards/*.md transport/*.md \
-	tests/*.md host/*.md host/*/*.md host/service/strategies/*.md \
+	tests/*.md host/*.md host/*/*.md host/*/*/*.md \
 	boards/linux/examples/* host/draw/*.svg)
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
@@ -29,8 +36,10 @@ $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
 folders   = $(doc)/.folders
 install: all $(pages)
 	@for file in bin/- share/man/man1/- share/bash-completion/completions/- \
-		lib/incode/loader/- include/- lib/pkgconfig/- $(documents:%=share/doc/incode/%); do \
+		lib/incode/loader/- include/- lib/pkgconfig/- $(documents:%=share/doc/incode/%) \
+		$(if $(made_python),python); do \
 		folder='$(DESTDIR)$(PREFIX)/'$${file%/*}; \
+		[ $$file != python ] || folder='$(python_to)/__pycache__'; \
 		while [ ! -e "$$folder" ]; do \
 			echo "$$folder"; above=$${folder%/*}; \
 			[ "$$above" != "$$folder" ] || break; folder=$$above; done; \
@@ -55,6 +64,8 @@ install: all $(pages)
 	$(if $(made_loaders),install -d '$(lib)/loader' && \
 		install -m 644 $(made_loaders) '$(lib)/loader')
 	$(if $(made_nodes),install -d '$(lib)' && install $(made_nodes) '$(lib)')
+	$(if $(made_python),install -d '$(python_to)' && \
+		install -m 644 $(made_python) '$(python_to)')
 	ln -sf incode '$(completion)/incode-node'
 
 uninstall:
@@ -67,7 +78,9 @@ uninstall:
 		'$(header)/incode.h' '$(library_to)/libincode.so' \
 		$(patsubst %,'$(library_to)/%',$(notdir $(libraries))) \
 		'$(library_to)/pkgconfig/incode.pc' \
-		$(patsubst %,'$(doc)/%',$(documents))
+		$(patsubst %,'$(doc)/%',$(documents)) \
+		$(patsubst %,'$(python_to)/%',$(notdir $(package_all))) \
+		'$(python_to)/__pycache__'/*.pyc
 	@if [ -e '$(folders)' ]; then \
 		sort -ru '$(folders)' > '$(BUILD)/folders'; rm '$(folders)'; \
 		while read -r folder; do \

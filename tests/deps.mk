@@ -4,6 +4,7 @@ run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev \
 	libpng-dev nettle-dev libjansson-dev libserialport-dev libsodium-dev \
 	libconfig-dev libgpiod-dev pkg-config libedit-dev \
 	libopenmpi-dev openmpi-bin
+python_packages = gcc libc6-dev make python3-dev python3-cffi python3-numpy
 # Of the processors that make nodes is called for.
 node_packages  = $(run_packages) dpkg-dev \
 	$(foreach a,$(node_for),$(node_packages_$(a)))
@@ -13,7 +14,8 @@ node_packages_riscv64 = gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
-	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages)
+	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages) \
+	$(python_packages) python3-scipy python3-pytest
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
@@ -21,6 +23,8 @@ full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
 deps: deps-test
 deps-run:
 	@sh tests/deps $(run_packages)
+deps-python:
+	@sh tests/deps $(python_packages)
 deps-test:
 	@sh tests/deps $(test_packages)
 deps-nodes:
