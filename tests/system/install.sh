@@ -73,6 +73,21 @@ for file in libincode.so.0 libincode.a; do
         [ "$(cat "$scratch/seen")" = "$names" ]
 done
 
+# The Python package, and the program that it runs.
+package=$(find "$root" -path '*/incode/__init__.py')
+if [ -n "$package" ]; then
+    printf '%s\n' '0 0 0' '1 0 0' '0 1 0' '0 0 1' > "$scratch/four.xyz"
+    succeeds 'install/the Python package' env -u INCODE_PROGRAM \
+        PYTHONPATH="${package%/incode/*}" PATH=/usr/bin:/bin \
+        "${PYTHON:-/usr/bin/python3}" -c 'import sys, incode
+print(incode.Delaunay(incode.read(sys.argv[1])).simplices)' \
+        "$scratch/four.xyz" > "$scratch/simplices"
+    check 'install/its simplices' "$(cat "$scratch/simplices")" \
+        [ "$(cat "$scratch/simplices")" = '[[0 1 2 3]]' ]
+else
+    skip 'install/the Python package' 'it is not made here: make python'
+fi
+
 # The firmware of boards, where the installed program finds it.
 if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
     command -v qemu-system-arm > "$scratch/where"; then

@@ -17,7 +17,7 @@ $(package)/_incode.abi3.so: $(BUILD)/python/_incode.c $(BUILD)/libincode.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) -std=gnu11 -w $(OPT) $(MACHINE) $(SANITIZE) $(CFLAGS) -fPIC -shared \
-		-fvisibility=hidden -Wl,--exclude-libs,ALL -DPy_LIMITED_API=0x03060000 \
+		-fvisibility=hidden -Wl,--exclude-libs,ALL -DPy_LIMITED_API=0x03080000 \
 		-I$$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_path("include"))') \
 		-Ihost/library $^ -lm -pthread -o $@
 

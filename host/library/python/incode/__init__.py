@@ -1,7 +1,7 @@
 """Exact 3D Delaunay triangulation with the interface of scipy.spatial.
 
 >>> import numpy, incode
->>> cube = numpy.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+>>> cube = numpy.mgrid[0:2, 0:2, 0:2].reshape(3, -1).T
 >>> tri = incode.Delaunay(cube)
 >>> tri.nsimplex
 6

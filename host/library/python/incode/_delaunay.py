@@ -16,10 +16,22 @@ _FLOAT64 = np.dtype(np.float64)
 
 # The exception of each status, and what the caller can do.
 _ERRORS = {
-    lib.INCODE_NO_MEMORY: (MemoryError, "free memory, or use fewer points or threads"),
-    lib.INCODE_BAD_ARGUMENT: (ValueError, "this is a defect of the package; please report it"),
-    lib.INCODE_TOO_FEW: (ValueError, "a tetrahedron takes four distinct points"),
-    lib.INCODE_FLAT: (ValueError, "points in a plane have a triangulation in 2D only"),
+    lib.INCODE_NO_MEMORY: (
+        MemoryError,
+        "free memory, or use fewer points or threads",
+    ),
+    lib.INCODE_BAD_ARGUMENT: (
+        ValueError,
+        "this is a defect of the package; please report it",
+    ),
+    lib.INCODE_TOO_FEW: (
+        ValueError,
+        "a tetrahedron takes four distinct points",
+    ),
+    lib.INCODE_FLAT: (
+        ValueError,
+        "points in a plane have a triangulation in 2D only",
+    ),
     lib.INCODE_TOO_MANY: (ValueError, "triangulate parts of the points"),
     lib.INCODE_IO: (OSError, "see whether the device is full"),
     lib.INCODE_INTERNAL: (RuntimeError, "please report it with the points"),
@@ -41,7 +53,9 @@ class _Call:
     def __init__(self, threads, progress, flags=0, watched=True):
         self.progress = progress
         self.error = None
-        self.options = ffi.new("struct incode_options *", {"threads": threads, "flags": flags})
+        self.options = ffi.new(
+            "struct incode_options *", {"threads": threads, "flags": flags}
+        )
         if watched or progress is not None:
             self.handle = ffi.new_handle(self)
             self.options.context = self.handle
@@ -70,7 +84,7 @@ def incode_tick(context, done):
 
 
 class _Memory:
-    """Memory of the library as an array: numpy keeps it, and it keeps the owner."""
+    """Memory of the library as an array: numpy keeps this, this the owner."""
 
     def __init__(self, owner, pointer, shape, kind):
         self.owner = owner
@@ -96,38 +110,48 @@ def _rows_kind(points):
 def _coordinates(given, name):
     """`given` as it is if it is contiguous float64, else converted once."""
     if np.ma.isMaskedArray(given):
-        raise ValueError(f"{name} of shape {given.shape} is a masked array; give the rows "
-                         "that are not masked, as an array")
+        raise ValueError(
+            f"{name} of shape {given.shape} is a masked array; give the rows "
+            "that are not masked, as an array"
+        )
     array = np.asarray(given)
     if array.ndim == 0 or array.shape[-1] != 3:
-        raise ValueError(f"{name} has the shape {array.shape}; its last axis must be x, y, z")
+        raise ValueError(
+            f"{name} has the shape {array.shape}; its last axis must be x, y, z"
+        )
     if array.dtype.kind == "c":
-        raise ValueError(f"{name} of shape {array.shape} is complex; give real coordinates")
+        raise ValueError(
+            f"{name} of shape {array.shape} is complex; give real coordinates"
+        )
     try:
         return np.require(array, np.float64, ["C", "A"])
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} of shape {array.shape} and type {array.dtype} does not "
-                         f"convert to float64: {error}") from error
+        raise ValueError(
+            f"{name} of shape {array.shape} and type {array.dtype} does not "
+            f"convert to float64: {error}"
+        ) from error
 
 
 def _thread_count(threads):
     threads = operator.index(threads)
     if not 0 <= threads < 1 << 32:
-        raise ValueError(f"threads={threads}; give a count, or 0 for one a processor")
+        raise ValueError(
+            f"threads={threads}; give a count, or 0 for one a processor"
+        )
     return threads
 
 
 class Delaunay:
     """The Delaunay tetrahedra of points in space, computed exactly.
 
-    points: array of shape (n, 3).  Contiguous float64 is used in place and must not
-        change while this object is in use; anything else is converted once.
+    points: array of shape (n, 3).  Contiguous float64 is used in place and must
+        not change while this object is in use; anything else is converted once.
     threads: how many work; 0: one a processor.
-    progress: called with the part that is done, 0.0 to 1.0, at least ten times a
-        second.  An exception that it raises cancels the call and is passed on.
+    progress: called with the part that is done, 0.0 to 1.0, at least ten times
+        a second.  An exception that it raises cancels the call and is passed on.
 
-    Arrays of the result are views of the library's memory, which is freed with the
-    last of them.  They are read-only.
+    Arrays of the result are views of the library's memory, which is freed with
+    the last of them.  They are read-only.
     """
 
     ndim = 3
@@ -135,19 +159,27 @@ class Delaunay:
     def __init__(self, points, *, threads=0, progress=None):
         points = _coordinates(points, "points")
         if points.ndim != 2:
-            raise ValueError(f"points has the shape {points.shape}; (n, 3) is needed")
+            raise ValueError(
+                f"points has the shape {points.shape}; (n, 3) is needed"
+            )
         self.points = points
         self.npoints = n = len(points)
         self._threads = _thread_count(threads)
         self._xyz = ffi.from_buffer("double[]", points)
-        call = _Call(self._threads, progress, lib.INCODE_NEIGHBORS | lib.INCODE_HULL,
-                     n >= _WATCHED)
+        call = _Call(
+            self._threads,
+            progress,
+            lib.INCODE_NEIGHBORS | lib.INCODE_HULL,
+            n >= _WATCHED,
+        )
         result = ffi.new("struct incode_tetrahedra *")
         status = lib.incode_delaunay(self._xyz, n, call.options, result)
         self._result = t = ffi.gc(result, lib.incode_tetrahedra_free)
         if status == lib.INCODE_NOT_FINITE:
-            raise ValueError(f"row {t.at} of points is {points[t.at]}; remove rows that are "
-                             "not finite: points[numpy.isfinite(points).all(1)]")
+            raise ValueError(
+                f"row {t.at} of points is {points[t.at]}; remove rows that are "
+                "not finite: points[numpy.isfinite(points).all(1)]"
+            )
         call.check(status)
         kind = _rows_kind(n)
         self.nsimplex = t.count
@@ -158,14 +190,19 @@ class Delaunay:
         self._duplicates = _view(t, t.duplicate, (t.duplicate_count, 2), kind)
 
     def find_simplex(self, xi, bruteforce=False, tol=None):
-        """The lowest number of a simplex that contains each point; -1: none does.
+        """The lowest number of a simplex that contains each point, or -1.
 
         xi: array of shape (..., 3).  Facets, edges and vertices belong to their
-        simplices.  A point with a NaN is in none.  The answer is exact, therefore
-        `bruteforce` and `tol` change nothing.  The result is int64, of shape (...).
+        simplices.  A point with a NaN is in none.  The answer is exact, so
+        `bruteforce` and `tol` change nothing.  The result is int64 (...).
         """
-        if not (type(xi) is np.ndarray and xi.dtype == _FLOAT64 and xi.flags.c_contiguous
-                and xi.flags.aligned and xi.shape[-1:] == (3,)):
+        if not (
+            type(xi) is np.ndarray
+            and xi.dtype == _FLOAT64
+            and xi.flags.c_contiguous
+            and xi.flags.aligned
+            and xi.shape[-1:] == (3,)
+        ):
             xi = _coordinates(xi, "xi")
         found = np.empty(xi.shape[:-1], np.int64)
         call, options = None, ffi.NULL
@@ -173,8 +210,15 @@ class Delaunay:
             call = _Call(self._threads, None)
             options = call.options
         status = lib.incode_locate(
-            self._xyz, self.npoints, self._result, ffi.from_buffer("double[]", xi), found.size,
-            options, ffi.from_buffer("uint64_t[]", found), ffi.NULL)
+            self._xyz,
+            self.npoints,
+            self._result,
+            ffi.from_buffer("double[]", xi),
+            found.size,
+            options,
+            ffi.from_buffer("uint64_t[]", found),
+            ffi.NULL,
+        )
         if status == lib.INCODE_NOT_FINITE:
             return self._find_finite(xi)
         if status != lib.INCODE_OK:
@@ -193,11 +237,15 @@ class Delaunay:
         indices[indptr[k]:indptr[k + 1]], ascending."""
         call = _Call(self._threads, None, watched=self.nsimplex >= _WATCHED)
         result = ffi.new("struct incode_adjacency *")
-        status = lib.incode_adjacency(self.npoints, self._result, call.options, result)
+        status = lib.incode_adjacency(
+            self.npoints, self._result, call.options, result
+        )
         a = ffi.gc(result, lib.incode_adjacency_free)
         call.check(status)
         indptr = _view(a, a.first, (self.npoints + 1,), np.int64)
-        return indptr, _view(a, a.to, (int(indptr[-1]),), _rows_kind(self.npoints))
+        return indptr, _view(
+            a, a.to, (int(indptr[-1]),), _rows_kind(self.npoints)
+        )
 
     @cached_property
     def vertex_to_simplex(self):
@@ -218,7 +266,7 @@ class Delaunay:
         point, and the lower row with the same point, which is the vertex."""
         row, vertex = self._duplicates.T
         if len(row) == 0:
-            return np.empty((0, 3), self._duplicates.dtype)
+            return np.empty((0, 3), np.int64)
         return np.stack([row, self.vertex_to_simplex[vertex], vertex], 1)
 
     @cached_property

@@ -12,57 +12,80 @@ from ._delaunay import Delaunay, _coordinates, _rows_kind
 
 
 def _program():
-    """INCODE_PROGRAM; else the program of this build or installation; else PATH's."""
+    """INCODE_PROGRAM; else that of this build or installation; else PATH's."""
     named = os.environ.get("INCODE_PROGRAM")
     if named:
         return named
     above = pathlib.Path(__file__).resolve().parent.parents
-    beside = [above[i] / name for i, name in ((1, "incode"), (3, "bin/incode"))
-              if i < len(above)]
+    beside = [
+        above[i] / name
+        for i, name in ((1, "incode"), (3, "bin/incode"))
+        if i < len(above)
+    ]
     for path in beside:
         if path.is_file() and os.access(path, os.X_OK):
             return str(path)
     found = shutil.which("incode")
     if found is None:
-        raise FileNotFoundError("the program incode is not found; install it, or set "
-                                "INCODE_PROGRAM to its path")
+        raise FileNotFoundError(
+            "the program incode is not found; install it, or set "
+            "INCODE_PROGRAM to its path"
+        )
     return found
 
 
-# The program's exit status: of a wrong argument, and of a file with wrong content.
+# The program's exit status: of a wrong argument, and of a file's wrong content.
 _STATUS = {2: ValueError, 3: ValueError}
 
 
 def _run(*arguments):
-    """Runs the program.  Its error is raised, and what else it reports is a warning."""
+    """Runs the program.  It raises its error, and warns of its other reports."""
     command = [_program(), *map(str, arguments)]
     try:
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                              stderr=subprocess.PIPE, text=True, errors="replace", check=False)
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            check=False,
+        )
     except OSError as error:
-        raise type(error)(error.errno, f"{error.strerror}; INCODE_PROGRAM names the program "
-                          "incode", command[0]) from None
+        raise type(error)(
+            error.errno,
+            f"{error.strerror}; INCODE_PROGRAM names the program " "incode",
+            command[0],
+        ) from None
     said = done.stderr.strip()
     if done.returncode != 0:
-        said = said or f"{command[0]} ended with status {done.returncode} and no message"
+        said = (
+            said
+            or f"{command[0]} ended with status {done.returncode}, silently"
+        )
         raise _STATUS.get(done.returncode, RuntimeError)(said)
     if said:
         warnings.warn(said, stacklevel=3)
 
 
 def read(path, *, format=None):
-    """What a file holds: points, float64 of shape (n, 3), or tetrahedra, rows of
-    points, of shape (m, 4).
+    """What a file holds: points, float64 of shape (n, 3), or tetrahedra, rows
+    of points, of shape (m, 4).
 
     A file that may hold both (.vtu, .vtk) is read as tetrahedra if it has some.
-    format: the name of a format, as "vtu": the file is read as points of that format.
+    format: a name as "vtu": the file is read as points in that format.
     """
     path = os.path.abspath(os.fspath(path))
     with open(path, "rb"):
         pass  # what is missing or not readable is Python's own exception
     with tempfile.TemporaryDirectory(prefix="incode-") as folder:
         out = os.path.join(folder, "out.npy")
-        _run("convert", *(() if format is None else (f"--format={format}",)), path, out)
+        _run(
+            "convert",
+            *(() if format is None else (f"--format={format}",)),
+            path,
+            out,
+        )
         array = np.load(out)
     if array.dtype.kind == "u":
         array = array.view(_rows_kind(int(array.max(initial=0)) + 1))
@@ -72,7 +95,7 @@ def read(path, *, format=None):
 def write(path, points, simplices=None):
     """Writes a file in the format of its extension.
 
-    points: a Delaunay, whose points and tetrahedra are written, or an array (n, 3).
+    points: an array (n, 3), or a Delaunay, which has tetrahedra, too.
     simplices: tetrahedra, an array (m, 4) of rows of `points`.
     """
     path = os.path.abspath(os.fspath(path))
@@ -93,9 +116,13 @@ def write(path, points, simplices=None):
 def _rows(simplices, points):
     array = np.asarray(simplices)
     if array.ndim != 2 or array.shape[1] != 4 or array.dtype.kind not in "iu":
-        raise ValueError(f"simplices has the shape {array.shape} and type {array.dtype}; "
-                         "integers of shape (m, 4) are needed")
+        raise ValueError(
+            f"simplices has the shape {array.shape} and type {array.dtype}; "
+            "integers of shape (m, 4) are needed"
+        )
     if array.size and not (0 <= array.min() and array.max() < points):
-        raise ValueError(f"simplices has rows {array.min()} .. {array.max()}; there are "
-                         f"{points} points")
+        raise ValueError(
+            f"simplices has rows {array.min()} .. {array.max()}; there are "
+            f"{points} points"
+        )
     return array.astype(np.uint32, order="C")
