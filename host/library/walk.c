@@ -118,29 +118,33 @@ static unsigned place_of(const uint32_t v[4], uint32_t p) {
     return i;
 }
 
-/* Goes round the edge a b, from `tet` out through its facet i, to the hull or
- * once round.  Lowers *lowest; false: the result is damaged. */
-static bool turn(const struct library_mesh *mesh, uint64_t tet, unsigned i,
-                 unsigned other, uint64_t *lowest, uint64_t *size) {
+enum turned { TURNED_ROUND, TURNED_TO_HULL, TURNED_WRONG };
+
+/* Goes round the edge that facets i and `other` of `tet` have in common, out
+ * through facet i.  Lowers *lowest, and counts in *size.  TURNED_WRONG: the
+ * result is damaged. */
+static enum turned turn(const struct library_mesh *mesh, uint64_t tet,
+                        unsigned i, unsigned other, uint64_t *lowest,
+                        uint64_t *size) {
     const struct incode_tetrahedra *t = mesh->t;
-    unsigned all = 6 - i - other, a = 0; /* the sum of both ends' places */
+    unsigned a = 0, sum = 6 - i - other; /* of the places of both ends */
     while (a == i || a == other)
         a++;
-    uint32_t ends[2] = {t->vertex[tet][a], t->vertex[tet][all - a]};
+    uint32_t ends[2] = {t->vertex[tet][a], t->vertex[tet][sum - a]};
     uint32_t common = t->vertex[tet][other];
     uint64_t at = tet;
     while ((at = t->neighbor[at][i]) != INCODE_NONE64 && at != tet) {
         if (at >= t->count || ++*size > t->count)
-            return false;
+            return TURNED_WRONG;
         *lowest = at < *lowest ? at : *lowest;
         const uint32_t *v = t->vertex[at];
         unsigned p = place_of(v, ends[0]), q = place_of(v, ends[1]);
         i = place_of(v, common);
-        if (p == 4 || q == 4 || i == 4 || p + q + i > 6)
-            return false;
+        if (p == 4 || q == 4 || i == 4 || p + q + i < 3 || p + q + i > 6)
+            return TURNED_WRONG;
         common = v[6 - p - q - i];
     }
-    return true;
+    return at == tet ? TURNED_ROUND : TURNED_TO_HULL;
 }
 
 /* The slot of a tetrahedron in the table, which has a free one. */
@@ -257,9 +261,10 @@ static enum incode_status lowest_of(struct library_walker *w,
     } else {
         unsigned p = (unsigned)__builtin_ctz(zeros);
         unsigned q = 31 - (unsigned)__builtin_clz(zeros);
-        if (!turn(mesh, tet, p, q, lowest, &size) ||
-            !turn(mesh, tet, q, p, lowest, &size))
-            status = INCODE_BAD_ARGUMENT;
+        enum turned turned = turn(mesh, tet, p, q, lowest, &size);
+        if (turned == TURNED_TO_HULL)
+            turned = turn(mesh, tet, q, p, lowest, &size);
+        status = turned == TURNED_WRONG ? INCODE_BAD_ARGUMENT : INCODE_OK;
     }
     if (status == INCODE_OK && size >= LIBRARY_STAR_FIRST) {
         w->star[hash].key = key;
