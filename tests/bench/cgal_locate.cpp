@@ -51,7 +51,8 @@ int main(int argc, char **argv) {
         std::cerr << "usage: cgal_locate POINTS.npy QUERIES.npy\n";
         return 2;
     }
-    const std::vector<Point> points = read(argv[1]), queries = read(argv[2]);
+    const std::vector<Point> points = read(argv[1]);
+    std::vector<Point> queries = read(argv[2]);
     const Delaunay t(points.begin(), points.end());
     std::vector<Delaunay::Cell_handle> found(queries.size());
     peer::Watch watch;

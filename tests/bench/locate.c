@@ -62,8 +62,8 @@ int main(int count, char **word) {
     o = (struct incode_options){.threads = (unsigned)atoi(word[3])};
     double cpu = -seconds(CLOCK_PROCESS_CPUTIME_ID);
     double wall = -seconds(CLOCK_MONOTONIC);
-    enum incode_status status = incode_locate(xyz, points, &t, query, queries,
-                                              &o, found, NULL);
+    enum incode_status status =
+        incode_locate(xyz, points, &t, query, queries, &o, found, NULL);
     cpu += seconds(CLOCK_PROCESS_CPUTIME_ID);
     wall += seconds(CLOCK_MONOTONIC);
     if (status != INCODE_OK) {
