@@ -62,7 +62,8 @@ if command -v g++ > "$scratch/where"; then
 else
     skip 'install/an example in C++' 'g++ is not installed'
 fi
-names='incode_delaunay incode_status_text incode_tetrahedra_free incode_version'
+names='incode_adjacency incode_adjacency_free incode_delaunay incode_locate'
+names="$names incode_status_text incode_tetrahedra_free incode_version"
 seen() { nm "$@" | awk 'NF == 3 && $2 ~ /[A-TV-Z]/ { print $3 }' | sort | xargs; }
 for file in libincode.so.0 libincode.a; do
     kind=
