@@ -17,7 +17,7 @@ test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages) \
 	$(python_packages) python3-scipy python3-pytest
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
-	libqhull-dev libgmsh-dev
+	libqhull-dev libgmsh-dev python3-scipy
 full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
 
 deps: deps-test

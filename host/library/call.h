@@ -1,11 +1,5 @@
 /* What a call of the library has around its work: the options, threads and
- * memory that it may use, progress, and the floating-point environment.
- *
- *     static enum incode_status sum(struct library_call *call);
- *     struct library_call call = {.work = sum, .done = part, .drop = free_it};
- *     if (library_options(&options, 0))
- *         status = library_call(&call, options, 1);
- */
+ * memory that it may use, progress, and the floating-point environment. */
 #ifndef HOST_LIBRARY_CALL_H
 #define HOST_LIBRARY_CALL_H
 

@@ -112,7 +112,7 @@ void incode_tetrahedra_free(struct incode_tetrahedra *t);
  * is on.  Up to 32 queries take memory for a star of more than 128 tetrahedra
  * alone.
  * Work of a query, where points are spread evenly: O(log queries) to put them
- * in order, and O(1 + (points / queries)^(1/3)) steps; O(points^(1/4)) for a
+ * in order, and O(1 + (points / queries)^(1/3)) steps; O(points^(1/3)) for a
  * query alone. */
 enum incode_status
 incode_locate(const double *xyz /* [3 * points] */, uint64_t points,

@@ -58,8 +58,8 @@ static double cut_at(const struct library_query *q, uint64_t n, unsigned sample,
     for (uint64_t i = 1; i < sample; i++) {
         for (unsigned k = 0; k < 3; k++) {
             double x = q[i * n / sample].at[k];
-            lower[k] = fmin(lower[k], x);
-            upper[k] = fmax(upper[k], x);
+            lower[k] = x < lower[k] ? x : lower[k];
+            upper[k] = x > upper[k] ? x : upper[k];
         }
     }
     *axis = 0;

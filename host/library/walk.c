@@ -9,6 +9,7 @@ enum {
     LANES = 16,       /* walks at a time, whose loads from memory overlap */
     LANE_QUERIES = 8, /* fewer are not worth another lane */
     POLL_STEPS = 4096,
+    SAMPLE = 4, /* times the cube root of the tetrahedra */
     FACETS = 4,
     NOWHERE = 4 /* no facet */
 };
@@ -118,29 +119,33 @@ static unsigned place_of(const uint32_t v[4], uint32_t p) {
     return i;
 }
 
-/* Goes round the edge a b, from `tet` out through its facet i, to the hull or
- * once round.  Lowers *lowest; false: the result is damaged. */
-static bool turn(const struct library_mesh *mesh, uint64_t tet, unsigned i,
-                 unsigned other, uint64_t *lowest, uint64_t *size) {
+enum turned { TURNED_ROUND, TURNED_TO_HULL, TURNED_WRONG };
+
+/* Goes round the edge that facets i and `other` of `tet` have in common, out
+ * through facet i.  Lowers *lowest, and counts in *size.  TURNED_WRONG: the
+ * result is damaged. */
+static enum turned turn(const struct library_mesh *mesh, uint64_t tet,
+                        unsigned i, unsigned other, uint64_t *lowest,
+                        uint64_t *size) {
     const struct incode_tetrahedra *t = mesh->t;
-    unsigned all = 6 - i - other, a = 0; /* the sum of both ends' places */
+    unsigned a = 0, sum = 6 - i - other; /* of the places of both ends */
     while (a == i || a == other)
         a++;
-    uint32_t ends[2] = {t->vertex[tet][a], t->vertex[tet][all - a]};
+    uint32_t ends[2] = {t->vertex[tet][a], t->vertex[tet][sum - a]};
     uint32_t common = t->vertex[tet][other];
     uint64_t at = tet;
     while ((at = t->neighbor[at][i]) != INCODE_NONE64 && at != tet) {
         if (at >= t->count || ++*size > t->count)
-            return false;
+            return TURNED_WRONG;
         *lowest = at < *lowest ? at : *lowest;
         const uint32_t *v = t->vertex[at];
         unsigned p = place_of(v, ends[0]), q = place_of(v, ends[1]);
         i = place_of(v, common);
-        if (p == 4 || q == 4 || i == 4 || p + q + i > 6)
-            return false;
+        if (p == 4 || q == 4 || i == 4 || p + q + i < 3 || p + q + i > 6)
+            return TURNED_WRONG;
         common = v[6 - p - q - i];
     }
-    return true;
+    return at == tet ? TURNED_ROUND : TURNED_TO_HULL;
 }
 
 /* The slot of a tetrahedron in the table, which has a free one. */
@@ -257,9 +262,10 @@ static enum incode_status lowest_of(struct library_walker *w,
     } else {
         unsigned p = (unsigned)__builtin_ctz(zeros);
         unsigned q = 31 - (unsigned)__builtin_clz(zeros);
-        if (!turn(mesh, tet, p, q, lowest, &size) ||
-            !turn(mesh, tet, q, p, lowest, &size))
-            status = INCODE_BAD_ARGUMENT;
+        enum turned turned = turn(mesh, tet, p, q, lowest, &size);
+        if (turned == TURNED_TO_HULL)
+            turned = turn(mesh, tet, q, p, lowest, &size);
+        status = turned == TURNED_WRONG ? INCODE_BAD_ARGUMENT : INCODE_OK;
     }
     if (status == INCODE_OK && size >= LIBRARY_STAR_FIRST) {
         w->star[hash].key = key;
@@ -275,6 +281,8 @@ struct lane {
     const struct library_query *query, *end;
     uint64_t tet, steps;
     bool has_vertices; /* their coordinates are on their way */
+    bool is_far;       /* the query, from the tetrahedron */
+    bool are_sparse;   /* its queries: all are far from each other */
 };
 
 static void ask_for(const struct library_mesh *mesh, uint64_t tet) {
@@ -282,15 +290,17 @@ static void ask_for(const struct library_mesh *mesh, uint64_t tet) {
     __builtin_prefetch(mesh->t->neighbor[tet]);
 }
 
-/* A tetrahedron near the query: the best of some that are spread over the list,
- * about as many as the walk from it then has steps (Muecke, Saias and Zhu,
+/* So many tetrahedra, spread over the list, are worth a look before a walk. */
+static uint64_t sample_of(const struct library_mesh *mesh) {
+    return 8 + (uint64_t)(SAMPLE * cbrt((double)mesh->t->count));
+}
+
+/* Goes to the nearest of a sample, or stays (Muecke, Saias and Zhu,
  * Computational Geometry 12:63-83, 1999). */
-static bool begin(const struct library_mesh *mesh, struct lane *lane,
-                  uint64_t last) {
+static bool jump(const struct library_mesh *mesh, struct lane *lane) {
     const struct incode_tetrahedra *t = mesh->t;
-    uint64_t sample = 8 + (uint64_t)(1.5 * sqrt(sqrt((double)t->count)));
+    uint64_t sample = sample_of(mesh), best_tet = lane->tet;
     double best = INFINITY;
-    lane->tet = last < t->count ? last : 0;
     for (uint64_t i = 0; i <= sample; i++) {
         uint64_t tet =
             i == sample ? lane->tet : (2 * i + 1) * (t->count / (2 * sample));
@@ -304,9 +314,11 @@ static bool begin(const struct library_mesh *mesh, struct lane *lane,
         double distance = dot(d, d);
         if (distance < best) {
             best = distance;
-            lane->tet = tet;
+            best_tet = tet;
         }
     }
+    lane->tet = best_tet;
+    lane->is_far = lane->has_vertices = false;
     ask_for(mesh, lane->tet);
     return true;
 }
@@ -355,6 +367,7 @@ static enum incode_status step(struct library_walker *w,
     }
     lane->query++;
     lane->steps = 0;
+    lane->is_far = lane->are_sparse;
     return INCODE_OK;
 }
 
@@ -363,23 +376,26 @@ enum incode_status library_walk(struct library_walker *w,
                                 const struct library_query *query,
                                 uint64_t count, uint64_t *found) {
     struct lane lane[LANES];
+    bool are_sparse = count < sample_of(mesh);
     unsigned lanes = (unsigned)(count < (uint64_t)LANES * LANE_QUERIES
-                                    ? 1 + count / LANE_QUERIES / 2
+                                    ? (count + LANE_QUERIES - 1) / LANE_QUERIES
                                     : LANES);
-    for (unsigned i = 0; i < lanes && count > 0; i++) {
+    for (unsigned i = 0; i < lanes; i++) {
         lane[i] = (struct lane){.query = query + count * i / lanes,
-                                .end = query + count * (i + 1) / lanes};
-        if (!begin(mesh, &lane[i], i == 0 ? w->last : lane[i - 1].tet))
-            return INCODE_BAD_ARGUMENT;
+                                .end = query + count * (i + 1) / lanes,
+                                .tet = w->last,
+                                .is_far = true,
+                                .are_sparse = are_sparse};
     }
     enum incode_status status = INCODE_OK;
-    for (uint64_t steps = 0; count > 0 && lanes > 0 && status == INCODE_OK;
-         steps++) {
+    for (uint64_t steps = 0; lanes > 0 && status == INCODE_OK; steps++) {
         if (steps % POLL_STEPS == 0 && host_call_cancelled())
             return INCODE_CANCELLED;
         for (unsigned i = 0; i < lanes && status == INCODE_OK; i++) {
             struct lane *l = &lane[i];
-            if (!l->has_vertices)
+            if (l->is_far)
+                status = jump(mesh, l) ? INCODE_OK : INCODE_BAD_ARGUMENT;
+            else if (!l->has_vertices)
                 status = fetch(mesh, l) ? INCODE_OK : INCODE_BAD_ARGUMENT;
             else
                 status = step(w, mesh, l, found);

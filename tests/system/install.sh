@@ -37,17 +37,29 @@ check 'install/what the documents link' "$lacks" [ -z "$lacks" ]
 # The library: the examples of its page, and the names that are seen from outside.
 export PKG_CONFIG_SYSROOT_DIR=$root LD_LIBRARY_PATH=$root/opt/incode/lib
 export PKG_CONFIG_PATH=$root/opt/incode/lib/pkgconfig
-example() { # LANGUAGE FILE
-    awk -v open="\`\`\`$1" '$0 == open { on = 1; next } /^```/ { on = 0 } on' \
-        host/library/README.md > "$2"
+example() { # LANGUAGE NUMBER FILE
+    awk -v open="\`\`\`$1" -v number="$2" \
+        '$0 == open { on = ++n == number; next } /^```/ { on = 0 } on' \
+        host/library/README.md > "$3"
 }
-example c "$scratch/ten.c"
-example cpp "$scratch/surface.cpp"
+example c 1 "$scratch/ten.c"
+example c 2 "$scratch/where.c"
+example cpp 1 "$scratch/surface.cpp"
 # shellcheck disable=SC2046
 succeeds 'install/an example in C' gcc -std=c11 -Wall -Wextra -Werror \
     "$scratch/ten.c" $(pkg-config --cflags --libs incode) -o "$scratch/ten"
 check 'install/its tetrahedra' 'not two' \
     [ "$("$scratch/ten" | tr '\n' ';')" = '0 1 2 3;1 2 3 4;' ]
+# shellcheck disable=SC2046
+succeeds 'install/an example of point location' gcc -std=c11 -Wall -Wextra \
+    -Werror "$scratch/where.c" $(pkg-config --cflags --libs incode) \
+    -o "$scratch/located"
+"$scratch/located" > "$scratch/answers"
+printf 'query %s\n' '0 is in tetrahedron 0' '1 is in tetrahedron 1' \
+    '2 is in tetrahedron 0' '3 is outside' > "$scratch/expected"
+echo 'point 0 has neighbours 1 2 3' >> "$scratch/expected"
+check 'install/what it finds' "$(xargs < "$scratch/answers")" \
+    cmp -s "$scratch/answers" "$scratch/expected"
 if command -v g++ > "$scratch/where"; then
     # shellcheck disable=SC2046
     succeeds 'install/an example in C++' g++ -Wall -Wextra -Werror \
@@ -62,7 +74,8 @@ if command -v g++ > "$scratch/where"; then
 else
     skip 'install/an example in C++' 'g++ is not installed'
 fi
-names='incode_delaunay incode_status_text incode_tetrahedra_free incode_version'
+names='incode_adjacency incode_adjacency_free incode_delaunay incode_locate'
+names="$names incode_status_text incode_tetrahedra_free incode_version"
 seen() { nm "$@" | awk 'NF == 3 && $2 ~ /[A-TV-Z]/ { print $3 }' | sort | xargs; }
 for file in libincode.so.0 libincode.a; do
     kind=
