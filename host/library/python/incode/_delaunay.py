@@ -148,7 +148,7 @@ class Delaunay:
         not change while this object is in use; anything else is converted once.
     threads: how many work; 0: one a processor.
     progress: called with the part that is done, 0.0 to 1.0, at least ten times
-        a second.  An exception that it raises cancels the call and is passed on.
+        a second.  An exception that it raises ends the call and is passed on.
 
     Arrays of the result are views of the library's memory, which is freed with
     the last of them.  They are read-only.

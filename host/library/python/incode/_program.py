@@ -39,7 +39,7 @@ _STATUS = {2: ValueError, 3: ValueError}
 
 
 def _run(*arguments):
-    """Runs the program.  It raises its error, and warns of its other reports."""
+    """Runs the program.  Raises its error, and warns of its other reports."""
     command = [_program(), *map(str, arguments)]
     try:
         done = subprocess.run(
