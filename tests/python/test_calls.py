@@ -158,16 +158,23 @@ def test_exception_of_progress(rng, count):
 
 
 INTERRUPT = """
-    import os, signal, time, numpy, incode
+    import os, signal, numpy, incode
     points = numpy.random.default_rng(1).random((400000, 3))
     tri = incode.Delaunay(points[:5000])
     queries = numpy.random.default_rng(2).random((3000000, 3))
-    def interrupt(*_):
+    def press(*_):
         os.kill(os.getpid(), signal.SIGINT)
     def progress(done):
-        interrupt()
+        press()
+    def interrupt(number, frame):
+        at = frame
+        while at is not None and at.f_code.co_name != "incode_tick":
+            at = at.f_back
+        print("within" if at is not None else "after")
+        signal.default_int_handler(number, frame)
+    signal.signal(signal.SIGINT, interrupt)
     # The signal of a timer that runs while this process works.
-    signal.signal(signal.SIGPROF, interrupt)
+    signal.signal(signal.SIGPROF, press)
     signal.setitimer(signal.ITIMER_PROF, {seconds})
     result = None
     try:
@@ -190,7 +197,8 @@ INTERRUPT = """
 )
 def test_interrupt(call, seconds):
     done = in_child(INTERRUPT.format(call=call, seconds=seconds))
-    assert done.stdout.split() == ["interrupted", "None", "True"], (
+    # The signal is handled within the call, not when it has ended.
+    assert done.stdout.split() == ["within", "interrupted", "None", "True"], (
         done.stdout + done.stderr
     )
     assert done.stderr == "" and done.returncode == 0
@@ -206,7 +214,7 @@ def test_others_run_meanwhile(rng):
     before = sys.getswitchinterval()
     sys.setswitchinterval(1000)
     try:
-        for _ in range(20):  # a busy machine may wake this thread late
+        for _ in range(10):  # a busy machine may wake this thread late
             order, begun = [], threading.Event()
 
             def work():

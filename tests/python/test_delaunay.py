@@ -179,7 +179,8 @@ LAYOUTS = {
 def test_layout(layout, tmp_path):
     tri = incode.Delaunay(LAYOUTS[layout](tmp_path))
     expected = incode.Delaunay(POINTS.copy())
-    assert (tri.points == POINTS).all() and tri.points.dtype == np.float64
+    assert tri.points.dtype == np.float64 and tri.points.flags.aligned
+    assert (tri.points == POINTS).all()
     assert (tri.simplices == expected.simplices).all()
     assert (
         tri.find_simplex(LAYOUTS[layout](tmp_path))
