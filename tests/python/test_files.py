@@ -5,6 +5,7 @@ import io
 import os
 import pathlib
 import re
+import subprocess
 
 import numpy as np
 import pytest
@@ -86,6 +87,27 @@ def test_the_program(tmp_path, monkeypatch):
         incode.read(tmp_path / "p.xyz")
     monkeypatch.delenv("INCODE_PROGRAM")
     assert incode.read(tmp_path / "p.xyz").shape == (1, 3)
+
+
+def test_an_interrupt_ends_the_program(tmp_path, monkeypatch):
+    program = tmp_path / "program"
+    program.write_text(
+        "#!/bin/sh\ntrap 'echo ended > $0.ended; exit' TERM\necho begun >&2\n"
+        "while :; do read line < $0.none; done\n"
+    )
+    program.chmod(0o755)
+    os.mkfifo(tmp_path / "program.none")
+    (tmp_path / "p.xyz").write_text("1 2 3\n")
+
+    def interrupted(process):
+        assert process.stderr.readline() == "begun\n"
+        raise KeyboardInterrupt
+
+    monkeypatch.setenv("INCODE_PROGRAM", str(program))
+    monkeypatch.setattr(subprocess.Popen, "communicate", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        incode.read(tmp_path / "p.xyz")
+    assert (tmp_path / "program.ended").read_text() == "ended\n"
 
 
 # --- documents ----------------------------------------------------------------

@@ -42,28 +42,31 @@ def _run(*arguments):
     """Runs the program.  Raises its error, and warns of its other reports."""
     command = [_program(), *map(str, arguments)]
     try:
-        done = subprocess.run(
+        process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
-            check=False,
         )
     except OSError as error:
         raise type(error)(
             error.errno,
-            f"{error.strerror}; INCODE_PROGRAM names the program " "incode",
+            f"{error.strerror}; INCODE_PROGRAM names the program incode",
             command[0],
         ) from None
-    said = done.stderr.strip()
-    if done.returncode != 0:
-        said = (
-            said
-            or f"{command[0]} ended with status {done.returncode}, silently"
-        )
-        raise _STATUS.get(done.returncode, RuntimeError)(said)
+    with process:
+        try:
+            said = process.communicate()[1].strip()
+        except BaseException:
+            process.terminate()  # it removes what it has begun
+            process.wait()
+            raise
+    status = process.returncode
+    if status != 0:
+        said = said or f"{command[0]} ended with status {status}, silently"
+        raise _STATUS.get(status, RuntimeError)(said)
     if said:
         warnings.warn(said, stacklevel=3)
 
