@@ -18,7 +18,8 @@ python_to  = $(DESTDIR)$(PYTHONDIR)/incode
 made_python = $(wildcard $(package_all))
 # The library, its header and what pkg-config tells of it.
 header     = $(DESTDIR)$(PREFIX)/include
-library_to = $(DESTDIR)$(PREFIX)/lib
+LIBDIR    ?= $(PREFIX)/lib
+library_to = $(DESTDIR)$(LIBDIR)
 VERSION   := $(shell sed -n 's/.*NODE_VERSION "\(.*\)"/\1/p' node/version.h)
 # Documents, what they show, and examples, in folders as here.
 doc       = $(DESTDIR)$(PREFIX)/share/doc/incode
@@ -26,7 +27,10 @@ documents := $(wildcard *.md LICENSE incode/*.md boards/*.md transport/*.md \
 	tests/*.md host/*.md host/*/*.md host/*/*/*.md \
 	boards/linux/examples/* host/draw/*.svg)
 man_pages := $(BUILD)/pages/incode.1 $(BUILD)/pages/incode-node.1
+# It is also that of the programs for ranks of MPI.
+man_links := incode-mpi.1 incode-node-mpi.1
 pages     := $(man_pages) $(BUILD)/pages/incode.bash
+pages: $(pages)
 $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
 	@mkdir -p $(@D)
 	$(say) PAGE $@
@@ -35,11 +39,9 @@ $(pages): $(BUILD)/pages/%: host/pages $(BUILD)/incode $(BUILD)/incode-node
 # Folders that install has made, for uninstall.
 folders   = $(doc)/.folders
 install: all $(pages)
-	@for file in bin/- share/man/man1/- share/bash-completion/completions/- \
-		lib/incode/loader/- include/- lib/pkgconfig/- $(documents:%=share/doc/incode/%) \
-		$(if $(made_python),python); do \
-		folder='$(DESTDIR)$(PREFIX)/'$${file%/*}; \
-		[ $$file != python ] || folder='$(python_to)/__pycache__'; \
+	@for folder in '$(bin)' '$(man)' '$(completion)' '$(lib)/loader' '$(header)' \
+		'$(library_to)/pkgconfig' $(patsubst %/,'$(doc)/%',$(sort $(dir $(documents)))) \
+		$(if $(made_python),'$(python_to)/__pycache__'); do \
 		while [ ! -e "$$folder" ]; do \
 			echo "$$folder"; above=$${folder%/*}; \
 			[ "$$above" != "$$folder" ] || break; folder=$$above; done; \
@@ -55,9 +57,11 @@ install: all $(pages)
 	ln -sf libincode.so.0 '$(library_to)/libincode.so'
 	printf '%s\n' 'Name: incode' 'Version: $(VERSION)' \
 		'Description: exact 3D Delaunay triangulation' \
-		'Cflags: -I$(PREFIX)/include' 'Libs: -L$(PREFIX)/lib -lincode' \
-		'Libs.private: -lm -pthread' > '$(library_to)/pkgconfig/incode.pc'
+		'Cflags: -I$(PREFIX)/include' 'Libs: -L$(LIBDIR) -lincode' \
+		'Libs.private: -lm -pthread' > '$(BUILD)/incode.pc'
+	install -m 644 '$(BUILD)/incode.pc' '$(library_to)/pkgconfig'
 	install -m 644 $(man_pages) '$(man)'
+	for page in $(man_links); do ln -sf incode.1 '$(man)'/$$page || exit 1; done
 	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode'
 	$(if $(made_images),install -d '$(lib)' && \
 		install -m 644 $(made_images) '$(lib)')
@@ -66,14 +70,14 @@ install: all $(pages)
 	$(if $(made_nodes),install -d '$(lib)' && install $(made_nodes) '$(lib)')
 	$(if $(made_python),install -d '$(python_to)' && \
 		install -m 644 $(made_python) '$(python_to)')
-	ln -sf incode '$(completion)/incode-node'
+	install -m 644 $(BUILD)/pages/incode.bash '$(completion)/incode-node'
 
 uninstall:
 	rm -f $(patsubst %,'$(lib)/%.img',$(bare_boards)) \
 		$(patsubst %,'$(lib)/loader/%.img',$(bare_boards)) \
 		$(patsubst %,'$(lib)/%',$(notdir $(node_programs)))
 	rm -f $(patsubst %,'$(bin)/%',$(notdir $(programs))) \
-		$(patsubst %,'$(man)/%',$(notdir $(man_pages))) \
+		$(patsubst %,'$(man)/%',$(notdir $(man_pages)) $(man_links)) \
 		'$(completion)/incode' '$(completion)/incode-node' \
 		'$(header)/incode.h' '$(library_to)/libincode.so' \
 		$(patsubst %,'$(library_to)/%',$(notdir $(libraries))) \
@@ -82,6 +86,6 @@ uninstall:
 		$(patsubst %,'$(python_to)/%',$(notdir $(package_all))) \
 		'$(python_to)/__pycache__'/*.pyc
 	@if [ -e '$(folders)' ]; then \
-		sort -ru '$(folders)' > '$(BUILD)/folders'; rm '$(folders)'; \
-		while read -r folder; do \
-			rmdir "$$folder" 2> /dev/null; done < '$(BUILD)/folders'; :; fi
+		made=$$(sort -ru '$(folders)'); rm '$(folders)'; \
+		printf '%s\n' "$$made" | while read -r folder; do \
+			rmdir "$$folder" 2> /dev/null; done; :; fi
