@@ -11,6 +11,10 @@ node_packages  = $(run_packages) dpkg-dev \
 node_packages_aarch64 = gcc-aarch64-linux-gnu libc6-dev-arm64-cross
 node_packages_armhf   = gcc-arm-linux-gnueabihf libc6-dev-armhf-cross
 node_packages_riscv64 = gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
+# Of the packages: Build-Depends of host/package/control.
+deb_packages   = $(run_packages) $(python_packages) dpkg-dev fakeroot debhelper \
+	dh-python gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-arm-none-eabi \
+	libnewlib-arm-none-eabi
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
 	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
@@ -18,7 +22,8 @@ test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	$(python_packages) python3-scipy python3-pytest
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev python3-scipy
-full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
+full_packages  = $(test_packages) $(bench_packages) $(deb_packages) lintian debootstrap \
+	cpio
 
 deps: deps-test
 deps-run:
@@ -29,6 +34,8 @@ deps-test:
 	@sh tests/deps $(test_packages)
 deps-nodes:
 	@sh tests/deps $(node_packages)
+deps-deb:
+	@sh tests/deps $(deb_packages)
 deps-bench:
 	@sh tests/deps $(bench_packages)
 deps-full:
