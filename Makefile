@@ -88,10 +88,11 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit points planted bare arithmetic fuzzers run check test \
+.PHONY: all pages deb images unit points planted bare arithmetic fuzzers python \
+	run check test \
 	test-full bench firmware nodes cross fuzz lint install uninstall clean \
-	compdb hooks \
-	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
+	compdb hooks help deps deps-run deps-python deps-nodes deps-deb deps-test \
+	deps-bench deps-full FORCE
 
 programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 	$(nodes)
@@ -117,12 +118,12 @@ $(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 
-include host/library/library.mk
+include host/library/library.mk host/library/python/python.mk
 $(BUILD)/libcore.a: $(core_objects)
 $(BUILD)/libhost.a: $(host_objects)
 $(BUILD)/%.a: $(BUILD)/lists
 	@rm -f $@
-	@$(AR) rcs $@ $(filter %.o,$^)
+	@$(AR) rcsD $@ $(filter %.o,$^)
 # An archive keeps nothing of a file that is gone.
 archived = $(core_objects) $(host_objects) $(bare_shared)
 $(BUILD)/lists: FORCE
@@ -243,7 +244,7 @@ firmware: deps-test
 clean:
 	rm -rf '$(BUILD)'
 
-include host/install.mk
+include host/install.mk host/package/package.mk
 
 help:
 	@cat tests/targets

@@ -123,9 +123,10 @@ $(BUILD)/tests/mpi_hops: $(obj)/tests/bench/mpi_hops.o \
 # The peers of `incode bench peers`, which makes those whose packages are there.
 # -frounding-math: CGAL's filters are wrong without it.
 # -DNDEBUG: its users build it without assertions.
-peers = $(addprefix $(BUILD)/peers/,cgal cgal_file tetgen qhull hxt)
+peers = $(addprefix $(BUILD)/peers/,cgal cgal_file cgal_locate tetgen qhull hxt)
 $(BUILD)/peers/cgal:   peer = -frounding-math $< -lgmp -lnettle
 $(BUILD)/peers/cgal_file: peer = -frounding-math $< -lgmp
+$(BUILD)/peers/cgal_locate: peer = -frounding-math $< -lgmp
 $(BUILD)/peers/tetgen: peer = $< -ltet
 $(BUILD)/peers/qhull:  peer = $< -lqhull_r
 $(BUILD)/peers/hxt:    peer = -fopenmp $< -lgmsh
@@ -133,6 +134,11 @@ $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	@mkdir -p $(@D)
 	$(say) CXX $<
 	$(Q)$(CXX) -std=c++17 -O3 -DNDEBUG -march=$(ARCH) $(peer) -o $@
+# The library beside them.
+$(BUILD)/peers/locate: tests/bench/locate.c $(BUILD)/libincode.a
+	@mkdir -p $(@D)
+	$(say) CC $@
+	$(Q)$(CC) $(HOSTED) -I. $^ -lm -o $@
 
 # What counts an emulated board's instructions for `incode bench boards`.
 $(BUILD)/peers/instructions.so: tests/bench/instructions.c

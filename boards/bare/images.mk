@@ -19,7 +19,8 @@ images := $(bare_boards:%=$(BUILD)/firmware/%.img)
 bare_mains := $(patsubst tests/boards/%.c,%,$(wildcard tests/boards/*.c))
 trials := $(foreach b,$(bare_boards), \
 	$(bare_mains:%=$(BUILD)/firmware/tests/$(b)-%.img))
-bare: $(images) $(trials)
+images: $(images)
+bare: images $(trials)
 
 # The cases of arithmetic, on boards and here.
 arithmetic := $(filter-out %/native.c,$(wildcard tests/arithmetic/*.c))
@@ -68,7 +69,7 @@ endef
 # bare_loader BOARD: its loader, firmware/loader/BOARD.img, and the program as an
 # image that it takes.  The loader is small rather than fast.
 define bare_loader
-bare: $(BUILD)/firmware/loader/$(1).img
+images: $(BUILD)/firmware/loader/$(1).img
 bare_loader_$(1) := $$(patsubst %,$(BUILD)/firmware/loader/$(1)/%.o,$$(basename \
 	$$(loader_parts) $$(bare_parts_$(1))))
 bare_sodium_$(1) := $$(sodium_parts:%=$(BUILD)/firmware/loader/$(1)/sodium/%.o)

@@ -503,7 +503,7 @@ int host_bench_boards(const struct host_bench_boards_options *options,
     b.options = options;
     b.set.file = -1;
     if (host_bench_made("instructions.so", b.counter, error) != 0 ||
-        host_bench_set_made(&b.set, "uniform", POINTS, error) != 0) {
+        host_bench_set_made(&b.set, "uniform", POINTS, 1, error) != 0) {
         host_bench_set_free(&b.set);
         return error->code;
     }

@@ -5,90 +5,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "host/formats/read.h"
-#include "host/mesh/gen.h"
 #include "bench.h"
 #include "bench_table.h"
 #include "bench_scaling.h"
 #include "host/base/progress.h"
 #include "host/formats/formats.h"
 #include "host/run/run.h"
-
-enum { HEADER = 128 };
-
-static int put(const struct host_bench_set *set, const void *bytes, size_t n) {
-    const char *at = bytes;
-    while (n > 0) {
-        ssize_t done = write(set->file, at, n);
-        if (done < 0 && errno != EINTR)
-            return -1;
-        at += done > 0 ? done : 0;
-        n -= done > 0 ? (size_t)done : 0;
-    }
-    return 0;
-}
-
-/* Takes the points over. */
-static int hold(struct host_bench_set *set, struct host_points *points,
-                struct host_error *error) {
-    char header[HEADER + 1];
-    (void)snprintf(header, sizeof header,
-                   "\x93NUMPY\x01_%c_{'descr': '<f8', 'fortran_order': False, "
-                   "'shape': (%llu, 3), }",
-                   HEADER - 10, (unsigned long long)points->count);
-    size_t used = strlen(header);
-    memset(header + used, ' ', HEADER - used);
-    header[7] = header[9] = '\0';
-    header[HEADER - 1] = '\n';
-    set->points = points->count;
-    set->file = memfd_create("points", MFD_CLOEXEC);
-    (void)snprintf(set->path, sizeof set->path, "/proc/%ld/fd/%d",
-                   (long)getpid(), set->file);
-    if (set->file < 0 || put(set, header, HEADER) != 0 ||
-        put(set, points->xyz, 24 * points->count) != 0) {
-        host_fail(error, HOST_BROKEN, "%s: %s; free memory", set->name,
-                  strerror(errno));
-    }
-    host_points_free(points);
-    return error->code;
-}
-
-int host_bench_set_made(struct host_bench_set *set, const char *kind,
-                        uint64_t n, struct host_error *error) {
-    struct host_points points;
-    memset(set, 0, sizeof *set);
-    set->file = -1;
-    (void)snprintf(set->name, sizeof set->name, "%s", kind);
-    return host_gen(kind, n, 1, &points, error) != 0
-               ? error->code
-               : hold(set, &points, error);
-}
-
-/* Of a file that `incode run` reads; named as it, without its extensions. */
-static int host_bench_set_read(struct host_bench_set *set, const char *path,
-                               struct host_error *error) {
-    struct host_points points = {0};
-    const char *slash = strrchr(path, '/');
-    memset(set, 0, sizeof *set);
-    set->file = -1;
-    (void)snprintf(set->name, sizeof set->name, "%s",
-                   slash == NULL ? path : slash + 1);
-    set->name[strcspn(set->name, ".")] = '\0';
-    return host_points_read(path, &points, error) != 0
-               ? error->code
-               : hold(set, &points, error);
-}
-
-void host_bench_set_free(struct host_bench_set *set) {
-    if (set->file >= 0) {
-        (void)close(set->file);
-        set->file = -1;
-    }
-}
 
 /* --- bench class ---------------------------------------------------------- */
 
@@ -160,6 +85,14 @@ static const struct host_bench_class classes[] = {
      .made = {{.kind = "scales", .n = 3000, .seconds = 5},
               {.kind = "lines", .n = 2000, .seconds = 5}},
      .way = HOST_WAY_ALONE},
+    {.name = "locate",
+     .title = "200,000 queries on one thread, ns a query that is found; CGAL's "
+              "in the order of its spatial sort",
+     .made = {{.kind = "uniform", .n = 20000, .ratio = 1.5},
+              {.kind = "uniform", .n = 100000, .ratio = 1.5},
+              {.kind = "uniform", .n = 1000000, .ratio = 1.5, .large = true}},
+     .queries = 200000,
+     .summary = {1.5, 0, 10}},
     {.name = "cube",
      .title = "files of 5,000 points or more by the clock; spatial, 8 nodes of "
               "512K, against 1M",
@@ -261,12 +194,32 @@ struct bench {
     struct turns turns[TURNS];
     char *file[HOST_BENCH_ROWS_MAX]; /* those given, and in directories */
     unsigned files, wrong;
-    char to_file[4096];          /* CGAL from file to file, once it is needed */
-    char folder[32], target[48]; /* of what whole programs write; else empty */
-    bool left_out;               /* the set at hand has no triangulation */
+    char to_file[4096];   /* CGAL from file to file, once it is needed */
+    char locate[2][4096]; /* point location: the library's, CGAL's */
+    struct host_bench_set query;
+    char folder[32], target[48];  /* of what whole programs write; else empty */
+    bool there[HOST_BENCH_PEERS]; /* in this class */
+    bool left_out;                /* the set at hand has no triangulation */
 };
 
 /* --- one set -------------------------------------------------------------- */
+
+/* The command of a turn that locates queries; false: it has none. */
+static bool command_to_locate(const struct bench *b, unsigned turn,
+                              const struct host_bench_set *set,
+                              const char *words[WORDS_MAX]) {
+    unsigned n = 0;
+    bool scipy = turn == PEER + HOST_BENCH_QHULL;
+    words[n++] = scipy ? "/usr/bin/python3" : b->locate[turn == MAIN ? 0 : 1];
+    if (scipy)
+        words[n++] = "tests/bench/scipy_locate.py";
+    words[n++] = set->path;
+    words[n++] = b->query.path;
+    if (turn == MAIN)
+        words[n++] = "1";
+    words[n] = NULL;
+    return turn == MAIN || (turn >= PEER && b->there[turn - PEER]);
+}
 
 /* The command of a turn; false: it has none in this class. */
 static bool command(struct bench *b, unsigned turn,
@@ -275,6 +228,8 @@ static bool command(struct bench *b, unsigned turn,
     unsigned n = 0;
     bool first = b->turns[turn].rounds == 0;
     enum host_bench_way way = turn == MAIN ? b->class->way : b->class->other;
+    if (b->class->queries > 0)
+        return command_to_locate(b, turn, set, words);
     if (turn >= PEER && b->class->whole) {
         words[n++] = b->to_file;
         words[n++] = set->path;
@@ -305,8 +260,9 @@ static bool command(struct bench *b, unsigned turn,
     return way != HOST_WAY_NONE;
 }
 
-static const char *title_of(unsigned turn) {
-    return turn < PEER ? "incode" : host_bench_peer_titles[turn - PEER];
+static const char *title_of(const struct bench *b, unsigned turn) {
+    return turn < PEER ? "incode"
+                       : host_bench_peer_title(b->class, turn - PEER);
 }
 
 /* What went wrong in a turn; its set is left to the others. */
@@ -321,8 +277,8 @@ static void note_failure(struct bench *b, unsigned turn,
                   why == NULL ? "" : why + strlen(set->path));
         return;
     }
-    b->wrong += turn < PEER ? 1 : 0;
-    host_note("%s: %s ended with status %d: %s", set->name, title_of(turn),
+    b->wrong += turn < PEER || b->class->queries > 0 ? 1 : 0;
+    host_note("%s: %s ended with status %d: %s", set->name, title_of(b, turn),
               trial->status, trial->said);
 }
 
@@ -336,8 +292,8 @@ static int take_turn(struct bench *b, unsigned turn, unsigned round,
     if (t->late || t->failed || !command(b, turn, set, words))
         return 0;
     (void)snprintf(phase, sizeof phase, "%.14s %llu: %s %u/%u", set->name,
-                   (unsigned long long)set->points, title_of(turn), round + 1,
-                   b->options->rounds);
+                   (unsigned long long)set->points, title_of(b, turn),
+                   round + 1, b->options->rounds);
     host_progress_phase(phase, NULL);
     int status = host_trial_run((char *const *)words, b->options->limit_s,
                                 &trial, error);
@@ -510,7 +466,7 @@ static int measure_made(struct bench *b, struct host_error *error) {
         if (m->large && !b->options->large)
             continue;
         host_progress_phase("making points", NULL);
-        if (host_bench_set_made(&set, m->kind, m->n, error) == 0)
+        if (host_bench_set_made(&set, m->kind, m->n, 1, error) == 0)
             (void)measure(b, &set, &result, error);
         host_bench_set_free(&set);
     }
@@ -532,7 +488,27 @@ static int make_target(struct bench *b, struct host_error *error) {
     return 0;
 }
 
+/* What locates queries, and the queries. */
+static int make_locate(struct bench *b, struct host_error *error) {
+    const char *wanted = b->options->peers;
+    bool *there = b->there,
+         scipy = wanted == NULL || strstr(wanted, "qhull") != NULL;
+    memset(there, 0, sizeof b->there);
+    there[0] = b->builds.there[0];
+    there[HOST_BENCH_QHULL] =
+        scipy && access("/usr/lib/python3/dist-packages/scipy", R_OK) == 0;
+    if (scipy && !there[HOST_BENCH_QHULL])
+        host_note("scipy: left out, as it is not installed; to have it: apt "
+                  "install python3-scipy");
+    if (host_bench_made("locate", b->locate[0], error) != 0 ||
+        (there[0] && host_bench_made("cgal_locate", b->locate[1], error) != 0))
+        return error->code;
+    return host_bench_set_made(&b->query, "uniform", b->class->queries, 2,
+                               error);
+}
+
 static void remove_target(struct bench *b) {
+    host_bench_set_free(&b->query);
     if (b->folder[0] != '\0') {
         (void)unlink(b->target);
         (void)rmdir(b->folder);
@@ -545,9 +521,13 @@ static int measure_class(struct bench *b, const struct host_bench_class *c,
     if (c->files != HOST_FILES_NONE && b->files == 0)
         return 0;
     b->class = c;
-    if (c->whole && make_target(b, error) != 0)
+    memcpy(b->there, b->builds.there, sizeof b->there);
+    if ((c->whole && make_target(b, error) != 0) ||
+        (c->queries > 0 && make_locate(b, error) != 0)) {
+        remove_target(b);
         return error->code;
-    host_bench_table_begin(&b->table, c, b->builds.there, b->options->limit_s);
+    }
+    host_bench_table_begin(&b->table, c, b->there, b->options->limit_s);
     int status = c->files == HOST_FILES_NONE ? measure_made(b, error)
                                              : measure_files(b, error);
     host_progress_erase();
@@ -574,6 +554,7 @@ int host_bench_peers(const struct host_bench_peers_options *options,
     const struct host_bench_class *c;
     memset(b, 0, sizeof *b);
     b->options = options;
+    b->query.file = -1;
     host_progress_begin(true);
     if (find_files(b, error) == 0 &&
         host_bench_build(&b->builds, options->peers, error) == 0) {

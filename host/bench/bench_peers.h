@@ -31,6 +31,7 @@ enum {
     HOST_BENCH_MADE_MAX = 13,
     /* CGAL, TetGen, Qhull, HXT, HXT on two threads: in this order everywhere */
     HOST_BENCH_PEERS = 5,
+    HOST_BENCH_QHULL = 2,    /* by scipy, where queries are located */
     HOST_BENCH_THREADED = 4, /* its times are always the clock's */
     HOST_BENCH_FEW = 5000    /* points; below, what is fixed counts */
 };
@@ -64,6 +65,7 @@ struct host_bench_class {
     struct host_bench_made made[HOST_BENCH_MADE_MAX]; /* kind NULL: the end */
     enum host_bench_files files; /* those given, of so many points */
     enum host_bench_way way, other;
+    uint64_t queries;   /* that are located; 0: sets are triangulated */
     bool wall;          /* times are the clock's, else the processor's */
     bool whole;         /* and of whole programs, file to file, CGAL's too */
     bool first;         /* steps are against the first row, a tetrahedron; else
@@ -96,9 +98,13 @@ struct host_bench_set {
     int file;
 };
 
-/* Of host_gen, seed 1. */
+/* Of host_gen. */
 int host_bench_set_made(struct host_bench_set *set, const char *kind,
-                        uint64_t n, struct host_error *error);
+                        uint64_t n, uint64_t seed, struct host_error *error);
+
+/* Of a file that `incode run` reads; named as it, without its extensions. */
+int host_bench_set_read(struct host_bench_set *set, const char *path,
+                        struct host_error *error);
 
 /* Also after a failure. */
 void host_bench_set_free(struct host_bench_set *set);

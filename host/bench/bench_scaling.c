@@ -369,7 +369,7 @@ static int measure_points(struct host_scaling_rows *rows, uint64_t points,
     (void)snprintf(phase, sizeof phase, "%llu points",
                    (unsigned long long)points);
     host_progress_phase(phase, NULL);
-    int status = host_bench_set_made(&set, "uniform", points, error);
+    int status = host_bench_set_made(&set, "uniform", points, 1, error);
     for (unsigned i = 0; i < runs && status == 0; i++)
         status = run_once(&set, &row, error);
     host_bench_set_free(&set);

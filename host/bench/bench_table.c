@@ -17,6 +17,13 @@ enum { CELLS_MAX = 20, NAME = 18, VALUE = 8 };
 const char *const host_bench_peer_titles[HOST_BENCH_PEERS] = {
     "CGAL", "TetGen", "Qhull", "HXT", "HXT x2"};
 
+const char *host_bench_peer_title(const struct host_bench_class *c,
+                                  unsigned peer) {
+    return c->queries > 0 && peer == HOST_BENCH_QHULL
+               ? "scipy"
+               : host_bench_peer_titles[peer];
+}
+
 /* A figure of a row, and what it is held to. */
 struct cell {
     const char *title;
@@ -71,19 +78,19 @@ static double step(const struct host_bench_table *t,
 
 static void add_times(struct cells *c, const struct host_bench_table *t,
                       const struct host_bench_result *r) {
-    bool wall = t->class->wall;
-    add(c, wall ? "clock" : "node", each(r->node, r), 0);
-    if (!wall)
+    bool wall = t->class->wall, queries = t->class->queries > 0;
+    add(c, wall ? "clock" : queries ? "incode" : "node", each(r->node, r), 0);
+    if (!wall && !queries)
         add(c, "+ host", each(r->host > 0 ? r->node + r->host : 0, r), 0);
     for (unsigned i = 0; i < HOST_BENCH_PEERS; i++) {
         if (t->peer[i]) {
-            add(c, host_bench_peer_titles[i], each(r->peer[i], r), 0)->beyond =
-                r->peer_late[i];
+            add(c, host_bench_peer_title(t->class, i), each(r->peer[i], r), 0)
+                ->beyond = r->peer_late[i];
         }
     }
     if (t->peer[0])
         add_held(c, "CGAL /", over(r->peer[0], r->node), false, r->ratio);
-    if (t->peer[0] && !wall) {
+    if (t->peer[0] && !wall && !queries) {
         add(c, "+ host", over(r->peer[0], r->host > 0 ? r->node + r->host : 0),
             2);
     }
@@ -94,8 +101,11 @@ static void collect(struct cells *c, const struct host_bench_table *t,
     const struct host_bench_class *class = t->class;
     c->count = 0;
     add(c, "points", (double)r->points, 0);
-    add(c, "tetrahedra", (double)r->tetrahedra, 0);
+    add(c, class->queries > 0 ? "found" : "tetrahedra", (double)r->tetrahedra,
+        0);
     add_times(c, t, r);
+    if (class->queries > 0)
+        return;
     add_held(c, "seconds", r->late ? t->limit_s : r->node, true, r->seconds);
     c->cell[c->count - 1].beyond = r->late;
     if (class->extra_ms > 0 && t->peer[0]) {
@@ -214,7 +224,7 @@ unsigned host_bench_table_end(struct host_bench_table *table) {
         qsort(ratio, n, sizeof *ratio, compare);
         double middle = c->means ? mean(ratio, n)
                                  : 0.5 * (ratio[(n - 1) / 2] + ratio[n / 2]);
-        printf("%s / incode: %s %.2f", host_bench_peer_titles[i],
+        printf("%s / incode: %s %.2f", host_bench_peer_title(c, i),
                c->means ? "geometric mean" : "median", middle);
         if (goal > 0) {
             printf(" >=%.3g%s", goal, middle >= goal ? "" : "!");

@@ -34,6 +34,10 @@ struct host_bench_table {
 
 extern const char *const host_bench_peer_titles[HOST_BENCH_PEERS];
 
+/* Its column in a class. */
+const char *host_bench_peer_title(const struct host_bench_class *c,
+                                  unsigned peer);
+
 void host_bench_table_begin(struct host_bench_table *table,
                             const struct host_bench_class *c,
                             const bool peer[HOST_BENCH_PEERS], double limit_s);

@@ -99,6 +99,48 @@ incode_delaunay(const double *xyz /* [3 * points] */, uint64_t points,
 /* Frees the memory of a result and clears it.  NULL is accepted. */
 void incode_tetrahedra_free(struct incode_tetrahedra *t);
 
+/* Which tetrahedron holds each query.  found[i] is the lowest number of a
+ * tetrahedron that contains query[3 * i ..], or INCODE_NONE64 where none does.
+ * Tetrahedra are closed: facets, edges and vertices belong to them.  `t` is a
+ * result for the same xyz with INCODE_NEIGHBORS, in any order.  Exact, and
+ * independent of the threads and of the order of queries.  options->flags is 0.
+ * On an error, `found` has no meaning; INCODE_NOT_FINITE: *at is the number of
+ * a query with a NaN or infinite coordinate.
+ *
+ * Memory: 32 bytes a query, at most 32 MB; and for each thread 3 KB, and up to
+ * 24 bytes for each tetrahedron of the largest star of a vertex that a query
+ * is on.  Up to 32 queries take memory for a star of more than 128 tetrahedra
+ * alone.
+ * Work of a query, where points are spread evenly: O(log queries) to put them
+ * in order, and O(1 + (points / queries)^(1/3)) steps; O(points^(1/3)) for a
+ * query alone. */
+enum incode_status
+incode_locate(const double *xyz /* [3 * points] */, uint64_t points,
+              const struct incode_tetrahedra *t,
+              const double *query /* [3 * queries] */, uint64_t queries,
+              const struct incode_options *options, /* or NULL */
+              uint64_t *found /* [queries] */, uint64_t *at /* or NULL */);
+
+/* The edges of a result: the neighbours of vertex p are to[first[p]] up to, not
+ * including, to[first[p + 1]], ascending, each once.  Rows that are duplicates
+ * have none. */
+struct incode_adjacency {
+    uint64_t points;
+    uint64_t *first; /* [points + 1] */
+    uint32_t *to;    /* [first[points]] */
+    void *reserved[4];
+};
+
+/* `out` need not be initialised, and owns no memory on an error.
+ * options->flags is 0. */
+enum incode_status
+incode_adjacency(uint64_t points, const struct incode_tetrahedra *t,
+                 const struct incode_options *options, /* or NULL */
+                 struct incode_adjacency *out);
+
+/* Frees the memory and clears it.  NULL is accepted. */
+void incode_adjacency_free(struct incode_adjacency *a);
+
 /* A sentence without its period, in static memory, also for a value that is not
  * a status. */
 const char *incode_status_text(enum incode_status status);

@@ -1,11 +1,8 @@
 /* The functions of incode.h over the pieces that `incode run` uses, too. */
-#include <errno.h>
-#include <fenv.h>
 #include <math.h>
-#include <signal.h>
 #include <string.h>
-#include <time.h>
 
+#include "call.h"
 #include "delaunay.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
@@ -14,12 +11,7 @@
 #include "host/mesh/order.h"
 #include "node/version.h"
 
-#pragma GCC visibility push(default)
-#include "incode.h"
-#pragma GCC visibility pop
-
 enum {
-    PROGRESS_MS = 40,
     POLL_ROWS = 1 << 16,
     THREAD_POINTS = 6000, /* fewer a thread take longer than on one */
     FORK_ROWS = 1 << 16   /* fewer rows are not worth a thread */
@@ -27,20 +19,14 @@ enum {
 
 /* One call of incode_delaunay. */
 struct work {
+    struct library_call call;
     const double *xyz;
     uint64_t rows;
     unsigned flags;
     struct incode_tetrahedra *out;
-    struct host_call call;
     struct host_order order;
     struct host_tetrahedra tets;
     struct host_error error;
-    enum incode_status status;
-
-    /* Between the calling thread and that which works, if they are two. */
-    pthread_mutex_t mutex;
-    pthread_cond_t condition;
-    bool finished;
 };
 
 /* --- points --------------------------------------------------------------- */
@@ -243,15 +229,15 @@ static enum incode_status make_order(struct work *w) {
     if (w->rows < 4)
         return INCODE_TOO_FEW;
     return host_order_make(&w->order, "points", w->xyz, w->rows, HOST_ADAPTIVE,
-                           host_direct_regions(w->call.threads, w->rows), false,
-                           &w->error) == 0
+                           host_direct_regions(w->call.host.threads, w->rows),
+                           false, &w->error) == 0
                ? INCODE_OK
                : status[w->order.fault];
 }
 
 static enum incode_status triangulate(struct work *w) {
     enum incode_status status = make_order(w);
-    w->call.phases = 1;
+    w->call.host.phases = 1;
     if (status != INCODE_OK)
         return status;
     switch (host_direct_run(&w->order, &w->tets, NULL, &w->error)) {
@@ -264,27 +250,26 @@ static enum incode_status triangulate(struct work *w) {
     case HOST_DIRECT_BROKEN:
         return INCODE_INTERNAL;
     }
-    w->call.phases = 2;
+    w->call.host.phases = 2;
     status = list_duplicates(w);
     host_order_free(&w->order);
     bool facets = (w->flags & (INCODE_NEIGHBORS | INCODE_HULL)) != 0;
     if (status == INCODE_OK && (facets || (w->flags & INCODE_ANY_ORDER) == 0))
         host_tetrahedra_sort(&w->tets);
-    w->call.phases = 3;
+    w->call.host.phases = 3;
     host_tetrahedra_trim(&w->tets);
     if (status == INCODE_OK && facets && !host_call_cancelled())
         status = join_facets(w);
-    w->call.phases = 4;
+    w->call.host.phases = 4;
     return status;
 }
 
-static void run(struct work *w) {
-    struct host_call *outer = host_call();
-    host_call_enter(&w->call);
-    w->status = triangulate(w);
+static enum incode_status work(struct library_call *call) {
+    struct work *w = (struct work *)call;
+    enum incode_status status = triangulate(w);
     if (host_call_cancelled())
-        w->status = INCODE_CANCELLED;
-    if (w->status == INCODE_OK) {
+        status = INCODE_CANCELLED;
+    if (status == INCODE_OK) {
         w->out->vertex = w->tets.v;
         w->out->count = w->tets.count;
     } else {
@@ -294,137 +279,43 @@ static void run(struct work *w) {
         w->out->at = at;
     }
     host_order_free(&w->order);
-    host_call_enter(outer);
+    return status;
+}
+
+static void drop(struct library_call *call) {
+    incode_tetrahedra_free(((struct work *)call)->out);
 }
 
 /* Of the work, as a part of 1: rough, and never going back. */
-static double done(struct work *w) {
+static double done(struct library_call *call) {
+    struct work *w = (struct work *)call;
     static const double before[] = {0.02, 0.1, 0.9, 0.96, 0.99};
-    unsigned phase = w->call.phases;
+    unsigned phase = w->call.host.phases;
     double part = before[phase < 4 ? phase : 4];
     uint64_t bricks = w->rows / INCODE_BRICK_POINTS + 1;
     if (phase == 1)
-        part += 0.8 * fmin(1, (double)w->call.bricks / (double)bricks);
+        part += 0.8 * fmin(1, (double)w->call.host.bricks / (double)bricks);
     return part;
-}
-
-static void *run_beside(void *argument) {
-    struct work *w = argument;
-    run(w);
-    (void)pthread_mutex_lock(&w->mutex);
-    w->finished = true;
-    (void)pthread_cond_signal(&w->condition);
-    (void)pthread_mutex_unlock(&w->mutex);
-    return NULL;
-}
-
-static struct timespec after_ms(long ms) {
-    struct timespec t;
-    (void)clock_gettime(CLOCK_MONOTONIC, &t);
-    t.tv_nsec += ms * 1000000;
-    t.tv_sec += t.tv_nsec / 1000000000;
-    t.tv_nsec %= 1000000000;
-    return t;
-}
-
-/* Calls `progress` until the work is finished. */
-static void watch(struct work *w, const struct incode_options *options) {
-    (void)pthread_mutex_lock(&w->mutex);
-    while (!w->finished) {
-        struct timespec until = after_ms(PROGRESS_MS);
-        (void)pthread_cond_timedwait(&w->condition, &w->mutex, &until);
-        if (w->finished || w->call.cancelled)
-            continue;
-        (void)pthread_mutex_unlock(&w->mutex);
-        if (!options->progress(options->context, done(w)))
-            w->call.cancelled = true;
-        (void)pthread_mutex_lock(&w->mutex);
-    }
-    (void)pthread_mutex_unlock(&w->mutex);
-}
-
-/* Works on a thread of its own, which has the plain floating-point environment
- * that this one has now, and takes no signals; `theirs` is the caller's. */
-static void run_watched(struct work *w, const struct incode_options *options,
-                        const fenv_t *theirs) {
-    pthread_condattr_t monotonic;
-    pthread_t thread;
-    sigset_t all, before;
-    if (pthread_condattr_init(&monotonic) != 0)
-        return;
-    (void)pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
-    (void)pthread_mutex_init(&w->mutex, NULL);
-    (void)pthread_cond_init(&w->condition, &monotonic);
-    (void)pthread_condattr_destroy(&monotonic);
-    (void)sigfillset(&all);
-    (void)pthread_sigmask(SIG_BLOCK, &all, &before);
-    bool running = pthread_create(&thread, NULL, run_beside, w) == 0;
-    (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-    (void)fesetenv(theirs);
-    if (running) {
-        watch(w, options);
-        (void)pthread_join(thread, NULL);
-    }
-    (void)pthread_cond_destroy(&w->condition);
-    (void)pthread_mutex_destroy(&w->mutex);
-    bool go_on = w->call.cancelled ||
-                 options->progress(options->context,
-                                   w->status == INCODE_OK ? 1.0 : done(w));
-    if (!go_on && w->status == INCODE_OK) {
-        incode_tetrahedra_free(w->out);
-        w->status = INCODE_CANCELLED;
-    }
-}
-
-/* One a processor, as far as they gain time. */
-static unsigned threads_for(uint64_t points) {
-    uint64_t most = 1 + points / THREAD_POINTS, threads = host_processors();
-    return (unsigned)(threads < most ? threads : most);
-}
-
-static bool are_valid(const struct incode_options *o) {
-    const unsigned known = INCODE_NEIGHBORS | INCODE_HULL | INCODE_ANY_ORDER;
-    for (unsigned i = 0; i < 4; i++)
-        if (o->reserved[i] != NULL)
-            return false;
-    return (o->flags & ~known) == 0;
 }
 
 enum incode_status incode_delaunay(const double *xyz, uint64_t points,
                                    const struct incode_options *options,
                                    struct incode_tetrahedra *out) {
-    static const struct incode_options defaults;
-    const struct incode_options *o = options == NULL ? &defaults : options;
     if (out == NULL)
         return INCODE_BAD_ARGUMENT;
     *out = (struct incode_tetrahedra){0};
-    if ((xyz == NULL && points > 0) || !are_valid(o))
+    if ((xyz == NULL && points > 0) ||
+        !library_options(&options,
+                         INCODE_NEIGHBORS | INCODE_HULL | INCODE_ANY_ORDER))
         return INCODE_BAD_ARGUMENT;
     if (points >= UINT32_MAX)
         return INCODE_TOO_MANY;
-    int saved_errno = errno;
-    fenv_t theirs;
-    (void)fegetenv(&theirs);
-    (void)fesetenv(FE_DFL_ENV);
-    unsigned threads = o->threads == 0 ? threads_for(points) : o->threads;
-    struct work w = {
-        .xyz = xyz,
-        .rows = points,
-        .flags = o->flags,
-        .out = out,
-        .status = INCODE_NO_MEMORY, /* where no thread can be had */
-        .call = {
-            .threads = threads < HOST_THREADS_MAX ? threads : HOST_THREADS_MAX,
-            .memory_max = o->memory_max == 0 ? UINT64_MAX : o->memory_max}};
-    if (incode_arithmetic_fault() != NULL)
-        w.status = INCODE_INTERNAL;
-    else if (o->progress != NULL)
-        run_watched(&w, o, &theirs);
-    else
-        run(&w);
-    (void)fesetenv(&theirs);
-    errno = saved_errno;
-    return w.status;
+    struct work w = {.call = {.work = work, .done = done, .drop = drop},
+                     .xyz = xyz,
+                     .rows = points,
+                     .flags = options->flags,
+                     .out = out};
+    return library_call(&w.call, options, 1 + points / THREAD_POINTS);
 }
 
 void incode_tetrahedra_free(struct incode_tetrahedra *t) {

@@ -14,4 +14,4 @@ $(BUILD)/libincode.o: $(library:%.c=$(obj)/%.o)
 	@$(OBJCOPY) --localize-hidden $@
 $(BUILD)/libincode.a: $(BUILD)/libincode.o
 	@rm -f $@
-	@$(AR) rcs $@ $^
+	@$(AR) rcsD $@ $^

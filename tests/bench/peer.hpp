@@ -46,11 +46,12 @@ class Watch {
         cpu_ += seconds(CLOCK_PROCESS_CPUTIME_ID);
         wall_ += seconds(CLOCK_MONOTONIC);
     }
-    void print(std::size_t tetrahedra, const std::string &digest) const {
+    void print(std::size_t tetrahedra, const std::string &digest,
+               const char *kind = "sha256") const {
         std::printf("{\"tetrahedra\": %zu, \"cpu_s\": %.6f, \"wall_s\": %.6f%s",
                     tetrahedra, cpu_, wall_, digest.empty() ? "" : ", ");
         if (!digest.empty()) {
-            std::printf("\"digest\": \"sha256:%s\"", digest.c_str());
+            std::printf("\"digest\": \"%s:%s\"", kind, digest.c_str());
         }
         std::printf("}\n");
     }

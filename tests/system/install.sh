@@ -37,17 +37,29 @@ check 'install/what the documents link' "$lacks" [ -z "$lacks" ]
 # The library: the examples of its page, and the names that are seen from outside.
 export PKG_CONFIG_SYSROOT_DIR=$root LD_LIBRARY_PATH=$root/opt/incode/lib
 export PKG_CONFIG_PATH=$root/opt/incode/lib/pkgconfig
-example() { # LANGUAGE FILE
-    awk -v open="\`\`\`$1" '$0 == open { on = 1; next } /^```/ { on = 0 } on' \
-        host/library/README.md > "$2"
+example() { # LANGUAGE NUMBER FILE
+    awk -v open="\`\`\`$1" -v number="$2" \
+        '$0 == open { on = ++n == number; next } /^```/ { on = 0 } on' \
+        host/library/README.md > "$3"
 }
-example c "$scratch/ten.c"
-example cpp "$scratch/surface.cpp"
+example c 1 "$scratch/ten.c"
+example c 2 "$scratch/where.c"
+example cpp 1 "$scratch/surface.cpp"
 # shellcheck disable=SC2046
 succeeds 'install/an example in C' gcc -std=c11 -Wall -Wextra -Werror \
     "$scratch/ten.c" $(pkg-config --cflags --libs incode) -o "$scratch/ten"
 check 'install/its tetrahedra' 'not two' \
     [ "$("$scratch/ten" | tr '\n' ';')" = '0 1 2 3;1 2 3 4;' ]
+# shellcheck disable=SC2046
+succeeds 'install/an example of point location' gcc -std=c11 -Wall -Wextra \
+    -Werror "$scratch/where.c" $(pkg-config --cflags --libs incode) \
+    -o "$scratch/located"
+"$scratch/located" > "$scratch/answers"
+printf 'query %s\n' '0 is in tetrahedron 0' '1 is in tetrahedron 1' \
+    '2 is in tetrahedron 0' '3 is outside' > "$scratch/expected"
+echo 'point 0 has neighbours 1 2 3' >> "$scratch/expected"
+check 'install/what it finds' "$(xargs < "$scratch/answers")" \
+    cmp -s "$scratch/answers" "$scratch/expected"
 if command -v g++ > "$scratch/where"; then
     # shellcheck disable=SC2046
     succeeds 'install/an example in C++' g++ -Wall -Wextra -Werror \
@@ -62,7 +74,7 @@ if command -v g++ > "$scratch/where"; then
 else
     skip 'install/an example in C++' 'g++ is not installed'
 fi
-names='incode_delaunay incode_status_text incode_tetrahedra_free incode_version'
+names=$(sed -n 's/^ \(.*\)@.*/\1/p' host/package/libincode0.symbols | xargs)
 seen() { nm "$@" | awk 'NF == 3 && $2 ~ /[A-TV-Z]/ { print $3 }' | sort | xargs; }
 for file in libincode.so.0 libincode.a; do
     kind=
@@ -72,6 +84,21 @@ for file in libincode.so.0 libincode.a; do
     check "install/names of $file" "$(cat "$scratch/seen")" \
         [ "$(cat "$scratch/seen")" = "$names" ]
 done
+
+# The Python package, and the program that it runs.
+package=$(find "$root" -path '*/incode/__init__.py')
+if [ -n "$package" ]; then
+    printf '%s\n' '0 0 0' '1 0 0' '0 1 0' '0 0 1' > "$scratch/four.xyz"
+    succeeds 'install/the Python package' env -u INCODE_PROGRAM \
+        PYTHONPATH="${package%/incode/*}" PATH=/usr/bin:/bin \
+        "${PYTHON:-/usr/bin/python3}" -c 'import sys, incode
+print(incode.Delaunay(incode.read(sys.argv[1])).simplices)' \
+        "$scratch/four.xyz" > "$scratch/simplices"
+    check 'install/its simplices' "$(cat "$scratch/simplices")" \
+        [ "$(cat "$scratch/simplices")" = '[[0 1 2 3]]' ]
+else
+    skip 'install/the Python package' 'it is not made here: make python'
+fi
 
 # The firmware of boards, where the installed program finds it.
 if [ -e "$BUILD/firmware/mps2-an500.img" ] &&
@@ -156,7 +183,7 @@ before='./opt ./opt/incode ./opt/incode/share ./opt/incode/share/man '
 check 'install/uninstall leaves what was there' "$(left)" [ "$(left)" = "$before" ]
 "${make[@]}" install > "$scratch/said" 2>&1
 "${make[@]}" install > "$scratch/said" 2>&1
-"${make[@]}" uninstall > "$scratch/said" 2>&1
+"${make[@]}" BUILD="$scratch/none" uninstall > "$scratch/said" 2>&1 # as after make clean
 check 'install/uninstall after two installs' "$(left)" [ "$(left)" = "$before" ]
 refused=$("${make[@]}" nodes FOR=z80 2>&1)
 check 'install/make nodes FOR=z80' "$refused" grep -qF \

@@ -6,6 +6,8 @@
  *     library cancel FILE.xyz cancels after one call of progress more and more
  *                             often; prints the longest wait in ms
  *     library failing FILE.xyz  each mapping and each thread fails in turn
+ *     library locate FILE.xyz THREADS  finds each point in the lowest of its
+ *                             tetrahedra, and as many edges as Euler says
  *     library arguments       wrong ones
  */
 #include "host/library/incode.h"
@@ -248,6 +250,122 @@ static void cancelling(void) {
     printf("%.0f\n", longest);
 }
 
+/* --- point location and edges --------------------------------------------- */
+
+static void triangulate(struct incode_tetrahedra *t) {
+    struct incode_options o = {.threads = 1,
+                               .flags = INCODE_NEIGHBORS | INCODE_HULL};
+    demand(incode_delaunay(xyz, points, &o, t) == INCODE_OK);
+}
+
+/* The points, and some outside. */
+static double *make_queries(uint64_t *count) {
+    *count = points + 6;
+    double *query = malloc(3 * *count * sizeof *query);
+    demand(query != NULL);
+    memcpy(query, xyz, 3 * points * sizeof *query);
+    memset(query + 3 * points, 0, (size_t)18 * sizeof *query);
+    for (size_t i = 0; i < 6; i++)
+        query[3 * (points + i) + i / 2] = i % 2 == 0 ? 0x1p1023 : -0x1p1023;
+    return query;
+}
+
+static void check_found(const struct incode_tetrahedra *t,
+                        const uint64_t *found) {
+    uint64_t *lowest = malloc(points * sizeof *lowest);
+    demand(lowest != NULL);
+    for (uint64_t i = 0; i < points; i++)
+        lowest[i] = INCODE_NONE64;
+    for (uint64_t i = t->count; i-- > 0;)
+        for (int k = 0; k < 4; k++)
+            lowest[t->vertex[i][k]] = i;
+    for (uint64_t i = 0; i < t->duplicate_count; i++)
+        lowest[t->duplicate[i][0]] = lowest[t->duplicate[i][1]];
+    for (uint64_t i = 0; i < points; i++)
+        demand(found[i] == lowest[i] && found[i] != INCODE_NONE64);
+    for (uint64_t i = points; i < points + 6; i++)
+        demand(found[i] == INCODE_NONE64);
+    free(lowest);
+}
+
+/* vertices - edges + facets - tetrahedra = 1 */
+static void check_edges(const struct incode_tetrahedra *t,
+                        const struct incode_adjacency *a) {
+    uint64_t facets = (4 * t->count + t->hull_count) / 2;
+    uint64_t vertices = points - t->duplicate_count;
+    demand(a->first[points] == 2 * (vertices + facets - t->count - 1));
+    for (uint64_t p = 0; p < points; p++)
+        for (uint64_t i = a->first[p]; i < a->first[p + 1]; i++)
+            demand(a->to[i] < points && a->to[i] != p &&
+                   (i == a->first[p] || a->to[i - 1] < a->to[i]));
+    for (uint64_t i = 0; i < t->duplicate_count; i++) {
+        uint64_t p = t->duplicate[i][0];
+        demand(a->first[p] == a->first[p + 1]);
+    }
+}
+
+static void locate(unsigned threads) {
+    struct incode_tetrahedra t;
+    struct incode_adjacency a;
+    struct incode_options o = {.threads = threads};
+    uint64_t queries, at;
+    triangulate(&t);
+    long before = mapped;
+    double *query = make_queries(&queries);
+    uint64_t *found = malloc(queries * sizeof *found);
+    demand(found != NULL);
+    demand(incode_locate(xyz, points, &t, query, queries, &o, found, &at) ==
+           INCODE_OK);
+    check_found(&t, found);
+    demand(mapped == before);
+    demand(incode_adjacency(points, &t, &o, &a) == INCODE_OK);
+    check_edges(&t, &a);
+    incode_adjacency_free(&a);
+    demand(mapped == before);
+    incode_tetrahedra_free(&t);
+    free(found);
+    free(query);
+}
+
+/* Each mapping and each thread fails in turn. */
+static void locate_failing(unsigned threads, bool progress) {
+    struct incode_tetrahedra t;
+    struct incode_adjacency a;
+    unsigned shown = 0;
+    struct incode_options o = {.threads = threads,
+                               .progress = progress ? count_calls : NULL,
+                               .context = &shown};
+    uint64_t queries;
+    triangulate(&t);
+    long before = mapped;
+    double *query = make_queries(&queries);
+    uint64_t *found = malloc(queries * sizeof *found);
+    demand(found != NULL);
+    for (failing = 1;; failing++) {
+        calls = 0;
+        enum incode_status status =
+            incode_locate(xyz, points, &t, query, queries, &o, found, NULL);
+        demand(status == INCODE_OK || status == INCODE_NO_MEMORY);
+        if (status == INCODE_OK)
+            check_found(&t, found);
+        demand(mapped == before);
+        status = incode_adjacency(points, &t, &o, &a);
+        demand(status == INCODE_OK || status == INCODE_NO_MEMORY);
+        if (status == INCODE_OK)
+            check_edges(&t, &a);
+        demand(status == INCODE_OK || a.first == NULL);
+        incode_adjacency_free(&a);
+        demand(mapped == before);
+        if (calls < failing)
+            break;
+    }
+    demand(failing > 7);
+    failing = 0;
+    incode_tetrahedra_free(&t);
+    free(found);
+    free(query);
+}
+
 static void run_failing(unsigned threads, bool progress) {
     for (failing = 1;; failing++) {
         struct incode_tetrahedra t;
@@ -319,6 +437,8 @@ int main(int count, char **word) {
         read_points(word[2]);
     if (strcmp(word[1], "rows") == 0 && count == 5) {
         rows((unsigned)atoi(word[3]), word[4]);
+    } else if (strcmp(word[1], "locate") == 0 && count == 4) {
+        locate((unsigned)atoi(word[3]));
     } else if (strcmp(word[1], "twice") == 0) {
         twice();
     } else if (strcmp(word[1], "cancel") == 0) {
@@ -326,6 +446,8 @@ int main(int count, char **word) {
     } else if (strcmp(word[1], "failing") == 0) {
         run_failing(1, false);
         run_failing(3, true);
+        locate_failing(1, false);
+        locate_failing(3, true);
         limits();
     } else {
         demand(strcmp(word[1], "arguments") == 0);

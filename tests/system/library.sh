@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# The library as programs use it: the rows of a cube's run, byte for byte; two
-# calls at once; cancelling; memory and threads that fail.  install.sh has its
-# page's examples, and the names that are seen from outside.
+# The library as programs use it: the rows of a cube's run, byte for byte; points
+# that are located, and edges; two calls at once; cancelling; memory and threads
+# that fail.  install.sh has its page's examples, and the names that are seen from
+# outside.
 . tests/system/lib.sh
 # Of this build.  The thread sanitizer knows few places for memory.
 user=(setarch -R "$BUILD/tests/library")
@@ -20,6 +21,7 @@ same() {
             cmp -s "$scratch/rows.npy" "$scratch/cube.npy"
         rm -f "$scratch/rows.npy"
     done
+    succeeds "library/$1, located" within "${user[@]}" locate "$2" 2
     succeeds "library/$1, incode run" incode run "$2" -q -o "$scratch/rows.npy"
     check "library/$1, incode run, rows" 'they differ from the cube'"'"'s' \
         cmp -s "$scratch/rows.npy" "$scratch/cube.npy"
@@ -45,6 +47,12 @@ if has_data library; then
     done < <(list_sets)
 fi
 
+if command -v g++ > "$scratch/where"; then
+    succeeds 'library/the header in C++' g++ -std=c++11 -Wall -Wextra -Werror \
+        -pedantic -fsyntax-only -x c++ host/library/incode.h
+else
+    skip 'library/the header in C++' 'g++ is not installed'
+fi
 succeeds 'library/two calls at once' "${user[@]}" twice "$scratch/bubbles.xyz"
 succeeds 'library/memory and threads that fail' "${user[@]}" failing \
     "$scratch/uniform.xyz" > "$scratch/tried"

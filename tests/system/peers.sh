@@ -59,13 +59,19 @@ check peers/many 'not one row, of the set with many points' \
     [ "$(grep -cE '^(few|many|flat) ' "$scratch/table")" = 1 ]
 check peers/median 'no median of its ratio' \
     grep -qE '^CGAL / incode: median [0-9.]+ >=2!?, .*, of 1$' "$scratch/table"
+succeeds peers/locate within "$INCODE" bench peers --rounds 1 --peers cgal \
+    --class locate > "$scratch/table"
+check peers/located 'no rows of queries that incode and CGAL locate' \
+    [ "$(grep -cE '^uniform +[0-9]+ +1[0-9]{5} +[0-9]+ +[0-9]+ +[0-9.]+ ' \
+        "$scratch/table")" = 2 ]
 
 # A tree whose peer says what is not so.
 fake=$scratch/fake
 mkdir -p "$fake/tests/bench" "$fake/bin" "$fake/build/peers"
 cp "$INCODE" "$BUILD/incode-node" "$fake/bin"
 touch "$fake/tests/bench/peer.hpp"
-printf 'build/peers/cgal:\n' > "$fake/Makefile"
+printf 'build/peers/cgal build/peers/locate build/peers/cgal_locate:\n' \
+    > "$fake/Makefile"
 cat > "$fake/build/peers/cgal" <<'END'
 #!/bin/sh
 echo '{"tetrahedra": 7, "cpu_s": 1, "wall_s": 1, "digest": "sha256:00"}'
@@ -78,6 +84,30 @@ status=$?
 check peers/wrong "status $status, not 1" [ $status = 1 ]
 check peers/differs 'no word of what differs' \
     grep -q 'few: sha256:.*, where CGAL has sha256:00' "$scratch/errors"
+# One that locates other tetrahedra, and one that locates nothing.
+# located PROGRAM COUNT SUM
+located() {
+    printf '#!/bin/sh\necho '"'"'{"tetrahedra": %d, "cpu_s": 1, "wall_s": 1, %s' \
+        "$2" "\"digest\": \"sum:$3\"}'" > "build/peers/$1"
+    chmod +x "build/peers/$1"
+}
+# locates_wrongly NAME: what the bench says of it.
+locates_wrongly() {
+    within bin/incode bench peers --rounds 1 --peers cgal --class locate \
+        > "$scratch/table" 2> "$scratch/errors"
+    status=$?
+    check "peers/$1: status" "status $status, not 1" [ $status = 1 ]
+    check "peers/$1: reason" "$(cat "$scratch/errors")" \
+        grep -qE "^incode: uniform: $2" "$scratch/errors"
+}
+located locate 9 12
+located cgal_locate 9 34
+locates_wrongly 'other tetrahedra' 'sum:12, where CGAL has sum:34'
+located cgal_locate 0 12
+locates_wrongly 'nothing located' 'CGAL ended with status 0'
+located locate 0 12
+located cgal_locate 9 12
+locates_wrongly 'nothing located by the library' 'incode ended with status 0'
 # And one that has no end.
 # clock: a peer that is still at work when its time is over
 printf '#!/bin/sh\nexec sleep 60\n' > build/peers/cgal

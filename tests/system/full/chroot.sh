@@ -1,38 +1,18 @@
 #!/usr/bin/env bash
-# `make run` and `make test` in a clean Debian 12 with nothing but the base
+# `make run` and `make test` in a clean Debian with nothing but the base
 # system, git and make: as root, and as a user with sudo.  Needs root and a
 # network with Debian's packages.
 . tests/system/lib.sh
-root=${CHROOT:-$scratch/root}
-mirror=${MIRROR:-http://deb.debian.org/debian}
+. tests/system/root.bash
 
 if [ "$(id -u)" != 0 ]; then
     skip 'chroot' 'only root can make one'
     exit 0
 fi
-leave() {
-    umount "$root/dev/pts" "$root/dev/shm" "$root/dev" "$root/proc" \
-        2> /dev/null
-}
-trap 'leave; rm -rf --one-file-system "$scratch"' EXIT
-
-# enter NAME USER: a fresh base system with a clone of this project in it and
-# the data beside it.
-base() {
-    debootstrap --variant=minbase --include=git,make,ca-certificates,sudo \
-        bookworm "$scratch/base" "$mirror" > "$scratch/log" 2>&1
-}
+# enter USER: a fresh base system with a clone of this project in it and the data
+# beside it.
 enter() {
-    leave
-    rm -rf --one-file-system "$root"
-    cp -a "$scratch/base" "$root"
-    mount -t proc proc "$root/proc"
-    mount --bind /dev "$root/dev"
-    mount -t devpts devpts "$root/dev/pts" 2> /dev/null
-    mount -t tmpfs tmpfs "$root/dev/shm" 2> /dev/null
-    cp /etc/resolv.conf "$root/etc/"
-    [ -d /etc/apt/apt.conf.d ] && grep -lsi proxy /etc/apt/apt.conf.d/* |
-        xargs -r cp -t "$root/etc/apt/apt.conf.d"
+    root_enter
     mkdir "$root/src"
     git clone -q . "$root/src/incode"
     [ -d "$INCODE_DATA" ] && mkdir "$root/src/shared" &&
@@ -56,7 +36,7 @@ works() { # USER TARGET
 }
 
 mkdir -p "$BUILD/results"
-if ! base; then
+if ! root_base git,make,ca-certificates,sudo; then
     fail 'chroot' "$(last "$scratch/log")"
     exit 1
 fi
