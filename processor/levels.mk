@@ -3,18 +3,19 @@
 # of x86-64; one level runs (processor.h).  Of others the baseline is all: that
 # of arm64 has its vectors.
 #
-# core_levels and host_levels are that code and its stubs in one object, for
-# nodes and for hosts.  They come before archives, which then give nothing of
-# it.  Bare boards have their processor's code alone.
+# NAME_levels is that code and its stubs in one object: core for nodes, library,
+# and host for the programs of hosts.  It comes before archives, which then give
+# nothing of it.  Bare boards have their processor's code alone.
 levels      := x86-64 x86-64-v2 x86-64-v3 x86-64-v4
 core_levelled := $(filter incode/%,$(freestanding)) transport/frame.c
-host_levelled := $(core_levelled) host/mesh/kd_build.c host/mesh/lift.c
+library_levelled := $(core_levelled) host/mesh/kd_build.c
+host_levelled := $(library_levelled) host/verify/check.c host/verify/sums.c
 machine_of  := $(shell $(CC) -dumpmachine)
 has_levels  := $(and $(filter any,$(ARCH)),$(filter x86_64-%,$(machine_of)))
 baseline    := $(if $(filter x86_64-%,$(machine_of)),-march=x86-64, \
 	$(if $(filter aarch64-%,$(machine_of)),-march=armv8-a))
-core_levels := $(if $(has_levels),$(BUILD)/levels/core.o)
-host_levels := $(if $(has_levels),$(BUILD)/levels/host.o)
+$(foreach g,core library host,$(eval $(g)_levels := \
+	$(if $(has_levels),$(BUILD)/levels/$(g).o)))
 
 # The baseline's objects are those of any build.
 level_objects = $(addprefix $(if $(filter x86-64,$(2)),$(obj),$(BUILD)/levels/$(2))/, \
@@ -44,11 +45,13 @@ $(BUILD)/levels/$(1).o: $(levels:%=$(BUILD)/levels/$(1)-%.o) processor/stubs
 	@$$(OBJCOPY) --wildcard --localize-symbol='x86_64_*' $$@
 $(BUILD)/levels/$(1)-%.o: processor/levels.mk
 	@$$(LD) -r $$(filter %.o,$$^) -o $$@
-	@nm -g --defined-only $$@ | awk '{ print $$$$3 }' > $$(@:.o=.names)
+	@nm -g --defined-only $$@ | awk '{ print $$$$3 } $$$$2 != "T" { \
+		print "$$@: " $$$$3 " is no function" > "/dev/stderr"; exit 1 }' \
+		> $$(@:.o=.names)
 	@sed 's/.*/& $$(subst -,_,$$*)_&/' $$(@:.o=.names) > $$(@:.o=.renamed)
 	@$$(OBJCOPY) --redefine-syms=$$(@:.o=.renamed) $$@
 endef
-$(foreach g,core host,$(eval $(call levels_object,$(g))))
+$(foreach g,core library host,$(eval $(call levels_object,$(g))))
 
 # Unit tests have the code of the highest level here, of whose vectors they know;
 # levels/LEVEL/test_NAME is one of another.

@@ -8,8 +8,8 @@ library      := $(call files,incode host/library) transport/text.c \
 
 $(library:%.c=$(obj)/%.o): private BASE += -fPIC -fvisibility=hidden
 # Its code of each level in place of that of one.
-library_objects := $(host_levels) $(filter-out $(if $(host_levels), \
-	$(host_levelled:%.c=$(obj)/%.o)),$(library:%.c=$(obj)/%.o))
+library_objects := $(library_levels) $(filter-out $(if $(library_levels), \
+	$(library_levelled:%.c=$(obj)/%.o)),$(library:%.c=$(obj)/%.o))
 $(BUILD)/libincode.so.0: $(library_objects)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) -shared -Wl,-soname,$(@F) -Wl,--no-undefined $^ -lm -o $@
