@@ -152,7 +152,7 @@ fuzz: deps-test
 compdb:
 	@$(MAKE) --no-print-directory --always-make --dry-run V=1 all unit | \
 		awk -v here='$(CURDIR)' ' \
-		/ -c [^ ]+\.c -o / { gsub(/\t/, " "); gsub(/["\\]/, "\\\\&"); source = $$0; \
+		/ -c [^ ]+\.c -o / && !/ -o [^ ]*\/levels\// { gsub(/\t/, " "); gsub(/["\\]/, "\\\\&"); source = $$0; \
 			sub(/.* -c /, "", source); sub(/ .*/, "", source); \
 			printf "%s{\"directory\": \"%s\", \"file\": \"%s\", " \
 				"\"command\": \"%s\"}", n++ ? ",\n" : "[\n", here, \
