@@ -1,14 +1,15 @@
 # Builds, runs and tests incode.  `make help` lists what there is.
 #
-# Variables: BUILD (where everything made goes), CC, ARCH (-march=), OPT,
-# SAN (sanitizers, as in SAN=address,undefined; their own BUILD, please).
+# Variables: BUILD (where everything made goes), CC, ARCH (-march=, or any: for
+# each processor of this architecture), OPT, SAN (sanitizers, as in
+# SAN=address,undefined; their own BUILD, please, and one processor).
 
 # The usual value, also where a variable is given without one.
 usual   = $(eval override $(1) := $(or $(strip $($(1))),$(2)))
 $(call usual,BUILD,build)
-$(call usual,ARCH,native)
-$(call usual,OUT,out)
 SAN    ?=
+$(call usual,ARCH,$(if $(SAN),native,any))
+$(call usual,OUT,out)
 OPT    ?= $(if $(SAN),-O1,-O3)
 PREFIX ?= /usr/local
 POINTS ?=
@@ -30,7 +31,7 @@ SANITIZE = $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all \
 	-fno-omit-frame-pointer -DINCODE_SANITIZED)
 CFLAGS  ?= -g
 OBJCOPY ?= objcopy
-MACHINE  = -march=$(ARCH)
+MACHINE  = $(if $(filter any,$(ARCH)),$(baseline),-march=$(ARCH))
 BASE     = -std=c11 -I. $(WARNINGS) $(OPT) $(MACHINE) $(FLOATING) $(SANITIZE) \
 	$(CFLAGS)
 HOSTED   = $(BASE) -pthread -D_GNU_SOURCE=
@@ -74,7 +75,7 @@ unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
 obj          := $(BUILD)/obj
-core_objects := $(freestanding:%.c=$(obj)/%.o)
+core_objects := $(freestanding:%.c=$(obj)/%.o) $(obj)/processor/processor.o
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
@@ -99,22 +100,26 @@ programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
 all: $(programs) $(libraries)
 
-$(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
+include processor/levels.mk
+
+$(BUILD)/incode: $(obj)/host/main.o $(host_levels) $(BUILD)/libhost.a \
+		$(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@
 
 # Static, so that a node's data memory is what the node itself declares.
 $(foreach b,$(boards),$(eval $(call node,$(b)): \
 	$(patsubst %.c,$(BUILD)/node/%.o,$(wildcard boards/$(b)/*.c))))
-$(nodes): $(node_objects) $(BUILD)/libcore.a
+$(nodes): $(node_objects) $(core_levels) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $(filter %.o,$^) \
 		$(BUILD)/libcore.a $(NODE_LIBS) -o $@
 
-$(BUILD)/incode-mpi: $(mpi_host) $(BUILD)/libhost.a $(BUILD)/libcore.a
+$(BUILD)/incode-mpi: $(mpi_host) $(host_levels) $(BUILD)/libhost.a \
+		$(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) $(MPI_LIBS) -o $@
-$(BUILD)/incode-node-mpi: $(mpi_node) $(BUILD)/libcore.a
+$(BUILD)/incode-node-mpi: $(mpi_node) $(core_levels) $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(MPI_LIBS) -o $@
 

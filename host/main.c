@@ -435,6 +435,8 @@ static int run(int argc, char **argv, struct host_error *error) {
                          "COMMAND: none is given; allowed: %s",
                          command_names());
     }
+    if (host_begin_processor(error) != 0)
+        return error->code;
     const char *fault = incode_arithmetic_fault();
     if (fault != NULL) {
         return host_fail(error, HOST_BROKEN,

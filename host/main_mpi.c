@@ -35,6 +35,7 @@ static int run(int argc, char **argv, struct host_error *error) {
     static struct host_run_result result;
     struct host_run_options options = {0};
     if (host_ranks_open(&ranks, error) != 0 ||
+        host_begin_processor(error) != 0 ||
         host_arguments_run(argc, argv, &options, error) != 0)
         return error->code;
     unsigned nodes = (unsigned)ranks.place.ranks - 1;

@@ -30,7 +30,8 @@ $(foreach t,tcp tcp_wire unix_file,$(BUILD)/tests/test_$(t)): \
 # A test's folder is its room's; its program stands with the others.
 unit: $(unit_tests)
 $(foreach t,$(unit),$(eval $(BUILD)/tests/$(notdir $(t:.c=)): $(obj)/$(t:.c=.o)))
-$(filter-out %/test_mpi,$(unit_tests)): $(BUILD)/libhost.a $(BUILD)/libcore.a
+$(filter-out %/test_mpi,$(unit_tests)): $(best_core) $(BUILD)/libhost.a \
+		$(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) -Wl,--start-group $(filter %.a,$^) \
@@ -91,8 +92,8 @@ $(BUILD)/renamed/%.o: $(obj)/host/%.o
 $(testing): $(BUILD)/renamed/main.o
 $(testing)-mpi: $(BUILD)/renamed/main_mpi.o $(filter-out %/main_mpi.o,$(mpi_host))
 $(testing)-mpi: private HOST_LIBS += $(MPI_LIBS)
-$(testing) $(testing)-mpi: $(obj)/tests/system/testing.o $(BUILD)/libhost.a \
-		$(BUILD)/libcore.a
+$(testing) $(testing)-mpi: $(obj)/tests/system/testing.o $(host_levels) \
+		$(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $(filter %.o,$^) $(filter %.a,$^) $(HOST_LIBS) -o $@
 
@@ -100,7 +101,8 @@ $(testing) $(testing)-mpi: $(obj)/tests/system/testing.o $(BUILD)/libhost.a \
 liar := $(patsubst %.c,$(BUILD)/node/%.o,host/sim/liar.c \
 	tests/system/liar/liar.c $(wildcard boards/linux/*.c))
 points: $(BUILD)/tests/incode-node-liar
-$(BUILD)/tests/incode-node-liar: $(liar) $(node_objects) $(BUILD)/libcore.a
+$(BUILD)/tests/incode-node-liar: $(liar) $(node_objects) $(core_levels) \
+		$(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@
 	$(Q)$(NODE_CC) $(BASE) $(if $(SAN),,-static) $(filter %.o,$^) \
@@ -133,7 +135,7 @@ $(BUILD)/peers/hxt:    peer = -fopenmp $< -lgmsh
 $(peers): $(BUILD)/peers/%: tests/bench/%.cpp tests/bench/peer.hpp
 	@mkdir -p $(@D)
 	$(say) CXX $<
-	$(Q)$(CXX) -std=c++17 -O3 -DNDEBUG -march=$(ARCH) $(peer) -o $@
+	$(Q)$(CXX) -std=c++17 -O3 -DNDEBUG -march=$(ARCH:any=native) $(peer) -o $@
 # The library beside them.
 $(BUILD)/peers/locate: tests/bench/locate.c $(BUILD)/libincode.a
 	@mkdir -p $(@D)
@@ -156,7 +158,7 @@ fuzz: deps-test
 compdb:
 	@$(MAKE) --no-print-directory --always-make --dry-run V=1 all unit | \
 		awk -v here='$(CURDIR)' ' \
-		/ -c [^ ]+\.c -o / { gsub(/\t/, " "); gsub(/["\\]/, "\\\\&"); source = $$0; \
+		/ -c [^ ]+\.c -o / && !/ -o [^ ]*\/levels\// { gsub(/\t/, " "); gsub(/["\\]/, "\\\\&"); source = $$0; \
 			sub(/.* -c /, "", source); sub(/ .*/, "", source); \
 			printf "%s{\"directory\": \"%s\", \"file\": \"%s\", " \
 				"\"command\": \"%s\"}", n++ ? ",\n" : "[\n", here, \

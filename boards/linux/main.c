@@ -19,6 +19,7 @@
 #include <fcntl.h>
 #include <stdbool.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -29,6 +30,7 @@
 #include "node/identity.h"
 #include "node/node.h"
 #include "options.h"
+#include "processor/processor.h"
 #include "transport/drivers/secure_sodium.h"
 #include "wire.h"
 
@@ -67,7 +69,8 @@ static uint32_t refused(void *context) {
 static void reset(void *context, int status) {
     const struct linux_board *board = context;
     if (board->again != NULL) {
-        char *environment[] = {(char[]){LINUX_AGAIN "=1"}, NULL};
+        char *environment[] = {(char[]){LINUX_AGAIN "=1"}, processor_variable(),
+                               NULL};
         execve("/proc/self/exe", board->again, environment);
     }
     _exit(status);
@@ -236,6 +239,15 @@ static int prepare(char **argv, struct linux_options *options,
                    struct linux_board *linux_board, struct node_board *board) {
     struct linux_fault fault = {0};
     struct tcp_wire *net = NULL;
+    const char *forced = getenv(PROCESSOR_VARIABLE);
+    const char *what = processor_force(forced);
+    if (what != NULL) {
+        return complain((struct linux_fault){.where = PROCESSOR_VARIABLE,
+                                             .value = forced,
+                                             .what = what,
+                                             .next = processor_allowed()},
+                        2);
+    }
     if (!linux_options_read(argv + 1, options, &fault))
         return complain(fault, 2);
     board->source.random = tcp_random;

@@ -9,9 +9,11 @@ nodes_x86_64  := x86_64-linux-gnu- -march=x86-64
 nodes_aarch64 := aarch64-linux-gnu- -march=armv8-a
 nodes_armhf   := arm-linux-gnueabihf- -march=armv7-a+fp -mfloat-abi=hard
 nodes_riscv64 := riscv64-linux-gnu- -march=rv64gc
+# That of this architecture has the code of all its levels, as others here do.
+nodes_levels_x86_64 := $(core_levels)
 node_programs := $(node_arches:%=$(BUILD)/nodes/incode-node-%)
 node_sources  := $(freestanding) $(wildcard boards/*.c boards/linux/*.c) \
-	$(node_drivers)
+	processor/processor.c $(node_drivers)
 # FOR: some of them alone.
 node_for     := $(or $(filter $(node_arches),$(FOR)),$(node_arches))
 node_unknown := $(filter-out $(node_arches),$(FOR))
@@ -64,7 +66,8 @@ node_sodium  := $(fetched)/libsodium/src/libsodium
 define node_arch
 nodes_cc_$(1) := $$(firstword $$(nodes_$(1)))gcc
 nodes_at_$(1) := $(BUILD)/nodes/$(1)
-nodes_objects_$(1) := $$(node_sources:%.c=$$(nodes_at_$(1))/%.o) \
+nodes_objects_$(1) := $$(patsubst %.c,$$(nodes_at_$(1))/%.o,$$(filter-out \
+		$$(if $$(nodes_levels_$(1)),$$(core_levelled)),$$(node_sources))) \
 	$$(node_crypto:%=$$(nodes_at_$(1))/sodium/%.o)
 $$(nodes_objects_$(1)): private NODE_CC = $$(nodes_at_$(1))/musl/bin/musl-gcc
 $$(nodes_objects_$(1)): private MACHINE = $$(wordlist 2,9,$$(nodes_$(1)))
@@ -89,7 +92,7 @@ $$(nodes_at_$(1))/%.o: %.c $(BUILD)/flags $(BUILD)/include/sodium.h
 	@mkdir -p $$(@D)
 	$$(say) CC $$@
 	$$(Q)$$(NODE_CC) $$(BASE) $$(NODE_INCLUDE) -D_GNU_SOURCE= -MMD -MP -c $$< -o $$@
-$(BUILD)/nodes/incode-node-$(1): $$(nodes_objects_$(1))
+$(BUILD)/nodes/incode-node-$(1): $$(nodes_objects_$(1)) $$(nodes_levels_$(1))
 	$$(say) LINK $$@
 	$$(Q)$$(nodes_at_$(1))/musl/bin/musl-gcc -static -s -Wl,--gc-sections $$^ -o $$@
 endef

@@ -13,6 +13,7 @@
 
 #include "boards/process.h"
 #include "node/node.h"
+#include "processor/processor.h"
 #include "transport/drivers/mpi.h"
 #include "transport/drivers/mpi_environment.h"
 
@@ -188,6 +189,14 @@ static void take_part(struct mpi_board *b, const struct mpi_order *order) {
 int main(int argc, char **argv) {
     static struct mpi_board board;
     struct sigaction action = {.sa_handler = stay_a_moment};
+    const char *forced = getenv(PROCESSOR_VARIABLE);
+    const char *what = processor_force(forced);
+    if (what != NULL) {
+        (void)fprintf(stderr,
+                      "incode-node-mpi: " PROCESSOR_VARIABLE "=%s: %s; %s\n",
+                      forced, what, processor_allowed());
+        return 2;
+    }
     prctl(PR_SET_PDEATHSIG, SIGKILL); /* gone with the launcher's daemon */
     (void)sigaction(SIGTERM, &action, NULL);
     mpi_environment();

@@ -1,15 +1,19 @@
 # What the library is made of: code for any address, of which no name but those
 # of its header is seen from outside.
-library      := $(call files,incode host/library) transport/text.c $(patsubst %,host/%.c, \
+library      := $(call files,incode host/library) transport/text.c \
+	processor/processor.c $(patsubst %,host/%.c, \
 	base/error base/memory base/parallel base/text mesh/adjacency \
 	mesh/duplicates mesh/kd_build mesh/lift mesh/order mesh/spill \
 	mesh/tetrahedra)
 
 $(library:%.c=$(obj)/%.o): private BASE += -fPIC -fvisibility=hidden
-$(BUILD)/libincode.so.0: $(library:%.c=$(obj)/%.o)
+# Its code of each level in place of that of one.
+library_objects := $(library_levels) $(filter-out $(if $(library_levels), \
+	$(library_levelled:%.c=$(obj)/%.o)),$(library:%.c=$(obj)/%.o))
+$(BUILD)/libincode.so.0: $(library_objects)
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) -shared -Wl,-soname,$(@F) -Wl,--no-undefined $^ -lm -o $@
-$(BUILD)/libincode.o: $(library:%.c=$(obj)/%.o)
+$(BUILD)/libincode.o: $(library_objects)
 	@$(LD) -r $^ -o $@
 	@$(OBJCOPY) --localize-hidden $@
 $(BUILD)/libincode.a: $(BUILD)/libincode.o

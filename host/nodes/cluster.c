@@ -17,6 +17,7 @@
 #include "transport/drivers/unix_file.h"
 #include "host/base/error.h"
 #include "host/base/parallel.h"
+#include "processor/processor.h"
 
 static const struct host_link rows[] = {
     {.name = "tcp",
@@ -221,7 +222,7 @@ static bool set_limit(int resource, uint64_t bytes) {
 static void become_node(const void *context, unsigned node) {
     const struct host_cluster *c = context;
     char text[8][32], links[CUBE_LINKS_MAX * 12] = "";
-    char *no_environment[] = {NULL};
+    char *environment[] = {processor_variable(), NULL};
     size_t at = 0;
     (void)close_range(3, ~0u, CLOSE_RANGE_CLOEXEC);
     for (unsigned d = 0; d < c->dimension + (node < c->ports ? 1u : 0u); d++) {
@@ -263,7 +264,7 @@ static void become_node(const void *context, unsigned node) {
         (!c->limited ||
          (set_limit(RLIMIT_STACK, HOST_STACK_BYTES) &&
           set_limit(RLIMIT_DATA, c->options.memory - HOST_STACK_BYTES))))
-        execve(c->path, argv, c->limited ? no_environment : environ);
+        execve(c->path, argv, c->limited ? environment : environ);
 }
 
 static int start_node(struct host_cluster *c, unsigned node,

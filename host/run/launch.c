@@ -18,6 +18,7 @@
 #include "host/formats/output.h"
 #include "host/base/error.h"
 #include "host/base/text.h"
+#include "processor/processor.h"
 #include "transport/drivers/mpi_environment.h"
 
 /* Of what was closed, nothing is read, and writing to it remains an error. */
@@ -35,6 +36,15 @@ void host_begin(const char *name) {
     open_standard();
     (void)signal(SIGCHLD, SIG_DFL);
     host_output_guard();
+}
+
+int host_begin_processor(struct host_error *error) {
+    const char *name = getenv(PROCESSOR_VARIABLE);
+    const char *what = processor_force(name);
+    if (what == NULL)
+        return 0;
+    return host_fail(error, HOST_USAGE, PROCESSOR_VARIABLE "=%s: %s; %s", name,
+                     what, processor_allowed());
 }
 
 /* --- launch --------------------------------------------------------------- */

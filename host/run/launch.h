@@ -23,6 +23,10 @@
  * started as /proc/self/exe. */
 void host_begin(const char *name);
 
+/* Takes the code for that level of processors which the environment forces, if
+ * it does. */
+int host_begin_processor(struct host_error *error);
+
 /* Of the launcher's making, as the environment has it; -1: no rank. */
 int host_launch_rank(void);
 

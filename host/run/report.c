@@ -9,6 +9,7 @@
 #include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
+#include "processor/processor.h"
 #include "host/formats/output.h"
 
 /* The processor time of the busiest node: what t_max would be if every node
@@ -309,6 +310,7 @@ static json_t *run_object(const struct host_run_result *r) {
     put_text(o, "index", host_indexes[r->index]);
     put_text(o, "link", r->link->name);
     put_text(o, "board", r->board->name);
+    put_text(o, "processor", processor_level());
     put(o, "nodes", r->nodes);
     put(o, "memory_bytes", r->memory);
     json_object_set_new(o, "memory_limited", json_boolean(r->limited));

@@ -10,12 +10,13 @@ if grep -q fsanitize "$BUILD/flags"; then
 fi
 tree=$scratch/tree
 mkdir -p "$tree/build"
-cp -a Makefile boards host incode node transport "$tree"
+cp -a Makefile boards host incode node processor transport "$tree"
 mkdir -p "$tree/tests/arithmetic"
 cp -a tests/*.mk "$tree/tests"
 cp -a tests/arithmetic/*.mk "$tree/tests/arithmetic"
 cp -a "$BUILD/flags" "$BUILD/commit" "$BUILD/obj" "$BUILD"/*.a \
     "$BUILD/node" "$BUILD/include" "$tree/build"
+[ ! -d "$BUILD/levels" ] || cp -a "$BUILD/levels" "$tree/build"
 
 cat > "$tree/host/formats/toy.c" <<'END'
 /* A count, then as many rows; tetrahedra in the same way, with a sibling that
