@@ -75,7 +75,7 @@ unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
 obj          := $(BUILD)/obj
-core_objects := $(freestanding:%.c=$(obj)/%.o) $(obj)/processor/processor.o
+core_objects := $(freestanding:%.c=$(obj)/%.o) $(obj)/boards/processor/processor.o
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
@@ -100,7 +100,7 @@ programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
 all: $(programs) $(libraries)
 
-include processor/levels.mk
+include boards/processor/levels.mk
 
 $(BUILD)/incode: $(obj)/host/main.o $(host_levels) $(BUILD)/libhost.a \
 		$(BUILD)/libcore.a

@@ -30,7 +30,7 @@
 #include "node/identity.h"
 #include "node/node.h"
 #include "options.h"
-#include "processor/processor.h"
+#include "boards/processor/processor.h"
 #include "transport/drivers/secure_sodium.h"
 #include "wire.h"
 

@@ -13,7 +13,7 @@ nodes_riscv64 := riscv64-linux-gnu- -march=rv64gc
 nodes_levels_x86_64 := $(core_levels)
 node_programs := $(node_arches:%=$(BUILD)/nodes/incode-node-%)
 node_sources  := $(freestanding) $(wildcard boards/*.c boards/linux/*.c) \
-	processor/processor.c $(node_drivers)
+	boards/processor/processor.c $(node_drivers)
 # FOR: some of them alone.
 node_for     := $(or $(filter $(node_arches),$(FOR)),$(node_arches))
 node_unknown := $(filter-out $(node_arches),$(FOR))

@@ -13,7 +13,7 @@
 
 #include "boards/process.h"
 #include "node/node.h"
-#include "processor/processor.h"
+#include "boards/processor/processor.h"
 #include "transport/drivers/mpi.h"
 #include "transport/drivers/mpi_environment.h"
 

@@ -1,7 +1,7 @@
 # What the library is made of: code for any address, of which no name but those
 # of its header is seen from outside.
 library      := $(call files,incode host/library) transport/text.c \
-	processor/processor.c $(patsubst %,host/%.c, \
+	boards/processor/processor.c $(patsubst %,host/%.c, \
 	base/error base/memory base/parallel base/text mesh/adjacency \
 	mesh/duplicates mesh/kd_build mesh/lift mesh/order mesh/spill \
 	mesh/tetrahedra)

@@ -17,7 +17,7 @@
 #include "transport/drivers/unix_file.h"
 #include "host/base/error.h"
 #include "host/base/parallel.h"
-#include "processor/processor.h"
+#include "boards/processor/processor.h"
 
 static const struct host_link rows[] = {
     {.name = "tcp",

@@ -18,7 +18,7 @@
 #include "host/formats/output.h"
 #include "host/base/error.h"
 #include "host/base/text.h"
-#include "processor/processor.h"
+#include "boards/processor/processor.h"
 #include "transport/drivers/mpi_environment.h"
 
 /* Of what was closed, nothing is read, and writing to it remains an error. */

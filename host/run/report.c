@@ -9,7 +9,7 @@
 #include "host/mesh/points.h"
 #include "host/service/strategies/strategies.h"
 #include "node/roles/roles.h"
-#include "processor/processor.h"
+#include "boards/processor/processor.h"
 #include "host/formats/output.h"
 
 /* The processor time of the busiest node: what t_max would be if every node

@@ -10,7 +10,7 @@ if grep -q fsanitize "$BUILD/flags"; then
 fi
 tree=$scratch/tree
 mkdir -p "$tree/build"
-cp -a Makefile boards host incode node processor transport "$tree"
+cp -a Makefile boards host incode node transport "$tree"
 mkdir -p "$tree/tests/arithmetic"
 cp -a tests/*.mk "$tree/tests"
 cp -a tests/arithmetic/*.mk "$tree/tests/arithmetic"

@@ -14,8 +14,8 @@
  *
  * Levels are those of the x86-64 psABI.  Other architectures, and programs that
  * were made with ARCH=, have one level. */
-#ifndef PROCESSOR_PROCESSOR_H
-#define PROCESSOR_PROCESSOR_H
+#ifndef BOARDS_PROCESSOR_PROCESSOR_H
+#define BOARDS_PROCESSOR_PROCESSOR_H
 
 #define PROCESSOR_VARIABLE "INCODE_PROCESSOR"
 

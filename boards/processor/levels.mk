@@ -37,13 +37,13 @@ $(foreach l,$(levels),$(eval $(call level,$(l))))
 define levels_object
 $(foreach l,$(levels),$(BUILD)/levels/$(1)-$(l).o: $(call level_objects,$(1),$(l))
 )
-$(BUILD)/levels/$(1).o: $(levels:%=$(BUILD)/levels/$(1)-%.o) processor/stubs
+$(BUILD)/levels/$(1).o: $(levels:%=$(BUILD)/levels/$(1)-%.o) boards/processor/stubs
 	$$(say) LINK $$@
-	@processor/stubs $(BUILD)/levels/$(1)-x86-64.names $(levels) > $$(@:.o=.s)
+	@boards/processor/stubs $(BUILD)/levels/$(1)-x86-64.names $(levels) > $$(@:.o=.s)
 	@$$(CC) -c $$(@:.o=.s) -o $$(@:.o=-stubs.o)
 	@$$(LD) -r $$(@:.o=-stubs.o) $$(filter %.o,$$^) -o $$@
 	@$$(OBJCOPY) --wildcard --localize-symbol='x86_64_*' $$@
-$(BUILD)/levels/$(1)-%.o: processor/levels.mk
+$(BUILD)/levels/$(1)-%.o: boards/processor/levels.mk
 	@$$(LD) -r $$(filter %.o,$$^) -o $$@
 	@nm -g --defined-only $$@ | awk '{ print $$$$3 } $$$$2 != "T" { \
 		print "$$@: " $$$$3 " is no function" > "/dev/stderr"; exit 1 }' \
