@@ -56,8 +56,11 @@ struct host_format {
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
     bool pieces; /* its readers take a packed file piece by piece, see above */
-    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT". */
+    bool apart;  /* its bytes are read in a process of its own (hdf5.h) */
+    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT", and
+     * whether a file that begins so has it, whatever its extension. */
     const char *unread;
+    bool (*recognises)(const uint8_t *data, size_t bytes);
 };
 
 #endif

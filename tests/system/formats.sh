@@ -88,8 +88,22 @@ refuses 'formats/--format of no format' 2 \
     incode run "$scratch/a.stl" --format frob -o "$scratch/left/o.npy"
 refuses 'formats/no format is told' 3 'pipe: .*--format' incode run \
     "$scratch/pipe" -q -o "$scratch/left/o.npy"
-refuses 'formats/.laz' 3 'a.laz: .*; unpack them with laszip' incode run \
-    "$scratch/a.laz" -q -o "$scratch/left/o.npy"
+
+# What is known and not read, by its extension or by its first bytes.
+laz='LAS whose points LASzip has compressed.*; unpack them with laszip'
+e57='E57 .ASTM E2807., which is not read; convert it with pdal translate'
+{
+    head -c 104 "$scratch/a.las" && printf '\x83' && tail -c +106 "$scratch/a.las"
+} > "$scratch/marked.las"
+printf 'ASTM-E57\1\0\0\0\0\0\0\0' > "$scratch/scans.xyz"
+refuses 'formats/.laz' 3 "a.laz: $laz" incode run "$scratch/a.laz" -q \
+    -o "$scratch/left/o.npy"
+refuses 'formats/.e57' 3 "a.e57: $e57" incode run "$scratch/a.e57" -q \
+    -o "$scratch/left/o.npy"
+refuses 'formats/compressed, in .las' 3 "marked.las: $laz" incode run \
+    "$scratch/marked.las" -q -o "$scratch/left/o.npy"
+refuses 'formats/E57, in .xyz' 3 "scans.xyz: $e57" incode convert \
+    "$scratch/scans.xyz" "$scratch/left/o.npy"
 help=$(incode run --help | tr -s ' \n' ' ')
 check 'formats/--help lists them' "$help" \
     grep -qF '.xyz .txt .pts .csv .node .ply .off .obj .stl .las' <<< "$help"
