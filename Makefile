@@ -98,6 +98,12 @@ programs     := $(BUILD)/incode $(BUILD)/incode-mpi $(BUILD)/incode-node-mpi \
 libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
 all: $(programs) $(libraries)
 
+# HDF5 is loaded when a file calls for it, by the name that it has here.
+hdf5 = $(realpath $(shell $(CC) -print-file-name=libhdf5_serial.so))
+$(obj)/host/formats/hdf5.o: private HOSTED += $(if $(hdf5),-DHDF5_LIBRARY='"$(shell \
+	echo '$(notdir $(hdf5))' | cut -d . -f 1-3)"' -DHDF5_PACKAGE='"$(shell \
+	dpkg-query -S '$(hdf5)' 2> /dev/null | cut -d : -f 1)"')
+
 $(BUILD)/incode: $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	$(say) LINK $@
 	$(Q)$(CC) $(HOSTED) $^ $(HOST_LIBS) -o $@

@@ -2,7 +2,7 @@
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev \
 	libpng-dev nettle-dev libjansson-dev libserialport-dev libsodium-dev \
-	libconfig-dev libgpiod-dev pkg-config libedit-dev \
+	libconfig-dev libgpiod-dev pkg-config libedit-dev libhdf5-dev \
 	libopenmpi-dev openmpi-bin
 # Of the processors that make nodes is called for.
 node_packages  = $(run_packages) dpkg-dev \
@@ -12,7 +12,7 @@ node_packages_armhf   = gcc-arm-linux-gnueabihf libc6-dev-armhf-cross
 node_packages_riscv64 = gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
-	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
+	openssl python3-h5py gcc-arm-none-eabi libnewlib-arm-none-eabi \
 	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages)
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev

@@ -28,6 +28,10 @@ struct host_mesh {
 typedef int host_reader(const struct host_source *source,
                         struct host_mesh *mesh, struct host_error *error);
 
+/* Before the work for it begins: 0, or HOST_INPUT where the output cannot be
+ * written in this format. */
+typedef int host_output_checker(const char *path, struct host_error *error);
+
 /* The same doubles come back when it is read. */
 typedef void host_points_writer(struct host_output *out,
                                 const struct host_points *points);
@@ -50,6 +54,7 @@ struct host_format {
     host_reader *read_points, *read_tetrahedra;
     host_points_writer *write_points;
     host_tetrahedra_writer *write_tetrahedra;
+    host_output_checker *check_output; /* of tetrahedra */
     /* Of the files that belong to an output of tetrahedra, and are written
      * beside it.  If it holds no points, the first has them, and its extension
      * is that of a format that reads points. */

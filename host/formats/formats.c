@@ -23,6 +23,7 @@
     ROW(vtk)                                                                   \
     ROW(vtp)                                                                   \
     ROW(vts)                                                                   \
+    ROW(vtkhdf)                                                                \
     ROW(msh)                                                                   \
     ROW(mesh)                                                                  \
     ROW(npy)                                                                   \
