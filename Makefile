@@ -89,7 +89,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 .DELETE_ON_ERROR:
 .SECONDARY:
 .PHONY: all unit points planted bare arithmetic fuzzers run check test \
-	test-full bench firmware nodes cross fuzz lint install uninstall clean \
+	test-full bench firmware nodes cross fuzz lint abi install uninstall clean \
 	compdb hooks \
 	help deps deps-run deps-nodes deps-test deps-bench deps-full FORCE
 

@@ -16,7 +16,7 @@ test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages)
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev
-full_packages  = $(test_packages) $(bench_packages) debootstrap cpio
+full_packages  = $(test_packages) $(bench_packages) debootstrap cpio abigail-tools
 
 deps: deps-test
 deps-run:
