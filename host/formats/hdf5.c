@@ -82,6 +82,7 @@ static _Noreturn void child(const struct host_hdf5_work *work,
     for (int i = 1; i < NSIG; i++)
         (void)signal(i, SIG_DFL);
     (void)signal(SIGINT, SIG_IGN); /* its parent ends by that, and then it */
+    (void)signal(SIGXFSZ, SIG_IGN);
     (void)prctl(PR_SET_PDEATHSIG, SIGKILL);
     (void)sigprocmask(SIG_SETMASK, signals, NULL);
     limit(work->bytes);
