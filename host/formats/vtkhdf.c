@@ -137,9 +137,13 @@ static herr_t image_left(void *source) {
 static hid_t open_image(const struct host_hdf5 *h,
                         const struct host_source *source) {
     void *data = (void *)source->data;
-    H5FD_file_image_callbacks_t calls = {image_of,      image_copy, image_grown,
-                                         image_free,    image_kept, image_left,
-                                         (void *)source};
+    H5FD_file_image_callbacks_t calls = {.image_malloc = image_of,
+                                         .image_memcpy = image_copy,
+                                         .image_realloc = image_grown,
+                                         .image_free = image_free,
+                                         .udata_copy = image_kept,
+                                         .udata_free = image_left,
+                                         .udata = (void *)source};
     hid_t access = h->H5Pcreate(h->H5P_CLS_FILE_ACCESS_ID_g);
     if (h->H5Pset_fapl_core(access, CHUNK_MAX, 0) < 0 ||
         h->H5Pset_file_image_callbacks(access, &calls) < 0 ||
@@ -439,8 +443,12 @@ static int take_arrays(const struct task *task, const uint8_t *data,
         uint64_t points = 0, first = rows;
         if (host_stream_whole(&a.of[POINTS_OF_PARTS], &points, error) != 0)
             break;
-        rows = points > UINT32_MAX || rows > UINT32_MAX ? UINT64_MAX
-                                                        : rows + points;
+        if (points > UINT32_MAX - rows) {
+            host_source_fail(task->source, error,
+                             "more than 2^32 points; give fewer");
+            break;
+        }
+        rows += points;
         if (mesh->tets != NULL)
             take_cells(&a, points, first, mesh->tets, error);
     }
@@ -535,9 +543,11 @@ static void *frame_grown(void *image, size_t bytes, H5FD_file_image_op_t why,
 static int make_frame(void *context, const struct host_hdf5 *h,
                       struct host_error *error) {
     const struct task *task = context;
-    H5FD_file_image_callbacks_t calls = {image_of,    image_copy, frame_grown,
-                                         image_free,  image_kept, image_left,
-                                         task->report};
+    H5FD_file_image_callbacks_t calls = {.image_realloc = frame_grown,
+                                         .image_free = image_free,
+                                         .udata_copy = image_kept,
+                                         .udata_free = image_left,
+                                         .udata = task->report};
     hid_t access = h->H5Pcreate(h->H5P_CLS_FILE_ACCESS_ID_g);
     hid_t make = h->H5Pcreate(h->H5P_CLS_FILE_CREATE_ID_g);
     hid_t timeless = h->H5Pcreate(h->H5P_CLS_GROUP_CREATE_ID_g);

@@ -133,6 +133,7 @@ else
 		steps it has several steps of time;
 		none HDF5 without a group VTKHDF
 		sum the points of its partitions are not those of Points;
+		many more than 2.32 points;
 		filter /VTKHDF/Points is packed by a filter of number 32000,
 		empty /VTKHDF/Points claims more numbers than the file holds;
 		linked /VTKHDF/Points is not there or not to be read;

@@ -64,6 +64,9 @@ fault("image", "ImageData")
 fault("steps").create_group("Steps").attrs["NSteps"] = 2
 del fault("none").file["VTKHDF"]
 fault("sum")["NumberOfPoints"][0] = third
+group = fault("many")
+del group["NumberOfPoints"]
+group["NumberOfPoints"] = [2 ** 32 - 1, len(points)]
 fault("filter", compression="lzf")
 group = fault("empty")
 del group["Points"]
