@@ -91,7 +91,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 .SECONDARY:
 .PHONY: all pages deb images unit points planted bare arithmetic fuzzers python \
 	run check test \
-	test-full bench firmware nodes cross fuzz lint install uninstall clean \
+	test-full bench firmware nodes cross fuzz lint abi install uninstall clean \
 	compdb hooks help deps deps-run deps-python deps-nodes deps-deb deps-test \
 	deps-bench deps-full FORCE
 
@@ -101,6 +101,12 @@ libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
 all: $(programs) $(libraries)
 
 include boards/processor/levels.mk
+
+# HDF5 is loaded when a file calls for it, by the name that it has here.
+hdf5 = $(realpath $(shell $(CC) -print-file-name=libhdf5_serial.so))
+$(obj)/host/formats/hdf5.o: private HOSTED += $(if $(hdf5),-DHDF5_LIBRARY='"$(shell \
+	echo '$(notdir $(hdf5))' | cut -d . -f 1-3)"' -DHDF5_PACKAGE='"$(shell \
+	dpkg-query -S '$(hdf5)' 2> /dev/null | cut -d : -f 1)"')
 
 $(BUILD)/incode: $(obj)/host/main.o $(host_levels) $(BUILD)/libhost.a \
 		$(BUILD)/libcore.a

@@ -2,7 +2,7 @@
 
 run_packages   = gcc libc6-dev make musl-tools zlib1g-dev libexpat1-dev \
 	libpng-dev nettle-dev libjansson-dev libserialport-dev libsodium-dev \
-	libconfig-dev libgpiod-dev pkg-config libedit-dev \
+	libconfig-dev libgpiod-dev pkg-config libedit-dev libhdf5-dev \
 	libopenmpi-dev openmpi-bin
 python_packages = gcc libc6-dev make python3-dev python3-cffi python3-numpy
 # Of the processors that make nodes is called for.
@@ -17,13 +17,13 @@ deb_packages   = $(run_packages) $(python_packages) dpkg-dev fakeroot debhelper 
 	libnewlib-arm-none-eabi
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
-	openssl gcc-arm-none-eabi libnewlib-arm-none-eabi \
+	openssl python3-h5py gcc-arm-none-eabi libnewlib-arm-none-eabi \
 	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages) \
 	$(python_packages) python3-scipy python3-pytest
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev python3-scipy
 full_packages  = $(test_packages) $(bench_packages) $(deb_packages) lintian debootstrap \
-	cpio
+	cpio abigail-tools
 
 deps: deps-test
 deps-run:

@@ -91,6 +91,11 @@ static bool holds_tetrahedra(const char *path) {
     return f != NULL && f->read_points == NULL && f->write_points == NULL;
 }
 
+static bool takes_tetrahedra(const char *path) {
+    const struct host_format *f = host_format_named(path);
+    return f != NULL && f->write_points == NULL && f->write_tetrahedra != NULL;
+}
+
 /* Others may hold either. */
 static bool has_tetrahedra(const char *path) {
     const struct host_format *f = host_format_named(path);
@@ -111,7 +116,7 @@ static int convert(const char *in, const char *format, const char *out,
         to != NULL && to->write_points != NULL && to->write_tetrahedra != NULL;
     if (check_claims(in, out, error) != 0)
         return error->code;
-    if (format == NULL && (holds_tetrahedra(in) || holds_tetrahedra(out) ||
+    if (format == NULL && (holds_tetrahedra(in) || takes_tetrahedra(out) ||
                            (either && has_tetrahedra(in))))
         return convert_tetrahedra(in, out, error);
     struct host_points points;

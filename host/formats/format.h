@@ -28,6 +28,10 @@ struct host_mesh {
 typedef int host_reader(const struct host_source *source,
                         struct host_mesh *mesh, struct host_error *error);
 
+/* Before the work for it begins: 0, or HOST_INPUT where the output cannot be
+ * written in this format. */
+typedef int host_output_checker(const char *path, struct host_error *error);
+
 /* The same doubles come back when it is read. */
 typedef void host_points_writer(struct host_output *out,
                                 const struct host_points *points);
@@ -50,14 +54,18 @@ struct host_format {
     host_reader *read_points, *read_tetrahedra;
     host_points_writer *write_points;
     host_tetrahedra_writer *write_tetrahedra;
+    host_output_checker *check_output; /* of tetrahedra */
     /* Of the files that belong to an output of tetrahedra, and are written
      * beside it.  If it holds no points, the first has them, and its extension
      * is that of a format that reads points. */
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
     bool pieces; /* its readers take a packed file piece by piece, see above */
-    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT". */
+    bool apart;  /* its bytes are read in a process of its own (hdf5.h) */
+    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT", and
+     * whether a file that begins so has it, whatever its extension. */
     const char *unread;
+    bool (*recognises)(const uint8_t *data, size_t bytes);
 };
 
 #endif

@@ -18,10 +18,12 @@
     ROW(stl)                                                                   \
     ROW(las)                                                                   \
     ROW(laz)                                                                   \
+    ROW(e57)                                                                   \
     ROW(vtu)                                                                   \
     ROW(vtk)                                                                   \
     ROW(vtp)                                                                   \
     ROW(vts)                                                                   \
+    ROW(vtkhdf)                                                                \
     ROW(msh)                                                                   \
     ROW(mesh)                                                                  \
     ROW(npy)                                                                   \
@@ -81,6 +83,15 @@ const struct host_format *host_format_of(const char *path, enum host_use use) {
     return f == NULL || !has_use(f, use) || (written && host_is_packed(path))
                ? NULL
                : f;
+}
+
+const struct host_format *host_format_recognised(const uint8_t *data,
+                                                 size_t bytes) {
+    const struct host_format *f;
+    for (unsigned i = 0; (f = host_format_row(i)) != NULL; i++)
+        if (f->recognises != NULL && f->recognises(data, bytes))
+            break;
+    return f;
 }
 
 /* --- for people ----------------------------------------------------------- */

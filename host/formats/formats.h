@@ -25,6 +25,11 @@ const struct host_format *host_format_named(const char *path);
  * written. */
 const struct host_format *host_format_of(const char *path, enum host_use use);
 
+/* Of the formats that are not read, the one that a file which begins so has;
+ * NULL: none. */
+const struct host_format *host_format_recognised(const uint8_t *data,
+                                                 size_t bytes);
+
 /* The format that an option --format names, as an extension does, with or
  * without its dot ("las", ".xyz.gz").  NULL with HOST_USAGE, and what is
  * allowed, where none that has the use is called so. */

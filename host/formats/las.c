@@ -1,16 +1,23 @@
-/* .las of laser scanners, versions 1.0 to 1.4 (ASPRS, LAS Specification 1.4
- * R15, 2019: Tables 3 and 7 to 17): x, y and z of every point record, also of
- * those that are marked as withheld, for rows are numbered by records.  What
- * LASzip has compressed (.laz, or a .las with its mark) is not read. */
+/* Files of laser scanners.  .las, versions 1.0 to 1.4 (ASPRS, LAS
+ * Specification 1.4 R15, 2019: Tables 3 and 7 to 17): x, y and z of every point
+ * record, also of those that are marked as withheld, for rows are numbered by
+ * records.  What LASzip has compressed (.laz, or a .las with its mark) is not
+ * read, nor is .e57 (ASTM E2807). */
 #include <string.h>
 
 #include "format.h"
 #include "rows.h"
 
 #define COMPRESSED                                                             \
-    "its points are compressed, which is not read; unpack them with laszip "   \
-    "-i IN.laz -o OUT.las (of LAStools) or pdal translate IN.laz OUT.las, "    \
-    "neither of them in Debian 12"
+    "LAS whose points LASzip has compressed, which is not read; unpack them "  \
+    "with laszip -i IN.laz -o OUT.las (of LAStools) or pdal translate IN.laz " \
+    "OUT.las (PDAL of conda-forge); Debian 12 has neither"
+
+#define SCANS                                                                  \
+    "E57 (ASTM E2807), which is not read; convert it with pdal translate "     \
+    "IN.e57 OUT.las (PDAL of conda-forge, with its plugin for E57) or "        \
+    "e572las -i IN.e57 -o OUT.las (of LAStools); Debian 12 has neither, and "  \
+    "its CloudCompare reads no E57"
 
 /* Where fields are. */
 enum {
@@ -41,6 +48,17 @@ static uint64_t field(const struct host_source *source, size_t at,
     return host_whole_at(source->data + at, type, false);
 }
 
+static bool is_laz(const uint8_t *data, size_t bytes) {
+    return bytes > AT_FORMAT && memcmp(data, "LASF", 4) == 0 &&
+           (data[AT_FORMAT] & MARKS_OF_LASZIP) != 0;
+}
+
+static bool is_e57(const uint8_t *data, size_t bytes) {
+    static const char signature[] = "ASTM-E57";
+    return bytes >= strlen(signature) &&
+           memcmp(data, signature, strlen(signature)) == 0;
+}
+
 /* What is known of versions and of formats. */
 static int check_known(const struct host_source *source, const struct las *las,
                        struct host_error *error) {
@@ -50,8 +68,6 @@ static int check_known(const struct host_source *source, const struct las *las,
                          "to one of these",
                          source->path, source->data[AT_MAJOR], las->minor);
     }
-    if ((las->format & MARKS_OF_LASZIP) != 0)
-        return host_source_fail(source, error, COMPRESSED);
     if (las->format >= FORMATS) {
         return host_fail(error, HOST_INPUT,
                          "%s: point record format %u, where 0 to 10 are read; "
@@ -199,4 +215,12 @@ const struct host_format host_format_laz = {
     .name = "LASzip",
     .extensions = {".laz"},
     .unread = COMPRESSED,
+    .recognises = is_laz,
+};
+
+const struct host_format host_format_e57 = {
+    .name = "E57",
+    .extensions = {".e57"},
+    .unread = SCANS,
+    .recognises = is_e57,
 };

@@ -63,12 +63,21 @@ static bool ends_in_cr(const struct host_source *source) {
            memchr(data, '\0', source->bytes) == NULL;
 }
 
-/* Replaces such CRs by LFs, in the file's own bytes or, if the bytes are the
- * caller's, in a copy.  A packed file is held whole if its lines end so, or if
- * its format needs that. */
-static int mend_line_ends(struct host_source *source,
-                          const struct host_format *format,
-                          struct host_error *error) {
+/* What is certainly of a format that is not read, whatever its name says. */
+static int refuse_unread(const struct host_source *source,
+                         struct host_error *error) {
+    const struct host_format *format =
+        host_format_recognised(source->data, source->bytes);
+    return format == NULL ? 0 : host_source_fail(source, error, format->unread);
+}
+
+/* Refuses what is not read, and replaces such CRs by LFs, in the file's own
+ * bytes or, if the bytes are the caller's, in a copy.  A packed file is held
+ * whole if its lines end so, or if its format needs that. */
+static int prepare(struct host_source *source, const struct host_format *format,
+                   struct host_error *error) {
+    if (refuse_unread(source, error) != 0)
+        return error->code;
     bool mends = ends_in_cr(source);
     if ((mends || !format->pieces) && host_source_hold(source, error) != 0)
         return error->code;
@@ -96,7 +105,7 @@ static int take_points(struct host_source *source,
                        struct host_points *points, struct host_error *error) {
     struct host_mesh mesh = {.points = points};
     host_progress_phase("reading", "Mpoint");
-    if (mend_line_ends(source, format, error) == 0) {
+    if (prepare(source, format, error) == 0) {
         format->read_points(source, &mesh, error);
         host_source_fault(source, error);
     }
@@ -173,7 +182,7 @@ static int take_tetrahedra(struct host_source *source,
                            struct host_points *points,
                            struct host_error *error) {
     struct host_mesh mesh = {.points = points, .tets = tets};
-    if (mend_line_ends(source, format, error) == 0) {
+    if (prepare(source, format, error) == 0) {
         format->read_tetrahedra(source, &mesh, error);
         host_source_fault(source, error);
     }

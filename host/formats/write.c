@@ -55,9 +55,10 @@ int host_points_write(const char *path, const struct host_points *points,
 }
 
 int host_write_check(const char *path, struct host_error *error) {
-    return host_format_of(path, HOST_WRITE_TETRAHEDRA) != NULL
-               ? 0
-               : refuse(path, "tetrahedra", HOST_WRITE_TETRAHEDRA, error);
+    const struct host_format *f = host_format_of(path, HOST_WRITE_TETRAHEDRA);
+    if (f == NULL)
+        return refuse(path, "tetrahedra", HOST_WRITE_TETRAHEDRA, error);
+    return f->check_output == NULL ? 0 : f->check_output(path, error);
 }
 
 /* The extension of file k of those that belong beside the output `path`; NULL:

@@ -39,7 +39,8 @@ int host_write(const char *path, const char *input,
 bool host_write_leaves(const char *input, const char *name);
 
 /* 0 where `path` has an extension that host_write knows, else HOST_USAGE with
- * the list of those that are allowed.  For checking before the work starts. */
+ * the list of those that are allowed; HOST_INPUT where the format lacks its
+ * library.  For checking before the work starts. */
 int host_write_check(const char *path, struct host_error *error);
 
 /* File k of those that the output `path` makes, 0 being itself; NULL: there is

@@ -19,3 +19,13 @@ $(BUILD)/libincode.o: $(library_objects)
 $(BUILD)/libincode.a: $(BUILD)/libincode.o
 	@rm -f $@
 	@$(AR) rcsD $@ $^
+
+# What programs that are linked with the library rely on: the symbols of the last
+# release, and the types that these reach.  Made again at a release;
+# tests/system/full/abi.sh compares it with what is built.
+$(call usual,ABI,host/library/libincode.abi)
+abi: $(BUILD)/libincode.so.0
+	$(say) ABI '$(ABI)'
+	$(Q)abidw --exported-interfaces-only --drop-undefined-syms --no-elf-needed \
+		--no-comp-dir-path --no-corpus-path --no-architecture --no-show-locs \
+		--type-id-style hash --out-file '$(ABI)' $<

@@ -88,8 +88,93 @@ refuses 'formats/--format of no format' 2 \
     incode run "$scratch/a.stl" --format frob -o "$scratch/left/o.npy"
 refuses 'formats/no format is told' 3 'pipe: .*--format' incode run \
     "$scratch/pipe" -q -o "$scratch/left/o.npy"
-refuses 'formats/.laz' 3 'a.laz: .*; unpack them with laszip' incode run \
-    "$scratch/a.laz" -q -o "$scratch/left/o.npy"
+
+# VTKHDF, out and in, and by what h5py writes: the library is loaded for it alone.
+needs=$(readelf -d "$INCODE" "$BUILD/libincode.so.0" 2>&1)
+check 'formats/HDF5 is linked nowhere' "$needs" \
+    bash -c '[[ $0 = *libexpat* && $0 = *libm.so* && $0 != *hdf5* ]]' "$needs"
+succeeds 'formats/.vtkhdf, written' incode run "$from" -q \
+    -o "$scratch/a.vtkhdf" -o "$scratch/a.ele"
+wanted=$(incode digest "$scratch/a.ele")
+found=$(incode digest "$scratch/a.vtkhdf" 2>&1)
+check 'formats/.vtkhdf, read' "$found, not $wanted" \
+    [ "$found:${wanted%%:*}" = "$wanted:sha256" ]
+succeeds 'formats/.hdf of .ele' incode convert "$scratch/a.ele" "$scratch/b.hdf"
+check 'formats/.vtkhdf is one set of bytes' 'they differ' \
+    cmp "$scratch/a.vtkhdf" "$scratch/b.hdf"
+incode verify --format hdf - "$scratch/a.ele" < "$scratch/b.hdf" \
+    > "$scratch/verified" 2>&1
+check 'formats/.hdf, standard input' "$(last "$scratch/verified")" \
+    grep -q 'the Delaunay triangulation of' "$scratch/verified"
+same '.vtkhdf, its points' "$scratch/a.vtkhdf"
+gzip -kc "$scratch/a.vtkhdf" > "$scratch/d.vtkhdf.gz"
+same '.vtkhdf.gz' "$scratch/d.vtkhdf.gz"
+if ! /usr/bin/python3 -c 'import h5py' 2> "$scratch/said"; then
+    skip 'formats/VTKHDF of h5py' 'there is no python3-h5py; make deps installs it'
+else
+    /usr/bin/python3 tests/system/vtkhdf.py "$from" "$scratch"
+    for kind in grid parts poly variable; do
+        same "VTKHDF of h5py: $kind" "$scratch/$kind.vtkhdf"
+    done
+    incode convert "$scratch/single.vtkhdf" "$scratch/single.0.xyz"
+    incode convert "$scratch/single.npy" "$scratch/single.1.xyz"
+    check 'formats/VTKHDF of h5py: single' 'its points are others' \
+        cmp "$scratch/single.0.xyz" "$scratch/single.1.xyz"
+    found=$(incode digest "$scratch/pair.hdf" 2>&1)
+    wanted=$(incode digest "$scratch/pair.ele" 2>&1)
+    check 'formats/cells of two partitions' "$found, not $wanted" \
+        [ "$found:${wanted%%:*}" = "$wanted:sha256" ]
+    while read -r name pattern; do
+        refuses "formats/VTKHDF of h5py: $name" 3 "$name.vtkhdf: $pattern" \
+            incode run "$scratch/$name.vtkhdf" -q -o "$scratch/left/o.npy"
+    done <<-'END'
+		version VTKHDF 3.0, where 1.x and 2.x are read;
+		image its Type is neither UnstructuredGrid nor PolyData;
+		steps it has several steps of time;
+		none HDF5 without a group VTKHDF
+		sum the points of its partitions are not those of Points;
+		many more than 2.32 points;
+		filter /VTKHDF/Points is packed by a filter of number 32000,
+		empty /VTKHDF/Points claims more numbers than the file holds;
+		linked /VTKHDF/Points is not there or not to be read;
+		outside /VTKHDF/Points claims more numbers than the file holds;
+		flat /VTKHDF/Points has another shape or type;
+	END
+    refuses 'formats/no cells in PolyData' 3 'poly.vtkhdf: PolyData, which has' \
+        incode digest "$scratch/poly.vtkhdf"
+fi
+
+# A library that breaks down is an error, and so is one that is not there.
+soname=$(strings -a "$INCODE" | grep -m 1 '^libhdf5')
+mkdir "$scratch/lib"
+breaks='HDF5.s library has broken down on it .Illegal instruction.'
+echo '__attribute__((constructor)) void f(void) { __builtin_trap(); }' |
+    gcc -shared -fPIC -x c - -o "$scratch/lib/${soname:-none}"
+for what in "$breaks" "needs a library that cannot be loaded .*; install .*hdf5"; do
+    refuses "formats/.vtkhdf, in: ${what:0:20}" 3 "a.vtkhdf: .*$what" \
+        env LD_LIBRARY_PATH="$scratch/lib" "$INCODE" run "$scratch/a.vtkhdf" -q \
+        -o "$scratch/left/o.npy"
+    refuses "formats/.vtkhdf, out: ${what:0:20}" 3 "o.vtkhdf: .*$what" \
+        env LD_LIBRARY_PATH="$scratch/lib" "$INCODE" run "$from" -q \
+        -o "$scratch/left/o.vtkhdf"
+    : > "$scratch/lib/${soname:-none}"
+done
+
+# What is known and not read, by its extension or by its first bytes.
+laz='LAS whose points LASzip has compressed.*; unpack them with laszip'
+e57='E57 .ASTM E2807., which is not read; convert it with pdal translate'
+{
+    head -c 104 "$scratch/a.las" && printf '\x83' && tail -c +106 "$scratch/a.las"
+} > "$scratch/marked.las"
+printf 'ASTM-E57\1\0\0\0\0\0\0\0' > "$scratch/scans.xyz"
+refuses 'formats/.laz' 3 "a.laz: $laz" incode run "$scratch/a.laz" -q \
+    -o "$scratch/left/o.npy"
+refuses 'formats/.e57' 3 "a.e57: $e57" incode run "$scratch/a.e57" -q \
+    -o "$scratch/left/o.npy"
+refuses 'formats/compressed, in .las' 3 "marked.las: $laz" incode run \
+    "$scratch/marked.las" -q -o "$scratch/left/o.npy"
+refuses 'formats/E57, in .xyz' 3 "scans.xyz: $e57" incode convert \
+    "$scratch/scans.xyz" "$scratch/left/o.npy"
 help=$(incode run --help | tr -s ' \n' ' ')
 check 'formats/--help lists them' "$help" \
     grep -qF '.xyz .txt .pts .csv .node .ply .off .obj .stl .las' <<< "$help"

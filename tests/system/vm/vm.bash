@@ -8,7 +8,7 @@
 vm=$(realpath -m "${VM:-$BUILD/vm}")
 vm_packages='busybox-static libserialport-dev libjansson-dev nettle-dev
     libexpat1-dev libpng-dev zlib1g-dev libsodium-dev libconfig-dev
-    libgpiod-dev libedit-dev libbsd-dev libmd-dev libncurses-dev'
+    libgpiod-dev libedit-dev libhdf5-dev libbsd-dev libmd-dev libncurses-dev'
 
 # Packages of another architecture, without a change to this machine's own.
 vm_apt() { # COMMAND...

@@ -115,7 +115,7 @@ TEST(told_by_name) {
         error = (struct host_error){0};
     }
     assert_null(host_format_told("laz", HOST_READ_POINTS, &error));
-    assert_non_null(strstr(error.text, "--format laz: its points are com"));
+    assert_non_null(strstr(error.text, "--format laz: LAS whose points "));
 }
 
 TEST(written_and_read_back) {

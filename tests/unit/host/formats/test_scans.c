@@ -232,7 +232,7 @@ TEST(las_that_is_wrong) {
         {{.minor = 5, .header = 375, .length = 20}, "LAS 1.5, where 1.0 to"},
         {{.format = 11, .header = 227, .length = 99},
          "record format 11, where"},
-        {{.format = 128, .header = 227, .length = 20}, "compressed, which is"},
+        {{.format = 128, .header = 227, .length = 20}, "compressed, which"},
         {{.format = 67, .header = 227, .length = 34}, "laszip -i IN.laz"},
         {{.header = 200, .length = 20}, "a header of 200 bytes"},
         {{.minor = 4, .header = 227, .length = 20}, "a header of 227 bytes"},
@@ -258,6 +258,39 @@ TEST(las_that_is_wrong) {
             fail_msg("expected '%s' in '%s'", wrong[i].why, error.text);
     }
     refused("a.las", "1 2 3\n", "no LAS file");
-    refused("a.laz", "1 2 3\n", "a.laz: its points are compressed, ");
+}
+
+/* Known by extension or by what the file begins with, packed or not. */
+TEST(known_and_not_read) {
+    static struct bytes b;
+    refused("a.laz", "1 2 3\n", "a.laz: LAS whose points LASzip has compr");
     refused("a.LAZ.gz", "1 2 3\n", "pdal translate IN.laz OUT.las");
+    refused("a.e57", "1 2 3\n", "a.e57: E57 (ASTM E2807), which is not read;");
+    refused("a.E57.gz", "1 2 3\n", "pdal translate IN.e57 OUT.las");
+    refused("a.xyz", "ASTM-E57", "a.xyz: E57 (ASTM E2807), which");
+    refused("-", "ASTM-E57\1", "stdin: E57 (ASTM E2807), which");
+    refused("a.npy", "ASTM-E5", "a.npy: ");
+    for (unsigned mark = 0; mark < 256; mark += 64) {
+        const struct las las = {
+            .minor = 2, .format = (uint8_t)mark, .header = 227, .length = 20};
+        struct host_points points;
+        struct host_error error = {0};
+        put_las(&b, &las);
+        assert_int_equal(
+            host_points_parse("a.ply", b.data, b.n, &points, &error),
+            HOST_INPUT);
+        assert_int_equal(strstr(error.text, "ply: LAS whose points") != NULL,
+                         mark != 0);
+        error = (struct host_error){0};
+        assert_int_equal(
+            host_points_parse("a.ply", b.data, 104, &points, &error),
+            HOST_INPUT);
+        assert_null(strstr(error.text, "LAS"));
+    }
+    struct host_tetrahedra tets;
+    struct host_error error = {0};
+    assert_int_equal(
+        host_tetrahedra_parse("a.vtu", "ASTM-E57", 8, &tets, NULL, &error),
+        HOST_INPUT);
+    assert_non_null(strstr(error.text, "a.vtu: E57 (ASTM E2807), which"));
 }

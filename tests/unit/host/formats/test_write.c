@@ -67,8 +67,8 @@ static void write_whole(const char *path, const struct host_points *points,
 }
 
 TEST(written_and_read_back) {
-    static const char *const names[] = {"a.vtu",  "a.vtk", "a.msh",
-                                        "a.mesh", "a.npy", "a.ele"};
+    static const char *const names[] = {"a.vtu",    "a.vtk", "a.msh", "a.mesh",
+                                        "a.vtkhdf", "a.npy", "a.ele"};
     struct host_points points, read;
     struct host_tetrahedra tets, again;
     struct host_error error = {0};
@@ -85,8 +85,8 @@ TEST(written_and_read_back) {
                 fail_msg("%s", error.text);
             assert_int_equal(again.count, tets.count);
             assert_memory_equal(again.v, tets.v, 16 * tets.count);
-            assert_int_equal(read.count, i < 4 ? 200 : 0);
-            if (i < 4)
+            assert_int_equal(read.count, i < 5 ? 200 : 0);
+            if (i < 5)
                 assert_memory_equal(read.xyz, points.xyz, 24 * 200);
             host_tetrahedra_free(&again);
             host_points_free(&read);
@@ -100,7 +100,7 @@ TEST(written_and_read_back) {
     host_points_free(&read);
     host_points_free(&points);
     host_tetrahedra_free(&tets);
-    assert_int_equal(remove_folder(&folder), 9);
+    assert_int_equal(remove_folder(&folder), 10);
 }
 
 /* .neigh and .face against all pairs of tetrahedra. */
@@ -185,7 +185,8 @@ TEST(failures_leave_nothing) {
                      HOST_INPUT);
     error = (struct host_error){0};
     assert_int_equal(host_write_check("a.stl", &error), HOST_USAGE);
-    assert_non_null(strstr(error.text, "use .ele .vtu .vtk .msh .mesh .npy"));
+    assert_non_null(
+        strstr(error.text, "use .ele .vtu .vtk .vtkhdf .hdf .msh "));
     host_points_free(&points);
     host_tetrahedra_free(&tets);
     assert_int_equal(remove_folder(&folder), 0);
@@ -330,8 +331,8 @@ TEST(conversion) {
     triangulate(&points, &tets);
     in_folder(&folder, "a.ele", a);
     write_whole(a, &points, &tets);
-    static const char *const chain[] = {"b.vtu", "b.msh", "b.vtk", "b.mesh",
-                                        "b.npy"};
+    static const char *const chain[] = {"b.vtu",    "b.msh",  "b.vtk",
+                                        "b.vtkhdf", "b.mesh", "b.npy"};
     for (size_t i = 0; i < sizeof chain / sizeof *chain; i++) {
         in_folder(&folder, chain[i], b);
         assert_int_equal(host_convert(a, NULL, b, &error), 0);
@@ -357,7 +358,7 @@ TEST(conversion) {
     host_points_free(&read);
     host_points_free(&points);
     host_tetrahedra_free(&tets);
-    assert_int_equal(remove_folder(&folder), 11);
+    assert_int_equal(remove_folder(&folder), 12);
 }
 
 /* --- coordinates as text -------------------------------------------------- */
