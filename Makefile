@@ -40,9 +40,6 @@ Q = $(if $(V),,@)
 say = @$(if $(V),:,printf '  %-4s %s\n')
 MPI_CFLAGS = $(addprefix -isystem ,$(shell mpicc --showme:incdirs))
 MPI_LIBS = $(addprefix -L,$(shell mpicc --showme:libdirs)) -lmpi
-HOST_LIBS = -ledit -lconfig -lsodium -lserialport -lgpiod -ljansson -lnettle -lexpat \
-	-lpng -lz -lm
-
 # libsodium's own code is the same under either C library; its headers are
 # made visible to musl's compiler alone.
 NODE_LIBS = $(shell $(CC) -print-file-name=libsodium.a)
@@ -65,16 +62,12 @@ boards       := $(filter-out mpi,$(patsubst boards/%/main.c,%,$(wildcard \
 	boards/*/main.c)))
 # Host and node as ranks of Open MPI: no other program is linked with it.
 host_mpi     := host/main_mpi.c $(wildcard host/*/mpi/*.c)
-# The calls of that version of libgpiod which is installed.
-GPIOD        := $(firstword $(subst ., ,$(shell pkg-config --modversion libgpiod \
-	2>/dev/null)) 1)
-host         := $(filter-out host/main.c $(host_mpi),$(call files,host))
-host         := $(filter-out host/cube/lines_gpiod%,$(host)) \
-	host/cube/lines_gpiod$(GPIOD).c
+obj          := $(BUILD)/obj
+.DEFAULT_GOAL := all
+include host/host.mk
 unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
-obj          := $(BUILD)/obj
 core_objects := $(freestanding:%.c=$(obj)/%.o) $(obj)/boards/processor/processor.o
 host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
@@ -101,12 +94,6 @@ libraries    := $(BUILD)/libincode.a $(BUILD)/libincode.so.0
 all: $(programs) $(libraries)
 
 include boards/processor/levels.mk
-
-# HDF5 is loaded when a file calls for it, by the name that it has here.
-hdf5 = $(realpath $(shell $(CC) -print-file-name=libhdf5_serial.so))
-$(obj)/host/formats/hdf5.o: private HOSTED += $(if $(hdf5),-DHDF5_LIBRARY='"$(shell \
-	echo '$(notdir $(hdf5))' | cut -d . -f 1-3)"' -DHDF5_PACKAGE='"$(shell \
-	dpkg-query -S '$(hdf5)' 2> /dev/null | cut -d : -f 1)"')
 
 $(BUILD)/incode: $(obj)/host/main.o $(host_levels) $(BUILD)/libhost.a \
 		$(BUILD)/libcore.a
@@ -147,19 +134,6 @@ $(BUILD)/flags: FORCE
 	@echo '$(CC) $(NODE_CC) $(HOSTED)' | cmp -s - $@ || \
 		echo '$(CC) $(NODE_CC) $(HOSTED)' > $@
 
-ifeq ($(wildcard host/cube/lines_gpiod$(GPIOD).c),)
-host/cube/lines_gpiod$(GPIOD).c:
-	@echo 'make: libgpiod $(GPIOD) is installed; its calls belong in $@,' \
-		'as those of version 1 are in lines_gpiod1.c' >&2
-	@false
-endif
-
-# A simulation's failure names the commit that replays it.
-COMMIT := $(or $(shell git rev-parse --short=12 HEAD 2>/dev/null),unknown)
-$(BUILD)/commit: FORCE
-	@mkdir -p $(@D)
-	@echo '$(COMMIT)' | cmp -s - $@ || echo '$(COMMIT)' > $@
-
 # Vectors are written out where they pay; those that the compiler makes of loops
 # over three coordinates do not.
 $(core_objects): private BASE += -fno-tree-vectorize
@@ -181,10 +155,6 @@ $(obj)/transport/%.o: transport/%.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
-$(obj)/host/sim/sim.o: host/sim/sim.c $(BUILD)/flags $(BUILD)/commit
-	@mkdir -p $(@D)
-	$(say) CC $<
-	$(Q)$(CC) $(HOSTED) -DINCODE_COMMIT='"$(COMMIT)"' -MMD -MP -c $< -o $@
 $(obj)/%.o: %.c $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(say) CC $<
@@ -197,9 +167,6 @@ $(BUILD)/include/sodium.h:
 	@mkdir -p $(@D)
 	@ln -sfn /usr/include/sodium $(@D)/sodium
 	@ln -sfn /usr/include/sodium.h $@
-
-# The script for boards is taken in as it is.
-$(obj)/host/deploy/script.o: host/deploy/board.sh
 
 include tests/tests.mk
 
