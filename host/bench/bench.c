@@ -261,7 +261,8 @@ static const struct host_option rows[] = {
      .most = HOST_BENCH_ROUNDS_MAX},
     {"class", 0, "NAME",
      "One class alone: uniform, files, volumes, real, small, thin, growth, "
-     "extremes or cube; real, small and cube are of the files given",
+     "extremes, locate or cube; real, small and cube are of the files given; "
+     "in locate qhull is scipy",
      .take = take_class},
     {"peers", 0, "LIST",
      "Some peers alone, with commas between: cgal, tetgen, qhull, hxt, hxt2 "

@@ -28,7 +28,8 @@ extern "C" {
 enum incode_status {
     INCODE_OK = 0,
     INCODE_NO_MEMORY,    /* memory or memory_max too small, or no thread */
-    INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, reserved that is not NULL */
+    INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, reserved that is not NULL,
+                            or tetrahedra that are not of these points */
     INCODE_NOT_FINITE,   /* row out->at has a NaN or infinite coordinate */
     INCODE_TOO_FEW,      /* fewer than four distinct points */
     INCODE_FLAT,         /* all points on one plane or line */
@@ -104,8 +105,8 @@ void incode_tetrahedra_free(struct incode_tetrahedra *t);
  * Tetrahedra are closed: facets, edges and vertices belong to them.  `t` is a
  * result for the same xyz with INCODE_NEIGHBORS, in any order.  Exact, and
  * independent of the threads and of the order of queries.  options->flags is 0.
- * On an error, `found` has no meaning; INCODE_NOT_FINITE: *at is the number of
- * a query with a NaN or infinite coordinate.
+ * On an error, `found` has no meaning; INCODE_NOT_FINITE: *at is the lowest
+ * number of a query with a NaN or infinite coordinate.
  *
  * Memory: 32 bytes a query, at most 32 MB; and for each thread 3 KB, and up to
  * 24 bytes for each tetrahedron of the largest star of a vertex that a query
@@ -131,8 +132,11 @@ struct incode_adjacency {
     void *reserved[4];
 };
 
-/* `out` need not be initialised, and owns no memory on an error.
- * options->flags is 0. */
+/* `t` need not have neighbours.  `out` need not be initialised, and owns no
+ * memory on an error.  options->flags is 0.
+ *
+ * Memory: 24 bytes a tetrahedron and 12 a point, the result apart.  Work:
+ * O(tetrahedra) where no vertex has many neighbours. */
 enum incode_status
 incode_adjacency(uint64_t points, const struct incode_tetrahedra *t,
                  const struct incode_options *options, /* or NULL */

@@ -333,8 +333,9 @@ const char *incode_status_text(enum incode_status status) {
         [INCODE_OK] = "the points are triangulated",
         [INCODE_NO_MEMORY] = "there is not enough memory, or no thread; free "
                              "some, or raise memory_max",
-        [INCODE_BAD_ARGUMENT] = "an argument is NULL, a flag is unknown, or "
-                                "what is reserved is not NULL",
+        [INCODE_BAD_ARGUMENT] = "an argument is NULL, a flag is unknown, what "
+                                "is reserved is not NULL, or the tetrahedra "
+                                "are not of these points",
         [INCODE_NOT_FINITE] = "a coordinate is NaN or infinite; `at` is its "
                               "row",
         [INCODE_TOO_FEW] = "there are fewer than four distinct points",
