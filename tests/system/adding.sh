@@ -16,7 +16,6 @@ cp -a tests/*.mk "$tree/tests"
 cp -a tests/arithmetic/*.mk "$tree/tests/arithmetic"
 cp -a "$BUILD/flags" "$BUILD/commit" "$BUILD/obj" "$BUILD"/*.a \
     "$BUILD/node" "$BUILD/include" "$tree/build"
-[ ! -d "$BUILD/levels" ] || cp -a "$BUILD/levels" "$tree/build"
 
 cat > "$tree/host/formats/toy.c" <<'END'
 /* A count, then as many rows; tetrahedra in the same way, with a sibling that
@@ -164,7 +163,7 @@ sed -i 's/ROW(linux)/ROW(linux) ROW(toy)/' "$tree/host/nodes/boards.c"
 # The flags of what is copied, whatever they were: only what has changed is
 # built, and without optimisation.
 if ! "${MAKE:-make}" -C "$tree" --no-print-directory -o build/flags \
-    BUILD=build OPT=-O0 build/incode build/incode-node-toy \
+    BUILD=build OPT=-O0 ARCH=native build/incode build/incode-node-toy \
     build/tests/test_fuzzed \
     > "$scratch/log" 2>&1; then
     fail adding/build "$(grep -m 1 error "$scratch/log")"
