@@ -160,6 +160,7 @@ $(obj)/node/%.o: node/%.c $(BUILD)/flags
 	$(say) CC $<
 	$(Q)$(CC) $(BASE) -MMD -MP -c $< -o $@
 $(mpi_host) $(mpi_node) $(obj)/tests/bench/mpi_hops.o \
+	$(obj)/host/run/launch.o $(obj)/host/bench/bench_links.o \
 	$(obj)/tests/unit/transport/drivers/test_mpi.o: private HOSTED += $(MPI_CFLAGS)
 $(obj)/transport/drivers/%.o: transport/drivers/%.c $(BUILD)/flags
 	@mkdir -p $(@D)

@@ -212,5 +212,6 @@ check 'mpi/no session left' "$found" test -z "$found"
 # It has no time to clean up after itself.
 start 2 "$INCODE"
 began=$SECONDS
-kill -KILL "$(pid_of mpirun 1)"
+# In Open MPI 5 it becomes prterun.
+kill -KILL "$(pid_of '\(mpirun\|prterun\)' 1)"
 ends 'mpi/mpirun killed' 4 '^incode: (mpirun|node [01] \(rank [12]\)): '

@@ -7,7 +7,7 @@ root=${CHROOT:-$scratch/root}
 
 root_leave() {
     umount "$root/dev/pts" "$root/dev/shm" "$root/dev" "$root/proc" \
-        2> /dev/null
+        "$root/sys" 2> /dev/null
 }
 trap 'root_leave; rm -rf --one-file-system "$scratch"' EXIT
 
@@ -36,6 +36,7 @@ root_enter() {
     rm -rf --one-file-system "$root"
     cp -a "$scratch/base" "$root"
     mount -t proc proc "$root/proc"
+    mount -t sysfs -o ro sysfs "$root/sys"
     mount --bind /dev "$root/dev"
     mount -t devpts devpts "$root/dev/pts" 2> /dev/null
     mount -t tmpfs tmpfs "$root/dev/shm" 2> /dev/null
