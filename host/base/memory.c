@@ -104,7 +104,8 @@ static void *move_aside(struct host_scratch *scratch, void *old, size_t from,
 static void *move(void *old, size_t old_bytes, size_t bytes) {
     struct host_scratch *scratch = aside();
     size_t from = space_of(old_bytes), to = space_of(bytes);
-    if (scratch != NULL && bytes > old_bytes && bytes >= scratch->array_min)
+    if (scratch != NULL && bytes > old_bytes &&
+        (bytes >= scratch->array_min || host_scratch_has(scratch, old)))
         return move_aside(scratch, old, from, bytes);
     if (to <= from) { /* which cannot fail */
         if (to < from)
