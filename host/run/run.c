@@ -540,6 +540,8 @@ static int begin_call(const struct host_run_options *options,
         .threads = options->threads == 0 ? host_processors() : options->threads,
         .memory_max = UINT64_MAX};
     if (options->host_memory > 0) {
+        uint64_t most = options->host_memory / HOST_RESIDENT_MIN;
+        call->threads = most < call->threads ? (unsigned)most : call->threads;
         if (host_scratch_begin(scratch, scratch_folder(options),
                                options->host_memory, call->threads, error) != 0)
             return error->code;
