@@ -254,9 +254,6 @@ static void do_region(struct worker *w, uint32_t number) {
         if (step == INCODE_FINISHED)
             return;
         if (step == INCODE_FULL || w->is_hopeless) {
-                fprintf(stderr, "FULL region %u of %u points %u hopeless %d\n",
-                        number, w->run->order->regions, r->points,
-                        w->is_hopeless);
             give_up_region(w, r);
             return;
         }
@@ -644,7 +641,9 @@ static enum host_direct run_order(struct common *common,
     for (unsigned i = 0; i < threads && sums != NULL; i++)
         sums->part[i].statistics.tetrahedra_kept = list[i].count;
     if (outcome == HOST_DIRECT_DONE &&
-        host_tetrahedra_join(list, threads, order->row, common->error) != 0)
+        host_tetrahedra_join(
+            list, threads, sums != NULL && sums->by_vertex ? NULL : order->row,
+            common->error) != 0)
         outcome = HOST_DIRECT_MEMORY;
     if (outcome == HOST_DIRECT_DONE) {
         *tets = list[0];
