@@ -472,6 +472,12 @@ static int parse_run(int argc, char **argv, bool silent,
                          "a cube of nodes; leave one of the two out",
                          of_cube);
     }
+    if (!options->direct && options->host_memory > 0) {
+        return host_fail(error, HOST_USAGE,
+                         "--host-memory: limits a run on threads, and --%s "
+                         "speaks of a cube of nodes; leave one of the two out",
+                         of_cube == NULL ? "slow" : of_cube);
+    }
     return check_together(options, given, error);
 }
 

@@ -547,7 +547,31 @@ static int begin_call(const struct host_run_options *options,
             return error->code;
         call->scratch = scratch;
     }
-    host_call_enter(call);
+    if (options->direct)
+        host_call_enter(call);
+    return 0;
+}
+
+/* Refuses what the disk has no room for before the run takes time: at most the
+ * tetrahedra of a volume twice over, and the points in their order. */
+static int check_scratch(const struct host_run_options *options,
+                         const struct host_scratch *scratch, uint64_t points,
+                         struct host_error *error) {
+    enum { POINT_BYTES = 320 };
+    const double mb = 1e6;
+    uint64_t need = points * POINT_BYTES;
+    uint64_t room = host_scratch_free(scratch) + scratch->bytes;
+    if (room < need) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %.0f MB are free on its file system, and %.0f MB "
+                         "may be put aside; free some, or give another as "
+                         "--scratch DIR",
+                         scratch->directory, (double)room / mb,
+                         (double)need / mb);
+    }
+    if (!options->quiet)
+        host_note("up to %.0f MB are put aside in %s", (double)need / mb,
+                  scratch->directory);
     return 0;
 }
 
@@ -583,6 +607,8 @@ int host_run(const struct host_run_options *options,
     result->time_read_s = seconds_since(start);
     if (status == 0)
         status = look_at_points(options, &points, error);
+    if (status == 0 && call.scratch != NULL)
+        status = check_scratch(options, &scratch, points.count, error);
     if (status == 0)
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
