@@ -19,6 +19,7 @@
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "choose.h"
+#include "limit.h"
 #include "report.h"
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
@@ -513,76 +514,6 @@ static int look_at_points(const struct host_run_options *options,
     return 0;
 }
 
-/* Where to put aside what is not said: where the first output goes, else /tmp.
- */
-static const char *scratch_folder(const struct host_run_options *options) {
-    static char folder[HOST_PATH_MAX];
-    const char *temporary = getenv("TMPDIR");
-    const char *output = options->outputs > 0 ? options->output[0] : "-";
-    if (options->scratch != NULL)
-        return options->scratch;
-    if (temporary != NULL && temporary[0] != '\0')
-        return temporary;
-    const char *slash = strrchr(output, '/');
-    if (strcmp(output, "-") == 0)
-        return "/tmp";
-    (void)snprintf(folder, sizeof folder, "%.*s",
-                   slash == NULL ? 1 : (int)(slash - output) + 1,
-                   slash == NULL ? "." : output);
-    return folder;
-}
-
-/* All of the run is a call of so many threads, and in so much memory. */
-static int begin_call(const struct host_run_options *options,
-                      struct host_call *call, struct host_scratch *scratch,
-                      struct host_error *error) {
-    *call = (struct host_call){
-        .threads = options->threads == 0 ? host_processors() : options->threads,
-        .memory_max = UINT64_MAX};
-    if (options->host_memory > 0) {
-        uint64_t most = options->host_memory / HOST_RESIDENT_MIN;
-        call->threads = most < call->threads ? (unsigned)most : call->threads;
-        if (host_scratch_begin(scratch, scratch_folder(options),
-                               options->host_memory, call->threads, error) != 0)
-            return error->code;
-        call->scratch = scratch;
-    }
-    if (options->direct)
-        host_call_enter(call);
-    return 0;
-}
-
-/* Refuses what the disk has no room for before the run takes time: at most the
- * tetrahedra of a volume twice over, and the points in their order. */
-static int check_scratch(const struct host_run_options *options,
-                         const struct host_scratch *scratch, uint64_t points,
-                         struct host_error *error) {
-    enum { POINT_BYTES = 320 };
-    const double mb = 1e6;
-    uint64_t need = points * POINT_BYTES;
-    uint64_t room = host_scratch_free(scratch) + scratch->bytes;
-    if (room < need) {
-        return host_fail(error, HOST_INPUT,
-                         "%s: %.0f MB are free on its file system, and %.0f MB "
-                         "may be put aside; free some, or give another as "
-                         "--scratch DIR",
-                         scratch->directory, (double)room / mb,
-                         (double)need / mb);
-    }
-    if (!options->quiet)
-        host_note("up to %.0f MB are put aside in %s", (double)need / mb,
-                  scratch->directory);
-    return 0;
-}
-
-static void end_call(struct host_call *call, struct host_run_result *result) {
-    host_call_enter(NULL);
-    if (call->scratch != NULL) {
-        result->scratch_bytes = call->scratch->bytes_max;
-        host_scratch_end(call->scratch);
-    }
-}
-
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
@@ -593,7 +524,7 @@ int host_run(const struct host_run_options *options,
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
-        begin_call(options, &call, &scratch, error) != 0)
+        host_limit_begin(options, &call, &scratch, error) != 0)
         return error->code;
     result->host_memory = options->host_memory > 0
                               ? options->host_memory
@@ -608,12 +539,12 @@ int host_run(const struct host_run_options *options,
     if (status == 0)
         status = look_at_points(options, &points, error);
     if (status == 0 && call.scratch != NULL)
-        status = check_scratch(options, &scratch, points.count, error);
+        status = host_limit_check(options, &scratch, points.count, error);
     if (status == 0)
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
-    end_call(&call, result);
+    host_limit_end(&call, result);
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL)
