@@ -156,6 +156,7 @@ static int read_all(struct host_source *source, int file,
         if (n == 0)
             return 0;
         source->bytes += (size_t)n;
+        host_call_trim((size_t)n);
         if (source->bound > 0 && source->bytes > source->bound)
             return too_long(source, error);
         host_progress_add((uint64_t)n);
