@@ -2,8 +2,11 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
+#include "parallel.h"
+#include "scratch.h"
 #include "text.h"
 
 int host_fail(struct host_error *error, int code, const char *format, ...) {
@@ -21,6 +24,17 @@ int host_fail(struct host_error *error, int code, const char *format, ...) {
 }
 
 int host_fail_memory(struct host_error *error, const char *what) {
+    const struct host_call *call = host_call();
+    if (call != NULL && call->scratch != NULL && call->scratch->failure != 0) {
+        const struct host_scratch *scratch = call->scratch;
+        return host_fail(
+            error, HOST_INPUT,
+            "%s: no room for %s, %llu bytes beside the %llu that "
+            "are put aside here (%s); free some on its file "
+            "system, or give another as --scratch DIR",
+            scratch->directory, what, (unsigned long long)scratch->wanted,
+            (unsigned long long)scratch->bytes, strerror(scratch->failure));
+    }
     return host_fail(error, HOST_BROKEN,
                      "host: no memory for %s; free some memory or take a "
                      "machine with more",

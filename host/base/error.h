@@ -25,7 +25,8 @@ struct host_error {
 int host_fail(struct host_error *error, int code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* The memory of this machine does not suffice for `what`: HOST_BROKEN. */
+/* The memory of this machine does not suffice for `what`: HOST_BROKEN; or where
+ * this thread's call puts arrays aside (scratch.h), the disk: HOST_INPUT. */
 int host_fail_memory(struct host_error *error, const char *what);
 
 /* The clock by which the host measures and waits. */

@@ -9,6 +9,7 @@
 #include <sys/resource.h>
 
 #include "parallel.h"
+#include "scratch.h"
 
 /* Huge pages need their own alignment.  An array that has a part of one takes
  * it whole: a fault for each of its pages costs more than clearing it. */
@@ -53,23 +54,64 @@ static void refund(size_t bytes) {
         atomic_fetch_sub(&call->memory, bytes);
 }
 
+/* What this thread's call puts aside; NULL: nothing. */
+static struct host_scratch *aside(void) {
+    struct host_call *call = host_call();
+    return call == NULL ? NULL : call->scratch;
+}
+
+static void *map(size_t bytes) {
+    struct host_scratch *scratch = aside();
+    void *array = reserve(bytes);
+    if (array == NULL)
+        return NULL;
+    if (scratch == NULL || bytes < scratch->array_min) {
+        (void)madvise(array, space_of(bytes), MADV_HUGEPAGE);
+    } else if (!host_scratch_map(scratch, array, bytes)) {
+        (void)munmap(array, space_of(bytes));
+        return NULL;
+    }
+    return array;
+}
+
 void *host_map(size_t bytes) {
     bytes = bytes == 0 ? 1 : bytes;
     if (!charge(bytes))
         return NULL;
-    void *array = reserve(bytes);
-    if (array != NULL)
-        (void)madvise(array, space_of(bytes), MADV_HUGEPAGE);
-    else
+    void *array = map(bytes);
+    if (array == NULL)
         refund(bytes);
     return array;
 }
 
+/* The same of an array that is put aside, or will be. */
+static void *move_aside(struct host_scratch *scratch, void *old, size_t from,
+                        size_t bytes) {
+    bool has = host_scratch_has(scratch, old);
+    void *space = has ? reserve(bytes) : map(bytes);
+    if (space == NULL)
+        return NULL;
+    if (!has) {
+        memcpy(space, old, from); /* which is small */
+    } else if (!host_scratch_move(scratch, old, space, bytes)) {
+        (void)munmap(space, space_of(bytes));
+        return NULL;
+    }
+    (void)munmap(old, from);
+    return space;
+}
+
 static void *move(void *old, size_t old_bytes, size_t bytes) {
+    struct host_scratch *scratch = aside();
     size_t from = space_of(old_bytes), to = space_of(bytes);
+    if (scratch != NULL && bytes > old_bytes &&
+        (bytes >= scratch->array_min || host_scratch_has(scratch, old)))
+        return move_aside(scratch, old, from, bytes);
     if (to <= from) { /* which cannot fail */
         if (to < from)
             (void)munmap((char *)old + to, from - to);
+        if (scratch != NULL)
+            host_scratch_cut(scratch, old, bytes);
         return old;
     }
     char *space = reserve(bytes);
@@ -115,6 +157,8 @@ void *host_remap(void *old, size_t old_bytes, size_t bytes) {
 void host_unmap(void *array, size_t bytes) {
     bytes = bytes == 0 ? 1 : bytes;
     if (array != NULL) {
+        if (aside() != NULL)
+            (void)host_scratch_unmap(aside(), array);
         (void)munmap(array, space_of(bytes));
         refund(bytes);
     }

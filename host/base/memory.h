@@ -1,5 +1,6 @@
 /* Large arrays straight from the kernel: zeroed, on huge pages where there are
- * any, grown without a copy, given back at once; and how much is left.
+ * any, grown without a copy, given back at once; and how much is left.  In a
+ * call whose resident memory is limited they are put aside (scratch.h).
  *
  * Memory: what is touched, rounded up to 4 KiB. */
 #ifndef HOST_MEMORY_H

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scratch.h"
+
 static _Thread_local struct host_call *call_here;
 
 struct host_call *host_call(void) {
@@ -20,6 +22,27 @@ bool host_call_cancelled(void) {
     const struct host_call *call = call_here;
     return call != NULL &&
            atomic_load_explicit(&call->cancelled, memory_order_relaxed);
+}
+
+static _Thread_local size_t touched_here; /* since this thread looked */
+
+void host_call_trim(size_t touched) {
+    struct host_call *call = call_here;
+    if (call == NULL || call->scratch == NULL)
+        return;
+    touched_here += touched;
+    if (touched_here < call->scratch->step)
+        return;
+    touched_here = 0;
+    host_scratch_trim(call->scratch);
+}
+
+size_t host_call_share(void) {
+    enum { SHARE = 8 };
+    const struct host_call *call = call_here;
+    return call == NULL || call->scratch == NULL
+               ? SIZE_MAX
+               : (size_t)(call->scratch->resident_max / SHARE / call->threads);
 }
 
 /* Processors that the quota "MAX PERIOD" of a control group in `folder` gives,
@@ -76,6 +99,8 @@ static void *trampoline(void *argument) {
     struct host_fork *fork = argument;
     call_here = fork->call;
     fork->function(fork->argument);
+    if (call_here != NULL && call_here->scratch != NULL)
+        host_scratch_ended(call_here->scratch, touched_here);
     return NULL;
 }
 

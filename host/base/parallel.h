@@ -19,9 +19,10 @@ struct host_call {
     uint64_t memory_max;     /* bytes; UINT64_MAX: no limit */
     _Atomic uint64_t memory; /* bytes that host_map has given and not got back
                               */
-    atomic_bool cancelled;   /* what works for the call is to end */
-    _Atomic uint32_t bricks; /* whose tetrahedra are made */
-    _Atomic unsigned phases; /* enum of the library: which are behind it */
+    struct host_scratch *scratch; /* scratch.h; NULL: arrays stay in memory */
+    atomic_bool cancelled;        /* what works for the call is to end */
+    _Atomic uint32_t bricks;      /* whose tetrahedra are made */
+    _Atomic unsigned phases;      /* enum of the library: which are behind it */
 };
 
 /* The call that this thread works for, or NULL. */
@@ -32,6 +33,16 @@ void host_call_enter(struct host_call *call);
 
 /* Whether this thread's call is cancelled: loops over many points poll it. */
 bool host_call_cancelled(void);
+
+/* Of a call that puts arrays aside: this thread has touched so many more bytes
+ * of them.  Loops over arrays that grow with the input call it after each
+ * block, a small part of the limit: 64 KiB, or 64 KiB for each place where it
+ * reads in no order, as the kernel maps so much around it. */
+void host_call_trim(size_t touched);
+
+/* Bytes of arrays that each thread of this thread's call may have resident at
+ * once, beside what others need; SIZE_MAX: as many as there are. */
+size_t host_call_share(void);
 
 /* Processors that affinity and the quota of control groups leave to this
  * process, 1 to HOST_THREADS_MAX. */

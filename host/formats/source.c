@@ -10,6 +10,7 @@
 #include <zlib.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/base/progress.h"
 
 enum {
@@ -18,6 +19,7 @@ enum {
     PACKED_SHARE = 4,      /* and for a packed one, held whole */
     WINDOW = 1 << 20,      /* of a file that is unpacked piece by piece */
     WINDOW_MAX = 16 << 20, /* the same, with long lines */
+    READ_MAX = 1 << 18,    /* bytes at a time */
     PACKED_BYTES = 1 << 16
 };
 
@@ -141,8 +143,9 @@ static int read_all(struct host_source *source, int file,
     for (;;) {
         if (reserve(source, hint, error) != 0)
             return error->code;
+        size_t room = source->capacity - source->bytes;
         ssize_t n = read(file, (char *)source->owned + source->bytes,
-                         source->capacity - source->bytes);
+                         room < READ_MAX ? room : READ_MAX);
         if (n < 0 && errno == EINTR)
             continue;
         if (n < 0) {
@@ -153,6 +156,7 @@ static int read_all(struct host_source *source, int file,
         if (n == 0)
             return 0;
         source->bytes += (size_t)n;
+        host_call_trim((size_t)n);
         if (source->bound > 0 && source->bytes > source->bound)
             return too_long(source, error);
         host_progress_add((uint64_t)n);

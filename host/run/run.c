@@ -11,6 +11,7 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/base/progress.h"
+#include "host/base/scratch.h"
 #include "host/formats/output.h"
 #include "host/formats/write.h"
 #include "host/formats/formats.h"
@@ -18,6 +19,7 @@
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "choose.h"
+#include "limit.h"
 #include "report.h"
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
@@ -473,14 +475,9 @@ static int run_on(const struct host_run_options *options,
                   struct host_run_result *result, struct host_run_result *alone,
                   struct host_error *error) {
     struct host_tetrahedra tets = {0};
-    struct host_call call = {
-        .threads = options->threads == 0 ? host_processors() : options->threads,
-        .memory_max = UINT64_MAX};
-    if (options->direct)
-        host_call_enter(&call); /* all that follows takes so many threads */
     alone->time_io_s = result->time_read_s;
     if (options->table && run_alone(options, points, alone, error) != 0)
-        return error->code; /* of a cube: no call has begun */
+        return error->code;
     result->time_io_s = result->time_read_s;
     result->host_cpu_s = -used_seconds(CLOCK_PROCESS_CPUTIME_ID);
     int status = (options->direct ? host_triangulate_direct : host_triangulate)(
@@ -488,7 +485,6 @@ static int run_on(const struct host_run_options *options,
     if (status == 0)
         status = finish(options, points, &tets, result, error);
     host_tetrahedra_free(&tets);
-    host_call_enter(NULL);
     return status;
 }
 
@@ -521,12 +517,18 @@ static int look_at_points(const struct host_run_options *options,
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
+    static struct host_scratch scratch;
+    struct host_call call;
     struct host_points points = {0};
     uint64_t start = host_now_us();
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
-    if (check_outputs(options, error) != 0)
+    if (check_outputs(options, error) != 0 ||
+        host_limit_begin(options, &call, &scratch, error) != 0)
         return error->code;
+    result->host_memory = options->host_memory > 0
+                              ? options->host_memory
+                              : host_memory_available() / 2;
     if (options->anywhere)
         host_progress_begin_anywhere();
     else
@@ -536,10 +538,13 @@ int host_run(const struct host_run_options *options,
     result->time_read_s = seconds_since(start);
     if (status == 0)
         status = look_at_points(options, &points, error);
+    if (status == 0 && call.scratch != NULL)
+        status = host_limit_check(options, &scratch, points.count, error);
     if (status == 0)
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
+    host_limit_end(&call, result);
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL)
@@ -582,6 +587,44 @@ static void take_sums(const struct host_direct_sums *sums,
     host_run_sum_nodes(r);
 }
 
+/* The exact check where it is asked for.  The count of the hull's facets, which
+ * only statistics need, comes from the check that the tetrahedra tile.  What is
+ * put aside is checked by vertex numbers of the order, as neighbours have close
+ * ones: each place of it is read once. */
+static bool is_checked_in_order(const struct host_run_options *options) {
+    return options->host_memory > 0 &&
+           (options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL);
+}
+
+static int check(const struct host_run_options *options,
+                 const struct host_points *points,
+                 const struct host_order *order,
+                 const struct host_tetrahedra *tets, struct host_run_result *r,
+                 struct host_error *error) {
+    bool exact = options->verifying == HOST_VERIFY_ALWAYS;
+    enum host_check_depth depth =
+        exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING;
+    if (!exact && options->stats == NULL)
+        return 0;
+    uint64_t start = host_now_us();
+    host_progress_phase("checking", NULL);
+    struct host_sites sites = {0};
+    if (order != NULL)
+        sites = host_sites_of_order(order);
+    int status = order != NULL
+                     ? host_check(&sites, tets, depth, NULL, &r->check, error)
+                     : host_verify(points, tets, depth, &r->check, error);
+    r->hull_facets = r->check.hull_facets;
+    r->verified = status == 0 && exact;
+    r->checks_failed = status == HOST_UNVERIFIED;
+    r->time_verify_s = 1e-6 * (double)(host_now_us() - start);
+    if (status == HOST_UNVERIFIED) {
+        host_progress_erase();
+        fputs(r->check.text, stderr);
+    }
+    return status;
+}
+
 static int triangulate(const struct host_run_options *options,
                        const struct host_points *points,
                        struct host_tetrahedra *tets, struct host_order *order,
@@ -604,34 +647,14 @@ static int triangulate(const struct host_run_options *options,
     host_progress_phase("triangulating", NULL);
     memset(&sums, 0, sizeof sums);
     sums.committed = show_progress;
+    sums.by_vertex = is_checked_in_order(options);
     if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
         return error->code;
     take_sums(&sums, r);
-    return 0;
-}
-
-/* The exact check where it is asked for.  The count of the hull's facets, which
- * only statistics need, comes from the check that the tetrahedra tile. */
-static int check(const struct host_run_options *options,
-                 const struct host_points *points,
-                 const struct host_tetrahedra *tets, struct host_run_result *r,
-                 struct host_error *error) {
-    bool exact = options->verifying == HOST_VERIFY_ALWAYS;
-    if (!exact && options->stats == NULL)
+    if (!sums.by_vertex)
         return 0;
-    uint64_t start = host_now_us();
-    host_progress_phase("checking", NULL);
-    int status = host_verify(points, tets,
-                             exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING,
-                             &r->check, error);
-    r->hull_facets = r->check.hull_facets;
-    r->verified = status == 0 && exact;
-    r->checks_failed = status == HOST_UNVERIFIED;
-    r->time_verify_s = 1e-6 * (double)(host_now_us() - start);
-    if (status == HOST_UNVERIFIED) {
-        host_progress_erase();
-        fputs(r->check.text, stderr);
-    }
+    status = check(options, points, order, tets, r, error);
+    host_tetrahedra_map(tets, order->row);
     return status;
 }
 
@@ -653,10 +676,13 @@ static int host_triangulate_direct(const struct host_run_options *options,
     double before_s = (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
     int status = triangulate(options, points, tets, &order, result, error);
     host_order_free(&order);
-    result->time_triangulation_s = 1e-6 * (double)(host_now_us() - start);
+    result->time_triangulation_s =
+        1e-6 * (double)(host_now_us() - start) - result->time_verify_s;
     (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     result->host_triangulation_cpu_s =
         (double)used.tv_sec + 1e-9 * (double)used.tv_nsec - before_s;
     result->tetrahedra = tets->count;
-    return status == 0 ? check(options, points, tets, result, error) : status;
+    return status == 0 && !is_checked_in_order(options)
+               ? check(options, points, NULL, tets, result, error)
+               : status;
 }

@@ -16,7 +16,7 @@
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 
-enum { HOST_OUTPUTS_MAX = 16 };
+enum { HOST_OUTPUTS_MAX = 16, HOST_RESIDENT_MIN = 16 << 20 };
 
 struct host_run_result;
 
@@ -41,6 +41,8 @@ struct host_run_options {
      * a second of the host's wire; 0: there are none, or it is fast. */
     unsigned processors;
     uint64_t wire_bytes_s;
+    uint64_t host_memory; /* of the host, the rest is put aside; 0: as it is */
+    const char *scratch;  /* the folder for that; NULL: see run.c */
     uint64_t memory;
     uint64_t patience_s; /* for a node that does not answer */
     const char *cube;    /* a file that describes real nodes, or NULL */
@@ -82,7 +84,9 @@ struct host_run_result {
      * is the clock's of. */
     double host_cpu_s, host_triangulation_cpu_s;
     uint64_t host_peak_bytes;
-    uint64_t pages; /* that there are to be asked for */
+    uint64_t host_memory;   /* what the host may use */
+    uint64_t scratch_bytes; /* put aside, at most at a time */
+    uint64_t pages;         /* that there are to be asked for */
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
     uint64_t bytes_sent, bytes_received; /* on the host's wire */

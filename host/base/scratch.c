@@ -1,0 +1,243 @@
+#include "scratch.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+enum {
+    PAGE = 4096,
+    ARRAY_MIN = 1 << 20, /* smaller ones may be many, and cost little */
+    SHARE = 64,          /* of the limit, such an array at most */
+    BETWEEN = 32,        /* of the limit, what is touched between two looks */
+    ZEROS = 1 << 16
+};
+
+/* A file without a name: it goes when the program goes. */
+static int make_file(const char *directory) {
+    char name[4096];
+    int n = snprintf(name, sizeof name, "%s/incode-scratch-XXXXXX", directory);
+    if (n < 0 || (size_t)n >= sizeof name) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    int file = mkostemp(name, O_CLOEXEC);
+    if (file >= 0)
+        (void)unlink(name);
+    return file;
+}
+
+int host_scratch_begin(struct host_scratch *scratch, const char *directory,
+                       uint64_t resident_max, unsigned threads,
+                       struct host_error *error) {
+    uint64_t share = resident_max / SHARE;
+    memset(scratch, 0, sizeof *scratch);
+    scratch->directory = directory;
+    scratch->resident_max = resident_max;
+    scratch->array_min = share < ARRAY_MIN ? (size_t)share : ARRAY_MIN;
+    scratch->step = (size_t)(resident_max / BETWEEN / threads);
+    (void)pthread_mutex_init(&scratch->lock, NULL);
+    scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (scratch->statm < 0) {
+        return host_fail(error, HOST_BROKEN,
+                         "/proc/self/statm: %s; mount /proc, or leave the "
+                         "limit of memory out",
+                         strerror(errno));
+    }
+    int file = make_file(directory);
+    if (file < 0) {
+        host_fail(error, HOST_INPUT,
+                  "%s: no scratch file can be made here (%s); give another "
+                  "folder as --scratch DIR",
+                  directory, strerror(errno));
+        (void)close(scratch->statm);
+        return error->code;
+    }
+    (void)close(file);
+    return 0;
+}
+
+void host_scratch_end(struct host_scratch *scratch) {
+    while (scratch->arrays > 0)
+        (void)close(scratch->array[--scratch->arrays].file);
+    (void)close(scratch->statm);
+    (void)pthread_mutex_destroy(&scratch->lock);
+}
+
+uint64_t host_scratch_free(const struct host_scratch *scratch) {
+    struct statvfs about;
+    return statvfs(scratch->directory, &about) != 0
+               ? UINT64_MAX
+               : (uint64_t)about.f_bavail * about.f_frsize;
+}
+
+/* --- trims ---------------------------------------------------------------- */
+
+static uint64_t resident(const struct host_scratch *s) {
+    char text[256], *end;
+    ssize_t n = pread(s->statm, text, sizeof text - 1, 0);
+    if (n <= 0)
+        return UINT64_MAX;
+    text[n] = '\0';
+    (void)strtoull(text, &end, 10); /* address space */
+    return strtoull(end, NULL, 10) * PAGE;
+}
+
+static bool is_over(const struct host_scratch *s) {
+    return resident(s) > s->resident_max / 4 * 3;
+}
+
+/* Who finds too much waits for the thread that lets pages leave, and does not
+ * touch more in the meantime. */
+void host_scratch_trim(struct host_scratch *scratch) {
+    if (!is_over(scratch))
+        return;
+    (void)pthread_mutex_lock(&scratch->lock);
+    for (unsigned i = 0; i < scratch->arrays && (i > 0 || is_over(scratch));
+         i++)
+        (void)madvise(scratch->array[i].at, scratch->array[i].bytes,
+                      MADV_DONTNEED);
+    (void)pthread_mutex_unlock(&scratch->lock);
+}
+
+void host_scratch_ended(struct host_scratch *scratch, size_t touched) {
+    uint64_t before = atomic_fetch_add(&scratch->touched, touched);
+    if (before + touched < scratch->step)
+        return;
+    atomic_store(&scratch->touched, 0);
+    host_scratch_trim(scratch);
+}
+
+/* --- arrays --------------------------------------------------------------- */
+
+static size_t whole_pages(size_t bytes) {
+    return (bytes + PAGE - 1) / PAGE * PAGE;
+}
+
+static struct host_scratch_array *find(struct host_scratch *s,
+                                       const void *array) {
+    for (unsigned i = 0; i < s->arrays; i++)
+        if (s->array[i].at == array)
+            return &s->array[i];
+    return NULL;
+}
+
+bool host_scratch_has(struct host_scratch *scratch, const void *array) {
+    (void)pthread_mutex_lock(&scratch->lock);
+    bool has = find(scratch, array) != NULL;
+    (void)pthread_mutex_unlock(&scratch->lock);
+    return has;
+}
+
+/* Where the file system reserves nothing, zeros do. */
+static int write_zeros(int file, size_t from, size_t to) {
+    static const char zeros[ZEROS];
+    while (from < to) {
+        size_t n = to - from < sizeof zeros ? to - from : sizeof zeros;
+        ssize_t written = pwrite(file, zeros, n, (off_t)from);
+        if (written < 0 && errno != EINTR)
+            return errno;
+        from += written > 0 ? (size_t)written : 0;
+    }
+    return 0;
+}
+
+/* Makes a file longer: every byte of it has its place on the disk then.  0 or
+ * errno; then it is as long as before. */
+static int lengthen(int file, size_t from, size_t to) {
+    int failure = 0;
+    do {
+        failure = fallocate(file, 0, (off_t)from, (off_t)(to - from)) != 0
+                      ? errno
+                      : 0;
+    } while (failure == EINTR);
+    if (failure == EOPNOTSUPP || failure == ENOSYS)
+        failure = write_zeros(file, from, to);
+    if (failure != 0)
+        (void)ftruncate(file, (off_t)from);
+    return failure;
+}
+
+static void count(struct host_scratch *s, size_t from, size_t to) {
+    s->bytes += to - from; /* modulo 2^64, where it is less */
+    s->bytes_max = s->bytes > s->bytes_max ? s->bytes : s->bytes_max;
+}
+
+/* Gives the array's file so many bytes and maps it at `space`. */
+static bool place(struct host_scratch *s, struct host_scratch_array *a,
+                  void *space, size_t bytes) {
+    int failure = bytes > a->bytes ? lengthen(a->file, a->bytes, bytes) : 0;
+    if (failure == 0 &&
+        mmap(space, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_FIXED,
+             a->file, 0) == MAP_FAILED) {
+        failure = errno;
+        (void)ftruncate(a->file, (off_t)a->bytes);
+    }
+    if (failure != 0) {
+        s->failure = failure;
+        s->wanted = bytes - a->bytes;
+        return false;
+    }
+    /* What the kernel reads ahead, it keeps in pieces of up to 2 MiB, and maps
+     * a whole piece once a byte of it is touched (since Linux 6.18). */
+    (void)madvise(space, bytes, MADV_NOHUGEPAGE);
+    (void)madvise(space, bytes, MADV_RANDOM);
+    count(s, a->bytes, bytes);
+    a->at = space;
+    a->bytes = bytes;
+    return true;
+}
+
+bool host_scratch_map(struct host_scratch *scratch, void *space, size_t bytes) {
+    bool done = false;
+    (void)pthread_mutex_lock(&scratch->lock);
+    if (scratch->arrays < HOST_SCRATCH_ARRAYS) {
+        struct host_scratch_array *a = &scratch->array[scratch->arrays];
+        *a = (struct host_scratch_array){.file = make_file(scratch->directory)};
+        done = a->file >= 0 && place(scratch, a, space, whole_pages(bytes));
+        if (a->file < 0)
+            scratch->failure = errno;
+        else if (!done)
+            (void)close(a->file);
+        scratch->arrays += done;
+    }
+    (void)pthread_mutex_unlock(&scratch->lock);
+    return done;
+}
+
+bool host_scratch_move(struct host_scratch *scratch, const void *array,
+                       void *space, size_t bytes) {
+    (void)pthread_mutex_lock(&scratch->lock);
+    struct host_scratch_array *a = find(scratch, array);
+    bool done = a != NULL && place(scratch, a, space, whole_pages(bytes));
+    (void)pthread_mutex_unlock(&scratch->lock);
+    return done;
+}
+
+void host_scratch_cut(struct host_scratch *scratch, const void *array,
+                      size_t bytes) {
+    (void)pthread_mutex_lock(&scratch->lock);
+    struct host_scratch_array *a = find(scratch, array);
+    size_t to = whole_pages(bytes);
+    if (a != NULL && to < a->bytes && ftruncate(a->file, (off_t)to) == 0) {
+        count(scratch, a->bytes, to);
+        a->bytes = to;
+    }
+    (void)pthread_mutex_unlock(&scratch->lock);
+}
+
+bool host_scratch_unmap(struct host_scratch *scratch, const void *array) {
+    (void)pthread_mutex_lock(&scratch->lock);
+    struct host_scratch_array *a = find(scratch, array);
+    if (a != NULL) {
+        count(scratch, a->bytes, 0);
+        (void)close(a->file);
+        *a = scratch->array[--scratch->arrays];
+    }
+    (void)pthread_mutex_unlock(&scratch->lock);
+    return a != NULL;
+}

@@ -1,0 +1,91 @@
+/* Large arrays of a call whose resident memory is limited (parallel.h): each is
+ * a file of its own in the scratch directory, without a name, that is mapped.
+ * Its pages leave the process when there are too many, and come back from the
+ * kernel's cache of files, or from the disk, when they are touched.
+ *
+ *   static struct host_scratch scratch;
+ *   struct host_call call = {.threads = 2, .memory_max = UINT64_MAX};
+ *   if (host_scratch_begin(&scratch, "/tmp", 64 << 20, 2, &error) == 0)
+ *       call.scratch = &scratch;
+ *   host_call_enter(&call);
+ *   double *a = host_map(n * sizeof *a);      (memory.h; and host_unmap)
+ *   for (size_t i = 0; i < n; i += BLOCK) {
+ *       work(a + i, BLOCK);
+ *       host_call_trim(BLOCK * sizeof *a);    (parallel.h)
+ *   }
+ *   host_call_enter(NULL);
+ *   host_scratch_end(&scratch);
+ *
+ * An array is unmapped by a thread of the call that mapped it.  A file is
+ * reserved whole, so that a full disk is an error of host_map and never a
+ * signal.
+ *
+ * Memory: 24 KiB.  Of arrays, what threads touch between two trims is resident
+ * beyond three quarters of the limit: a 32nd of it in all.  Work: 2 us a trim
+ * that looks, 60 ns a page that leaves, about 1 us a page that comes back. */
+#ifndef HOST_SCRATCH_H
+#define HOST_SCRATCH_H
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "error.h"
+
+enum { HOST_SCRATCH_ARRAYS = 1024 };
+
+struct host_scratch_array {
+    char *at;
+    size_t bytes; /* of its file, in whole pages */
+    int file;
+};
+
+struct host_scratch {
+    const char *directory;
+    uint64_t resident_max; /* bytes of this process */
+    size_t array_min;      /* bytes of an array that becomes a file */
+    size_t step;           /* bytes that a thread touches between two looks */
+    int statm;             /* tells how much is resident */
+    pthread_mutex_t lock;  /* of all that follows */
+    struct host_scratch_array array[HOST_SCRATCH_ARRAYS];
+    unsigned arrays;
+    uint64_t bytes, bytes_max; /* of all files, now and at most */
+    uint64_t wanted;           /* bytes that were not to be had, */
+    int failure;               /* and errno; 0: there was no failure */
+    _Atomic uint64_t touched;  /* by threads that have ended */
+};
+
+/* directory outlives the scratch.  HOST_INPUT: no file can be made there. */
+int host_scratch_begin(struct host_scratch *scratch, const char *directory,
+                       uint64_t resident_max, unsigned threads,
+                       struct host_error *error);
+/* Closes the files of arrays that are still there. */
+void host_scratch_end(struct host_scratch *scratch);
+
+/* Bytes that the file system of the directory leaves to this user. */
+uint64_t host_scratch_free(const struct host_scratch *scratch);
+
+/* Lets all arrays' pages leave where more than three quarters of the limit are
+ * resident. */
+void host_scratch_trim(struct host_scratch *scratch);
+
+/* Adds what a thread that ends has touched since it looked. */
+void host_scratch_ended(struct host_scratch *scratch, size_t touched);
+
+/* The rest is for host_map and its kin.  space: address space that is reserved,
+ * where the array comes to stand. */
+
+bool host_scratch_has(struct host_scratch *scratch, const void *array);
+bool host_scratch_map(struct host_scratch *scratch, void *space, size_t bytes);
+/* The array stands at `space`, too, from then on.  False: it is as it was. */
+bool host_scratch_move(struct host_scratch *scratch, const void *array,
+                       void *space, size_t bytes);
+/* Gives back what the file has beyond `bytes`. */
+void host_scratch_cut(struct host_scratch *scratch, const void *array,
+                      size_t bytes);
+/* Closes its file; false: it has none. */
+bool host_scratch_unmap(struct host_scratch *scratch, const void *array);
+
+#endif
