@@ -12,12 +12,12 @@
 
 /* Of the stubs; without them all addresses are NULL, and there is one level. */
 #define OF_STUBS __attribute__((weak, visibility("hidden")))
-typedef void *const *calls;
+typedef const int32_t *calls; /* how far functions are from their table */
 extern calls processor_calls OF_STUBS;
-extern void *const processor_x86_64[] OF_STUBS;
-extern void *const processor_x86_64_v2[] OF_STUBS;
-extern void *const processor_x86_64_v3[] OF_STUBS;
-extern void *const processor_x86_64_v4[] OF_STUBS;
+extern const int32_t processor_x86_64[] OF_STUBS;
+extern const int32_t processor_x86_64_v2[] OF_STUBS;
+extern const int32_t processor_x86_64_v3[] OF_STUBS;
+extern const int32_t processor_x86_64_v4[] OF_STUBS;
 
 static const struct level {
     const char *name;
