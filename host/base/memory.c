@@ -72,7 +72,7 @@ static void *move(void *old, size_t old_bytes, size_t bytes) {
             (void)munmap((char *)old + to, from - to);
         return old;
     }
-    char *space = reserve(to);
+    char *space = reserve(bytes);
     if (space == NULL)
         return NULL;
     /* Move, then grow: one call for both is more than valgrind can follow.

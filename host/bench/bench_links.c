@@ -1,5 +1,6 @@
 #include "bench_links.h"
 
+#include <mpi.h> /* its version alone */
 #include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -321,9 +322,9 @@ static bool run_mpi(struct host_bench_row *row) {
     snprintf(command, sizeof command,
              "OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "
              "timeout 30 mpirun --oversubscribe --bind-to none "
-             "--mca pml ob1 --mca btl self,vader -np 2 '%s' "
+             "--mca pml ob1 --mca btl self,%s -np 2 '%s' "
              "bench-link 2> /dev/null",
-             path);
+             OMPI_MAJOR_VERSION < 5 ? "vader" : "sm", path);
     FILE *said = popen(command, "re");
     bool good =
         said != NULL && fscanf(said, "%lf %lf %lf %lf %lf", &row->bytes_per_s,

@@ -6,6 +6,10 @@
 #include <string.h>
 #include <strings.h>
 #include <zlib.h>
+#if XML_MAJOR_VERSION > 2 ||                                                   \
+    XML_MINOR_VERSION >= 9 /* the other is deprecated */
+#define XML_GetCurrentLineNumber XML_GetCurrentLineNumber64
+#endif
 
 #include "format.h"
 #include "host/base/memory.h"

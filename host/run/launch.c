@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <mpi.h> /* its version alone */
 #include <poll.h>
 #include <signal.h>
 #include <stddef.h>
@@ -231,6 +232,8 @@ static bool placed(void) {
                                         "PE_HOSTFILE",
                                         "LOADL_STEP_ID",
                                         "OMPI_MCA_orte_default_hostfile",
+                                        "PRTE_MCA_prte_default_hostfile",
+                                        "PRTE_MCA_plm_ssh_agent",
                                         "OMPI_MCA_plm_rsh_agent"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; i++)
         if (getenv(names[i]) != NULL)
@@ -243,10 +246,17 @@ static char **command_for(char **argv, char *ranks, char *self) {
     static char *const always[] = {
         "mpirun", "--oversubscribe", "--bind-to", "none", "-x", SOCKET_NAME};
     static char *const as_root[] = {"--allow-run-as-root"};
-    /* One machine: no look for networks, nor for a way to log in elsewhere. */
+    /* One machine: no look for networks, nor for a way to log in elsewhere.
+     * Open MPI 5 calls shared memory sm, and logs in nowhere unless it has to.
+     */
+#if OMPI_MAJOR_VERSION < 5
     static char *const at_home[] = {"--mca", "pml", "ob1",
                                     "--mca", "btl", "self,vader",
                                     "--mca", "plm", "isolated"};
+#else
+    static char *const at_home[] = {"--mca", "pml", "ob1",
+                                    "--mca", "btl", "self,sm"};
+#endif
     size_t count = 0, at = 0;
     while (argv[count] != NULL)
         count++;

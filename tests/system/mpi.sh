@@ -70,7 +70,7 @@ fi
 
 echo 'localhost slots=9' > "$scratch/hosts"
 rm -f "$scratch/out.npy"
-by_hand --hostfile "$scratch/hosts" -np 9 "$INCODE" run "$points" -q \
+by_hand --hostfile "$scratch/hosts" --bind-to none -np 9 "$INCODE" run "$points" -q \
     --link mpi -o "$scratch/out.npy" 2> "$scratch/errors"
 status=$?
 check 'mpi/mpirun with a hostfile' "exit $status: $(last "$scratch/errors")" \
@@ -79,7 +79,7 @@ check 'mpi/mpirun with a hostfile' "exit $status: $(last "$scratch/errors")" \
 # As on machines that share no memory: ranks look for messages themselves.
 rm -f "$scratch/out.npy"
 INCODE_MPI_APART=1 by_hand -x INCODE_MPI_APART --oversubscribe --mca pml ob1 \
-    --mca btl self,tcp -np 9 "$INCODE" run "$points" -q --link mpi \
+    --mca btl self,tcp --mca btl_tcp_if_include lo -np 9 "$INCODE" run "$points" -q --link mpi \
     -o "$scratch/out.npy" 2> "$scratch/errors"
 status=$?
 check 'mpi/ranks that share no memory' "exit $status: $(last "$scratch/errors")" \
@@ -212,5 +212,6 @@ check 'mpi/no session left' "$found" test -z "$found"
 # It has no time to clean up after itself.
 start 2 "$INCODE"
 began=$SECONDS
-kill -KILL "$(pid_of mpirun 1)"
+# In Open MPI 5 it becomes prterun.
+kill -KILL "$(pid_of '\(mpirun\|prterun\)' 1)"
 ends 'mpi/mpirun killed' 4 '^incode: (mpirun|node [01] \(rank [12]\)): '

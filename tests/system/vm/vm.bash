@@ -71,7 +71,9 @@ need_vm() {
     # What else is put into $disk, the machine has as /.
     disk=$scratch/disk
     mkdir -p "$disk/bin" "$disk/proc" "$disk/sys" "$disk/dev"
-    cp "$vm/root/bin/busybox" "${@/#/$vm/build/}" "$disk/bin/"
+    # In /bin, or in /usr/bin since Debian 13.
+    find "$vm/root" -path '*/bin/busybox' -type f -exec cp {} "$disk/bin/" \;
+    cp "${@/#/$vm/build/}" "$disk/bin/"
 }
 
 # What the machine does, from standard input, with busybox's commands.

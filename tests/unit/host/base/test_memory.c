@@ -98,3 +98,29 @@ TEST(a_limit) {
 }
 
 TEST_GROUP(enter, leave)
+
+/* Pages of address space that this process has. */
+static unsigned long space(void) {
+    unsigned long pages = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    assert_non_null(file);
+    assert_int_equal(fscanf(file, "%lu", &pages), 1);
+    assert_int_equal(fclose(file), 0);
+    return pages;
+}
+
+/* Sizes on both sides of those from which arrays have whole huge pages. */
+TEST(an_array_that_has_grown_gives_all_of_it_back) {
+    const size_t most = 4 << 20;
+    (void)space();
+    unsigned long before = space();
+    for (size_t from = 1; from < most; from += from / 2 + 4095) {
+        for (size_t to = from; to < most; to += to / 64 + 1000) {
+            void *array = host_map(from);
+            array = array == NULL ? NULL : host_remap(array, from, to);
+            assert_non_null(array);
+            host_unmap(array, to);
+        }
+    }
+    assert_int_equal(space(), before);
+}
