@@ -12,12 +12,12 @@
 
 /* Of the stubs; without them all addresses are NULL, and there is one level. */
 #define OF_STUBS __attribute__((weak, visibility("hidden")))
-typedef void *const *calls;
+typedef const int32_t *calls; /* how far functions are from their table */
 extern calls processor_calls OF_STUBS;
-extern void *const processor_x86_64[] OF_STUBS;
-extern void *const processor_x86_64_v2[] OF_STUBS;
-extern void *const processor_x86_64_v3[] OF_STUBS;
-extern void *const processor_x86_64_v4[] OF_STUBS;
+extern const int32_t processor_x86_64[] OF_STUBS;
+extern const int32_t processor_x86_64_v2[] OF_STUBS;
+extern const int32_t processor_x86_64_v3[] OF_STUBS;
+extern const int32_t processor_x86_64_v4[] OF_STUBS;
 
 static const struct level {
     const char *name;
@@ -88,21 +88,22 @@ const char *processor_force(const char *name) {
     if (name == NULL || name[0] == '\0')
         return NULL;
     if (!has_levels())
-        return "this program is made for one processor";
+        return "this program is built for one processor";
     for (unsigned i = 0; i < LEVELS; i++) {
         if (strcmp(name, levels[i].name) != 0)
             continue;
         if (i > highest())
-            return "this processor, or its system, does not have this level";
+            return "the processor or the operating system does not have this "
+                   "level";
         processor_calls = levels[i].calls;
         return NULL;
     }
-    return "there is no such level of processors";
+    return "x86-64 has no such level";
 }
 
 const char *processor_allowed(void) {
     return has_levels() ? levels[highest()].allowed
-                        : "leave it out, or make the program with ARCH=any";
+                        : "leave it out, or build the program with ARCH=any";
 }
 
 /* The value stands behind the name and a sign. */

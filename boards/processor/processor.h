@@ -1,36 +1,37 @@
-/* Which code of the triangulator runs.  A program for any x86-64 has it
- * compiled once for each level of that architecture (levels.mk).  Each of its
- * functions that others call is a jump through the table of the level that was
- * chosen (stubs), so that callers know nothing of levels, and the results are
- * the same bytes.
+/* Chooses the level of x86-64 whose code runs.  A program for any x86-64
+ * contains the triangulator's code once for each level of the architecture
+ * (levels.mk).  Callers know nothing of levels: each function that they call is
+ * a jump through the table of the chosen level (stubs).  The results are the
+ * same bytes on all levels.
  *
- * A constructor chooses the highest level that processor and system have,
- * before main and before any thread.  A program may force another at its
- * start, and never later:
+ * Before main and before any thread, a constructor chooses the highest level
+ * that the processor and the operating system support.  A program may force
+ * another level at its start, and never later:
  *
  *     const char *what = processor_force(getenv(PROCESSOR_VARIABLE));
  *     if (what != NULL)
  *         refuse(what, processor_allowed());
  *
- * Levels are those of the x86-64 psABI.  Other architectures, and programs that
- * were made with ARCH=, have one level. */
+ * The x86-64 psABI defines the levels.  Programs for other architectures, and
+ * programs that were built with ARCH=, have one level. */
 #ifndef BOARDS_PROCESSOR_PROCESSOR_H
 #define BOARDS_PROCESSOR_PROCESSOR_H
 
 #define PROCESSOR_VARIABLE "INCODE_PROCESSOR"
 
-/* Takes the code of a level, by its name; NULL or "": nothing changes.  Returns
- * NULL, or a static text of why it cannot, and nothing has changed. */
+/* Makes the code of a level run, by the level's name.  NULL and "" change
+ * nothing.  Returns NULL, or the reason of a refusal, a static text; then
+ * nothing has changed. */
 const char *processor_force(const char *name);
 
-/* What may be forced here, for a message: a static text. */
+/* The levels that can be forced here, for a message: a static text. */
 const char *processor_allowed(void);
 
-/* PROCESSOR_VARIABLE with its value as this program has it, for the environment
- * of another; NULL: it has none. */
+/* "INCODE_PROCESSOR=LEVEL" of this program's environment, for the environment
+ * of another program; NULL if the variable is not set. */
 char *processor_variable(void);
 
-/* Name of the level whose code runs; "native": there is one. */
+/* The name of the level whose code runs; "native" if there is only one. */
 const char *processor_level(void);
 
 #endif

@@ -262,7 +262,7 @@ static const struct host_option rows[] = {
     {"class", 0, "NAME",
      "One class alone: uniform, files, volumes, real, small, thin, growth, "
      "extremes, locate or cube; real, small and cube are of the files given; "
-     "in locate qhull is scipy",
+     "in locate the peer qhull is scipy",
      .take = take_class},
     {"peers", 0, "LIST",
      "Some peers alone, with commas between: cgal, tetgen, qhull, hxt, hxt2 "

@@ -62,8 +62,9 @@ struct host_format {
     bool rows_only; /* a file of tetrahedra holds no points */
     bool pieces; /* its readers take a packed file piece by piece, see above */
     bool apart;  /* its bytes are read in a process of its own (hdf5.h) */
-    /* Of a format that is known and not read: "WHY; WHAT TO DO NEXT", and
-     * whether a file that begins so has it, whatever its extension. */
+    /* Of a format that is known and not read: the message "WHY; WHAT TO DO
+     * NEXT", and the test whether a file that begins with these bytes has the
+     * format, whatever its extension. */
     const char *unread;
     bool (*recognises)(const uint8_t *data, size_t bytes);
 };

@@ -48,15 +48,15 @@ static int load(struct host_hdf5 *h, const char *path,
     if (!found) {
         const char *why = dlerror();
         return host_fail(error, HOST_INPUT,
-                         "%s: VTKHDF needs a library that cannot be loaded "
-                         "(%s); install " HDF5_PACKAGE ", or use .vtu",
+                         "%s: VTKHDF needs the HDF5 library, which cannot be "
+                         "loaded (%s); install " HDF5_PACKAGE ", or use .vtu",
                          path, why == NULL ? "it does not start" : why);
     }
     h->H5Eset_auto2(H5E_DEFAULT, NULL, NULL); /* it prints no errors */
     return 0;
 }
 
-/* In memory that both processes have. */
+/* In memory that both processes share. */
 struct report {
     struct host_error error;
     bool done;
@@ -113,7 +113,7 @@ static int run_apart(const struct host_hdf5_work *work, struct report *report,
         *error = report->error;
     } else {
         host_fail(error, HOST_INPUT,
-                  "%s: HDF5's library has broken down on it (%s); %s",
+                  "%s: the HDF5 library has crashed on this file (%s); %s",
                   work->path,
                   WIFSIGNALED(status) ? strsignal(WTERMSIG(status))
                                       : "it ended the process",

@@ -1,7 +1,7 @@
-/* HDF5's library, which is loaded (dlopen) when it is needed: linking it would
- * double the time of each start.  All calls are made in a process of their own,
- * as the library breaks down on some damaged files; that is an error like any
- * other then.
+/* The HDF5 library, loaded by dlopen when it is needed: linking it would double
+ * the time of each start.  The library crashes on some damaged files.  So all
+ * its calls are made in a process of their own, and a crash becomes an error
+ * like any other.
  *
  * Memory: none that stays.  Work: 20 ms to load it. */
 #ifndef HOST_HDF5_H
@@ -11,7 +11,7 @@
 
 #include "host/base/error.h"
 
-/* Its functions, without the H5 before them. */
+/* Functions of the library, without the prefix H5. */
 #define HOST_HDF5_CALLS(CALL)                                                  \
     CALL(open)                                                                 \
     CALL(Eset_auto2)                                                           \
@@ -66,7 +66,8 @@
     CALL(Dget_storage_size)                                                    \
     CALL(Dget_offset)
 
-/* Its variables: numbers of types and classes, once it is open. */
+/* Variables of the library: identifiers of types and classes, which are set
+ * when it is open. */
 #define HOST_HDF5_IDS(ID)                                                      \
     ID(H5T_IEEE_F64LE_g)                                                       \
     ID(H5T_STD_I64LE_g)                                                        \
@@ -84,19 +85,19 @@ struct host_hdf5 {
     HOST_HDF5_IDS(HOST_HDF5_ID)
 };
 
-/* What is done with it.  What its caller is to see of the result is in memory
- * or in a file that both processes have. */
+/* Work with the library.  Its results are left in memory or in a file that both
+ * processes share. */
 struct host_hdf5_work {
     int (*run)(void *context, const struct host_hdf5 *h,
                struct host_error *error);
     void *context;
-    const char *path;    /* as in messages */
-    const char *instead; /* what the user may do if the library breaks down */
-    size_t bytes;        /* of the file: what bounds its time */
+    const char *path;    /* for messages */
+    const char *instead; /* what the user may do if the library crashes */
+    size_t bytes;        /* of the file: they bound the processor time */
 };
 
 /* Loads the library and runs the work, if `run` is not NULL.  0, or the error
- * of the work; HOST_INPUT if the library is not installed or breaks down. */
+ * of the work; HOST_INPUT if the library is not installed or crashes. */
 int host_hdf5_run(const struct host_hdf5_work *work, struct host_error *error);
 
 #endif

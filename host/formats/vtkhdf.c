@@ -217,8 +217,8 @@ static int check_head(const struct task *task, const struct host_hdf5 *h,
         (!take_attribute(h, file, "/VTKHDF/Steps", "NSteps", &steps, 1) ||
          steps != 1)) {
         return host_source_fail(task->source, error,
-                                "it has several steps of time; write one of "
-                                "them to a file of its own");
+                                "it has several time steps; write one of them "
+                                "to a file of its own");
     }
     return 0;
 }
@@ -256,7 +256,7 @@ static int open_numbers(const struct task *task, const struct host_hdf5 *h,
     *n = (struct numbers){.rank = rank, .size = {0, 1}};
     n->dataset = h->H5Dopen2(file, names[i], H5P_DEFAULT);
     if (n->dataset < 0)
-        return fail_named(task, error, i, "is not there or not to be read");
+        return fail_named(task, error, i, "is missing or cannot be read");
     n->space = h->H5Dget_space(n->dataset);
     hid_t type = h->H5Dget_type(n->dataset);
     H5T_class_t class = h->H5Tget_class(type);
@@ -298,12 +298,12 @@ static int fail_reading(const struct task *task, const struct host_hdf5 *h,
             h->H5Pget_filter2(list, k, &flags, &none, NULL, 0, NULL, NULL);
         if (filter >= 0 && h->H5Zfilter_avail(filter) <= 0) {
             return host_fail(error, HOST_INPUT,
-                             "%s: %s is packed by a filter of number %d, which "
-                             "HDF5's library has not here; pack it by gzip",
+                             "%s: %s is packed by filter number %d, which the "
+                             "HDF5 library here lacks; pack it by gzip",
                              task->path, names[i], filter);
         }
     }
-    return fail_named(task, error, i, "is not to be read");
+    return fail_named(task, error, i, "cannot be read");
 }
 
 static int copy_numbers(const struct task *task, const struct host_hdf5 *h,
@@ -569,7 +569,7 @@ static int make_frame(void *context, const struct host_hdf5 *h,
     return made && h->H5Fclose(file) >= 0
                ? 0
                : host_fail(error, HOST_BROKEN,
-                           "%s: HDF5's library makes no such file; " UNDONE,
+                           "%s: the HDF5 library cannot make it; " UNDONE,
                            task->path);
 }
 

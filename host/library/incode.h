@@ -28,13 +28,13 @@ extern "C" {
 enum incode_status {
     INCODE_OK = 0,
     INCODE_NO_MEMORY,    /* memory or memory_max too small, or no thread */
-    INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, reserved that is not NULL,
+    INCODE_BAD_ARGUMENT, /* NULL, an unknown flag, `reserved` that is not NULL,
                             or tetrahedra that are not of these points */
-    INCODE_NOT_FINITE,   /* row out->at has a NaN or infinite coordinate */
+    INCODE_NOT_FINITE,   /* row `at` has a NaN or infinite coordinate */
     INCODE_TOO_FEW,      /* fewer than four distinct points */
     INCODE_FLAT,         /* all points on one plane or line */
     INCODE_TOO_MANY,     /* too many points or tetrahedra: see below */
-    INCODE_IO,           /* of streams */
+    INCODE_IO,           /* kept for streams: no function returns it */
     INCODE_CANCELLED,    /* `progress` returned false */
     INCODE_INTERNAL      /* a defect: please report */
 };
@@ -46,8 +46,8 @@ enum {
 };
 
 struct incode_options { /* all zero: the defaults */
-    /* 0: one a processor that this process may use, at most one for 6,000
-     * points. */
+    /* 0: one for each processor that this process may use, but no more than
+     * the work has use for (incode_delaunay: one for 6,000 points). */
     unsigned threads;
     unsigned flags; /* what else is wanted */
     /* Called from the calling thread, at least ten times a second and once at
@@ -100,21 +100,23 @@ incode_delaunay(const double *xyz /* [3 * points] */, uint64_t points,
 /* Frees the memory of a result and clears it.  NULL is accepted. */
 void incode_tetrahedra_free(struct incode_tetrahedra *t);
 
-/* Which tetrahedron holds each query.  found[i] is the lowest number of a
- * tetrahedron that contains query[3 * i ..], or INCODE_NONE64 where none does.
- * Tetrahedra are closed: facets, edges and vertices belong to them.  `t` is a
- * result for the same xyz with INCODE_NEIGHBORS, in any order.  Exact, and
- * independent of the threads and of the order of queries.  options->flags is 0.
- * On an error, `found` has no meaning; INCODE_NOT_FINITE: *at is the lowest
- * number of a query with a NaN or infinite coordinate.
+/* Finds the tetrahedron that contains each query.  found[i] is its number, or
+ * INCODE_NONE64 if query i, query[3 * i ..], is outside the hull.  Tetrahedra
+ * are closed: facets, edges and vertices belong to them.  If several contain a
+ * query, the lowest number is taken.  The answer is exact, and depends neither
+ * on the threads nor on the order of the queries.
  *
- * Memory: 32 bytes a query, at most 32 MB; and for each thread 3 KB, and up to
- * 24 bytes for each tetrahedron of the largest star of a vertex that a query
- * is on.  Up to 32 queries take memory for a star of more than 128 tetrahedra
- * alone.
- * Work of a query, where points are spread evenly: O(log queries) to put them
- * in order, and O(1 + (points / queries)^(1/3)) steps; O(points^(1/3)) for a
- * query alone. */
+ * `t` is the result for the same xyz with INCODE_NEIGHBORS, in any order.
+ * options->flags must be 0.  On an error `found` has no meaning.  On
+ * INCODE_NOT_FINITE *at is the lowest number of a query with a NaN or infinite
+ * coordinate.
+ *
+ * Memory: 32 bytes a query, at most 32 MB.  Each thread takes 3 KB, and up to
+ * 24 bytes for each tetrahedron of the largest star of a vertex on which a
+ * query lies.  A call with up to 32 queries allocates memory only for a star of
+ * more than 128 tetrahedra. Work of a query, if the points are spread evenly:
+ * O(log queries) to sort it, and O(1 + (points / queries)^(1/3)) steps of its
+ * walk, which are O(points^(1/3)) for a single query. */
 enum incode_status
 incode_locate(const double *xyz /* [3 * points] */, uint64_t points,
               const struct incode_tetrahedra *t,
@@ -122,9 +124,9 @@ incode_locate(const double *xyz /* [3 * points] */, uint64_t points,
               const struct incode_options *options, /* or NULL */
               uint64_t *found /* [queries] */, uint64_t *at /* or NULL */);
 
-/* The edges of a result: the neighbours of vertex p are to[first[p]] up to, not
- * including, to[first[p + 1]], ascending, each once.  Rows that are duplicates
- * have none. */
+/* The edges of a result: the neighbours of vertex p are to[i] for i from
+ * first[p] to first[p + 1] - 1, ascending, each once.  A row that repeats a
+ * point has no neighbours. */
 struct incode_adjacency {
     uint64_t points;
     uint64_t *first; /* [points + 1] */
@@ -132,17 +134,17 @@ struct incode_adjacency {
     void *reserved[4];
 };
 
-/* `t` need not have neighbours.  `out` need not be initialised, and owns no
- * memory on an error.  options->flags is 0.
+/* Lists the edges of a result.  `t` need not have neighbours.  `out` need not
+ * be initialised.  On an error `out` owns no memory.  options->flags must be 0.
  *
  * Memory: 24 bytes a tetrahedron and 12 a point, the result apart.  Work:
- * O(tetrahedra) where no vertex has many neighbours. */
+ * O(tetrahedra) if no vertex has many neighbours. */
 enum incode_status
 incode_adjacency(uint64_t points, const struct incode_tetrahedra *t,
                  const struct incode_options *options, /* or NULL */
                  struct incode_adjacency *out);
 
-/* Frees the memory and clears it.  NULL is accepted. */
+/* Frees the lists and clears `a`.  NULL is accepted. */
 void incode_adjacency_free(struct incode_adjacency *a);
 
 /* A sentence without its period, in static memory, also for a value that is not

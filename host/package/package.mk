@@ -1,4 +1,4 @@
-# The packages of Debian, in BUILD/deb.  SIGN=FILE is the pair that their firmware
+# The Debian packages, in BUILD/deb.  SIGN=FILE is the pair that their firmware
 # is signed with, as for make firmware.
 deb: deps-deb
 	@$(MAKE) --no-print-directory $(fetched)/libsodium/fetched

@@ -130,13 +130,13 @@ else
     done <<-'END'
 		version VTKHDF 3.0, where 1.x and 2.x are read;
 		image its Type is neither UnstructuredGrid nor PolyData;
-		steps it has several steps of time;
+		steps it has several time steps;
 		none HDF5 without a group VTKHDF
 		sum the points of its partitions are not those of Points;
 		many more than 2.32 points;
-		filter /VTKHDF/Points is packed by a filter of number 32000,
+		filter /VTKHDF/Points is packed by filter number 32000,
 		empty /VTKHDF/Points claims more numbers than the file holds;
-		linked /VTKHDF/Points is not there or not to be read;
+		linked /VTKHDF/Points is missing or cannot be read;
 		outside /VTKHDF/Points claims more numbers than the file holds;
 		flat /VTKHDF/Points has another shape or type;
 	END
@@ -144,13 +144,13 @@ else
         incode digest "$scratch/poly.vtkhdf"
 fi
 
-# A library that breaks down is an error, and so is one that is not there.
+# A library that crashes is an error, and so is one that is not there.
 soname=$(strings -a "$INCODE" | grep -m 1 '^libhdf5')
 mkdir "$scratch/lib"
-breaks='HDF5.s library has broken down on it .Illegal instruction.'
+breaks='the HDF5 library has crashed on this file .Illegal instruction.'
 echo '__attribute__((constructor)) void f(void) { __builtin_trap(); }' |
     gcc -shared -fPIC -x c - -o "$scratch/lib/${soname:-none}"
-for what in "$breaks" "needs a library that cannot be loaded .*; install .*hdf5"; do
+for what in "$breaks" "needs the HDF5 library, which cannot be loaded .*; install .*hdf5"; do
     refuses "formats/.vtkhdf, in: ${what:0:20}" 3 "a.vtkhdf: .*$what" \
         env LD_LIBRARY_PATH="$scratch/lib" "$INCODE" run "$scratch/a.vtkhdf" -q \
         -o "$scratch/left/o.npy"

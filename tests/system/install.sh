@@ -3,6 +3,9 @@
 # their completion, in which stands all that --help tells of; make uninstall
 # takes all of it away.
 . tests/system/lib.sh
+# One at a time, as make install writes its pages and its list of folders here.
+exec 9> "$BUILD/installing"
+flock 9
 root="$scratch/root"
 make=("${MAKE:-make}" --no-print-directory BUILD="$BUILD" DESTDIR="$root"
     PREFIX=/opt/incode)

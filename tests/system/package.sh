@@ -3,6 +3,9 @@
 # names of the library, with the version and with each other.  full/package.sh
 # builds the packages.
 . tests/system/lib.sh
+# One at a time, as make install writes its pages and its list of folders here.
+exec 9> "$BUILD/installing"
+flock 9
 folder=host/package
 control=$folder/control
 declared=$(sed -n 's/^Package: //p' $control | sort | xargs)

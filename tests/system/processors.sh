@@ -59,7 +59,7 @@ refused() {
     check "processors/$1" "$(last "$scratch/errors")" \
         grep -q "^$2: $3; give x86-64" "$scratch/errors"
 }
-unknown='there is no such level of processors'
+unknown='x86-64 has no such level'
 refused 'an unknown level' 'incode: INCODE_PROCESSOR=i386' "$unknown" \
     env INCODE_PROCESSOR=i386 "$INCODE" gen uniform 4
 refused 'an unknown level for a node' 'incode-node: INCODE_PROCESSOR i386' \
@@ -81,7 +81,7 @@ same 'emulated, Haswell' x86-64-v3 emulate Haswell "$INCODE"
 # registers.
 same 'emulated, no AVX of the system' x86-64-v2 emulate Haswell,-xsave "$INCODE"
 refused 'more than there is' 'incode: INCODE_PROCESSOR=x86-64-v3' \
-    'this processor, or its system, does not have this level' \
+    'the processor or the operating system does not have this level' \
     env INCODE_PROCESSOR=x86-64-v3 qemu-x86_64-static -cpu Nehalem "$INCODE" \
     gen uniform 4
 

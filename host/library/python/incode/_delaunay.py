@@ -26,7 +26,7 @@ _ERRORS = {
     ),
     lib.INCODE_TOO_FEW: (
         ValueError,
-        "a tetrahedron takes four distinct points",
+        "a tetrahedron needs four distinct points",
     ),
     lib.INCODE_FLAT: (
         ValueError,
@@ -136,7 +136,7 @@ def _thread_count(threads):
     threads = operator.index(threads)
     if not 0 <= threads < 1 << 32:
         raise ValueError(
-            f"threads={threads}; give a count, or 0 for one a processor"
+            f"threads={threads}; give a count, or 0 for one on each processor"
         )
     return threads
 
@@ -146,12 +146,13 @@ class Delaunay:
 
     points: array of shape (n, 3).  Contiguous float64 is used in place and must
         not change while this object is in use; anything else is converted once.
-    threads: how many work; 0: one a processor.
-    progress: called with the part that is done, 0.0 to 1.0, at least ten times
-        a second.  An exception that it raises ends the call and is passed on.
+    threads: how many work; 0: one for each processor.
+    progress: called at least ten times a second with the part that is done, 0.0
+        to 1.0.  An exception that it raises ends the call and is passed on.
 
-    Arrays of the result are views of the library's memory, which is freed with
-    the last of them.  They are read-only.
+    simplices, neighbors, convex_hull and vertex_neighbor_vertices are views of
+    the library's memory, which is freed with the last of them.  They are
+    read-only.
     """
 
     ndim = 3
@@ -193,8 +194,9 @@ class Delaunay:
         """The lowest number of a simplex that contains each point, or -1.
 
         xi: array of shape (..., 3).  Facets, edges and vertices belong to their
-        simplices.  A point with a NaN is in none.  The answer is exact, so
-        `bruteforce` and `tol` change nothing.  The result is int64 (...).
+        simplices.  A point that is not finite is in none.  The answer is
+        exact, so `bruteforce` and `tol` change nothing.  The result is int64
+        of shape (...).
         """
         if not (
             type(xi) is np.ndarray

@@ -65,7 +65,7 @@ def _run(*arguments):
             raise
     status = process.returncode
     if status != 0:
-        said = said or f"{command[0]} ended with status {status}, silently"
+        said = said or f"{command[0]} ended with status {status}"
         raise _STATUS.get(status, RuntimeError)(said)
     if said:
         warnings.warn(said, stacklevel=3)
