@@ -11,7 +11,6 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/base/progress.h"
-#include "host/base/scratch.h"
 #include "host/formats/output.h"
 #include "host/formats/write.h"
 #include "host/formats/formats.h"
@@ -513,64 +512,20 @@ static int look_at_points(const struct host_run_options *options,
     return 0;
 }
 
-/* Where to put aside what is not said: where the first output goes, else /tmp.
- */
-static const char *scratch_folder(const struct host_run_options *options) {
-    static char folder[HOST_PATH_MAX];
-    const char *temporary = getenv("TMPDIR");
-    const char *output = options->outputs > 0 ? options->output[0] : "-";
-    if (options->scratch != NULL)
-        return options->scratch;
-    if (temporary != NULL && temporary[0] != '\0')
-        return temporary;
-    const char *slash = strrchr(output, '/');
-    if (strcmp(output, "-") == 0)
-        return "/tmp";
-    (void)snprintf(folder, sizeof folder, "%.*s",
-                   slash == NULL ? 1 : (int)(slash - output) + 1,
-                   slash == NULL ? "." : output);
-    return folder;
-}
-
-/* All of the run is a call of so many threads, and in so much memory. */
-static int begin_call(const struct host_run_options *options,
-                      struct host_call *call, struct host_scratch *scratch,
-                      struct host_error *error) {
-    *call = (struct host_call){
-        .threads = options->threads == 0 ? host_processors() : options->threads,
-        .memory_max = UINT64_MAX};
-    if (options->host_memory > 0) {
-        if (host_scratch_begin(scratch, scratch_folder(options),
-                               options->host_memory, call->threads, error) != 0)
-            return error->code;
-        call->scratch = scratch;
-    }
-    host_call_enter(call);
-    return 0;
-}
-
-static void end_call(struct host_call *call, struct host_run_result *result) {
-    host_call_enter(NULL);
-    if (call->scratch != NULL) {
-        result->scratch_bytes = call->scratch->bytes_max;
-        host_scratch_end(call->scratch);
-    }
-}
-
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
-    static struct host_scratch scratch;
-    struct host_call call;
     struct host_points points = {0};
     uint64_t start = host_now_us();
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
-        begin_call(options, &call, &scratch, error) != 0)
+        host_limits_enter(&options->limits, options->threads,
+                          options->outputs > 0 ? options->output[0] : NULL,
+                          error) != 0)
         return error->code;
-    result->host_memory = options->host_memory > 0
-                              ? options->host_memory
+    result->host_memory = options->limits.memory > 0
+                              ? options->limits.memory
                               : host_memory_available() / 2;
     if (options->anywhere)
         host_progress_begin_anywhere();
@@ -585,7 +540,7 @@ int host_run(const struct host_run_options *options,
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
-    end_call(&call, result);
+    result->scratch_bytes = host_limits_leave();
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL)
