@@ -64,8 +64,8 @@ static bool ends_in_cr(const struct host_source *source) {
 }
 
 /* Replaces such CRs by LFs, in the file's own bytes or, if the bytes are the
- * caller's, in a copy.  A packed file is held whole if its lines end so, or if
- * its format needs that. */
+ * caller's, in a copy.  The file is held whole if its lines end so, or if its
+ * format needs that. */
 static int mend_line_ends(struct host_source *source,
                           const struct host_format *format,
                           struct host_error *error) {
@@ -95,8 +95,8 @@ static int take_points(struct host_source *source,
                        const struct host_format *format,
                        struct host_points *points, struct host_error *error) {
     struct host_mesh mesh = {.points = points};
-    host_progress_phase("reading", "Mpoint");
     if (mend_line_ends(source, format, error) == 0) {
+        host_progress_phase("reading", "Mpoint");
         format->read_points(source, &mesh, error);
         host_source_fault(source, error);
     }
