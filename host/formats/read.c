@@ -6,6 +6,7 @@
 
 #include "formats.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/base/progress.h"
 
 static const struct host_format *format_of(const char *path, enum host_use use,
@@ -69,6 +70,7 @@ static bool ends_in_cr(const struct host_source *source) {
 static int mend_line_ends(struct host_source *source,
                           const struct host_format *format,
                           struct host_error *error) {
+    enum { PIECE = 1 << 16 };
     bool mends = ends_in_cr(source);
     if ((mends || !format->pieces) && host_source_hold(source, error) != 0)
         return error->code;
@@ -86,6 +88,8 @@ static int mend_line_ends(struct host_source *source,
     for (size_t i = 0; i < source->bytes; i++) {
         bool alone =
             i + 1 == source->bytes || strchr("\r\n", text[i + 1]) == NULL;
+        if (i % PIECE == 0)
+            host_call_trim(PIECE);
         text[i] = text[i] == '\r' && alone ? '\n' : text[i];
     }
     return 0;

@@ -372,6 +372,18 @@ int host_source_hold(struct host_source *source, struct host_error *error) {
     return error->code;
 }
 
+const char *host_source_find(const struct host_source *source,
+                             const char *word) {
+    const char *data = (const char *)source->data, *found = NULL;
+    size_t n = strlen(word), bytes = source->bytes;
+    for (size_t at = 0; found == NULL && at < bytes; at += PIECE) {
+        size_t some = bytes - at < PIECE + n ? bytes - at : PIECE + n;
+        found = memmem(data + at, some, word, n);
+        host_call_trim(some);
+    }
+    return found;
+}
+
 /* --- opening -------------------------------------------------------------- */
 
 /* What is known of the file that is read. */

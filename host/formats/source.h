@@ -62,7 +62,11 @@ int host_source_all(const struct host_source *source, const uint8_t **at,
 int host_source_fault(const struct host_source *source,
                       struct host_error *error);
 
-/* The same, not unpacked, of a file of at most so many bytes, the most that
+/* The first place of a word in `data`, or NULL. */
+const char *host_source_find(const struct host_source *source,
+                             const char *word);
+
+/* The same as host_source_open, not unpacked, of a file of at most so many bytes, the most that
  * `what` has; a longer one, or one without an end: HOST_INPUT. */
 int host_source_open_bounded(struct host_source *source, const char *path,
                              size_t most, const char *what,
