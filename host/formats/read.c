@@ -39,7 +39,10 @@ static const struct host_format *format_of(const char *path, enum host_use use,
 
 static int check_finite(const char *path, const struct host_points *points,
                         struct host_error *error) {
+    enum { BLOCK = 1 << 13 };
     for (uint64_t i = 0; i < 3 * points->count; i++) {
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * sizeof *points->xyz);
         if (!isfinite(points->xyz[i])) {
             return host_fail(error, HOST_INPUT,
                              "%s: point %llu (counted from 0): %c is %s; "

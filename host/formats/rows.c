@@ -168,9 +168,19 @@ void host_put_double(struct host_output *out, double value, bool big) {
     host_put_whole(out, bits, sizeof bits, big);
 }
 
+/* In blocks, for arrays that are put aside. */
+static void put_bytes(struct host_output *out, const void *bytes, size_t n) {
+    const size_t block = 1 << 16;
+    for (size_t at = 0; at < n; at += block) {
+        size_t some = n - at < block ? n - at : block;
+        host_output_bytes(out, (const char *)bytes + at, some);
+        host_call_trim(some);
+    }
+}
+
 void host_put_words(struct host_output *out, const uint32_t *values, size_t n) {
     if (is_little) {
-        host_output_bytes(out, values, n * sizeof *values);
+        put_bytes(out, values, n * sizeof *values);
         return;
     }
     for (size_t i = 0; i < n; i++)
@@ -179,7 +189,7 @@ void host_put_words(struct host_output *out, const uint32_t *values, size_t n) {
 
 void host_put_doubles(struct host_output *out, const double *values, size_t n) {
     if (is_little) {
-        host_output_bytes(out, values, n * sizeof *values);
+        put_bytes(out, values, n * sizeof *values);
         return;
     }
     for (size_t i = 0; i < n; i++)
