@@ -218,7 +218,10 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
 int host_rows_check(const char *path, const struct host_tetrahedra *tets,
                     const struct host_points *points,
                     struct host_error *error) {
+    enum { BLOCK = 1 << 12 };
     for (uint64_t i = 0; i < tets->count; i++) {
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * sizeof *tets->v);
         for (int k = 0; k < 4; k++) {
             if (tets->v[i][k] >= points->count) {
                 return host_fail(error, HOST_INPUT,
