@@ -37,6 +37,14 @@ void host_call_trim(size_t touched) {
     host_scratch_trim(call->scratch);
 }
 
+size_t host_call_share(void) {
+    enum { SHARE = 8 };
+    const struct host_call *call = call_here;
+    return call == NULL || call->scratch == NULL
+               ? SIZE_MAX
+               : (size_t)(call->scratch->resident_max / SHARE / call->threads);
+}
+
 /* Processors that the quota "MAX PERIOD" of a control group in `folder` gives,
  * rounded up; `most` where it gives no fewer. */
 static unsigned by_quota(const char *folder, unsigned most) {

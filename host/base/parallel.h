@@ -40,6 +40,10 @@ bool host_call_cancelled(void);
  * reads in no order, as the kernel maps so much around it. */
 void host_call_trim(size_t touched);
 
+/* Bytes of arrays that each thread of this thread's call may have resident at
+ * once, beside what others need; SIZE_MAX: as many as there are. */
+size_t host_call_share(void);
+
 /* Processors that affinity and the quota of control groups leave to this
  * process, 1 to HOST_THREADS_MAX. */
 unsigned host_processors(void);

@@ -10,6 +10,7 @@
 enum {
     PAGES_QUEUE = 1024,
     SPILL_TAKEN = 128,     /* faces given back at a time */
+    AROUND = 1 << 16,      /* bytes that one place far from others touches */
     EXPECTED = 7,          /* tetrahedra a point */
     EMITTED_ROOM = 1 << 12 /* tetrahedra that the triangulator may give at once
                             */
@@ -66,18 +67,31 @@ struct worker {
  * several times as long. */
 enum {
     REGION_POINTS = 1 << 20,
+    REGION_BYTES = 64,        /* of an arena a point of a region */
     SEAM_LEAST = 1 << 13,     /* points of a seam that are worth two threads */
     SEAM_WHOLE = 60000,       /* of which a triangulation has room for all */
     HOPELESS = 2,             /* times as many tetrahedra are not final, */
     HOPELESS_LEAST = 1 << 14, /* and at least so many */
     SIFT_LEAST = 1 << 15,     /* tetrahedra, likewise */
+    POLL_LEFT = 1 << 11,      /* tetrahedra between two trims */
     REGIONS_MAX = 1 << 12
 };
 
+/* The most bytes of an arena that is of use. */
+static size_t arena_max(void) {
+    const size_t most = (size_t)256 << 20;
+    size_t share = host_call_share();
+    return share < most / 2 ? 2 * share : most;
+}
+
+/* What is not yet final of a region takes room in its thread's arena, which is
+ * a part of what the thread may have resident. */
 uint32_t host_direct_regions(unsigned threads, uint64_t points) {
+    uint64_t most = arena_max() / REGION_BYTES;
     uint32_t regions = 1;
+    most = most < REGION_POINTS ? most : REGION_POINTS;
     while (regions < threads ||
-           (points / regions > REGION_POINTS && regions < REGIONS_MAX))
+           (points / regions > most && regions < REGIONS_MAX))
         regions *= 2;
     return regions;
 }
@@ -120,6 +134,7 @@ static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
             mark[v[i][k]] |= AT_FINAL;
     }
     host_tetrahedra_keep(w->tets, count);
+    host_call_trim(count * sizeof *v);
 }
 
 static void leave(void *context, const uint32_t v[4]) {
@@ -138,6 +153,7 @@ static void leave(void *context, const uint32_t v[4]) {
         return;
     }
     memcpy(left[0], v, sizeof left[0]);
+    host_call_trim(sizeof left[0]);
     host_tetrahedra_keep(w->left, 1);
 }
 
@@ -196,6 +212,7 @@ static bool deliver_pages(struct worker *w) {
     uint8_t page[INCODE_PAGE_BYTES];
     for (uint32_t i = 0; i < w->page_count; i++) {
         size_t bytes = host_page(w->run->order, w->pages[i], page);
+        host_call_trim(AROUND);
         if (incode_triangulator_page(w->t, w->pages[i], page, bytes) != 0)
             return false;
     }
@@ -237,6 +254,9 @@ static void do_region(struct worker *w, uint32_t number) {
         if (step == INCODE_FINISHED)
             return;
         if (step == INCODE_FULL || w->is_hopeless) {
+                fprintf(stderr, "FULL region %u of %u points %u hopeless %d\n",
+                        number, w->run->order->regions, r->points,
+                        w->is_hopeless);
             give_up_region(w, r);
             return;
         }
@@ -348,9 +368,9 @@ static void work(void *context, unsigned part) {
  * points are inserted; the frames of all pages serve what has to go by faces.
  */
 static size_t arena_bytes(const struct host_order *order) {
-    enum { LEAST = 16 << 20, MOST = 256 << 20 };
+    enum { LEAST = 16 << 20 };
     size_t bytes = LEAST + (size_t)order->tree.pages * INCODE_PAGE_BYTES;
-    return bytes < MOST ? bytes : MOST;
+    return bytes < arena_max() ? bytes : arena_max();
 }
 
 /* --- seams ---------------------------------------------------------------- */
@@ -379,8 +399,11 @@ struct seam {
 
 static uint64_t count_seam(const struct direct *run) {
     uint64_t points = 0, all = (uint64_t)run->order->bricks;
-    for (uint64_t i = 0; i < all * INCODE_BRICK_POINTS; i++)
+    for (uint64_t i = 0; i < all * INCODE_BRICK_POINTS; i++) {
+        if (i % AROUND == 0)
+            host_call_trim(AROUND);
         points += (run->mark[i] & AT_SEAM) != 0;
+    }
     return points;
 }
 
@@ -390,6 +413,7 @@ static void gather_seam(struct seam *s) {
     for (uint32_t r = 0; r < order->regions; r++)
         for (uint32_t b = order->region[r].first; b < order->region[r].last;
              b++) {
+            host_call_trim(2 * sizeof *order->brick);
             for (uint32_t k = 0; k < order->fill[b]; k++) {
                 uint32_t id = b * INCODE_BRICK_POINTS + k;
                 unsigned mark = s->run->mark[id];
@@ -422,6 +446,7 @@ static void sort_four(uint32_t v[4]) {
 static uint32_t *find_left(const struct seam *s, uint32_t v[4]) {
     sort_four(v);
     uint64_t i = slot_of(s, v);
+    host_call_trim(AROUND);
     while (s->table[i][3] != INCODE_NONE &&
            memcmp(s->table[i], v, sizeof s->table[i]) != 0)
         i = (i + 1) & (s->slots - 1);
@@ -437,6 +462,8 @@ static bool keep_left(struct seam *s) {
         uint64_t kept = 0;
         for (uint64_t i = 0; i < left->count; i++) {
             const uint32_t *v = left->v[i];
+            if (i % POLL_LEFT == 0)
+                host_call_trim(POLL_LEFT * 2 * sizeof left->v[i]);
             if ((mark[v[0]] & mark[v[1]] & mark[v[2]] & mark[v[3]] &
                  AT_FINAL) != 0)
                 memmove(left->v[kept++], v, sizeof left->v[0]);
@@ -449,7 +476,11 @@ static bool keep_left(struct seam *s) {
     s->table = host_map(s->slots * sizeof *s->table);
     if (s->table == NULL)
         return false;
-    memset(s->table, 0xff, s->slots * sizeof *s->table);
+    for (uint64_t i = 0; i < s->slots; i += POLL_LEFT) {
+        uint64_t n = s->slots - i < POLL_LEFT ? s->slots - i : POLL_LEFT;
+        memset(s->table + i, 0xff, n * sizeof *s->table);
+        host_call_trim(n * sizeof *s->table);
+    }
     for (unsigned t = 0; t < s->run->threads; t++)
         for (uint64_t i = 0; i < s->run->left[t].count; i++) {
             uint32_t v[4];
@@ -473,7 +504,7 @@ static bool is_right(const struct seam *s, const uint32_t t[4]) {
 
 static void sift(void *context, unsigned part) {
     struct seam *s = context;
-    enum { POLL = 1 << 14 };
+    enum { POLL = 1 << 12, TOUCHED = 80 /* bytes a row */ };
     struct host_error error;
     uint64_t each = s->tets.count / s->parts, i = each * part;
     uint64_t last = part + 1 == s->parts ? s->tets.count : i + each;
@@ -485,6 +516,7 @@ static void sift(void *context, unsigned part) {
             s->failed = true;
             return;
         }
+        host_call_trim((size_t)(end - i) * TOUCHED);
         for (; i < end; i++) {
             if (!is_right(s, s->tets.v[i]))
                 continue;

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "host/base/parallel.h"
 #include "tetrahedra.h"
 
 void host_digest(const struct host_tetrahedra *tets,
@@ -15,6 +16,7 @@ void host_digest(const struct host_tetrahedra *tets,
     for (uint64_t done = 0; done < tets->count;) {
         uint64_t n = tets->count - done < ROWS ? tets->count - done : ROWS;
         memcpy(row, tets->v + done, n * sizeof *row);
+        host_call_trim(n * sizeof *row);
         for (uint64_t i = 0; i < n; i++) {
             uint32_t c = row[i][2], d = row[i][3];
             row[i][2] = c < d ? c : d;

@@ -9,13 +9,16 @@
 
 enum {
     AHEAD = 16, /* rows hashed ahead, so that their slots come from memory */
-    FORK_ROWS = 1 << 13, /* fewer rows are not worth a thread: to search, */
-    COPY_ROWS = 1 << 17, /* to copy */
-    POLL_ROWS = 1 << 16, /* between two polls of whether it is cancelled */
+    FORK_ROWS = 1 << 13,   /* fewer rows are not worth a thread: to search, */
+    COPY_ROWS = 1 << 17,   /* to copy */
+    POLL_ROWS = 1 << 12,   /* between two polls of whether it is cancelled */
+    POLL_COPIED = 1 << 11, /* the same, of copies */
+    AROUND = 1 << 16,      /* bytes that one row far from others touches */
     PARTS_MAX = 16
 };
 
-/* A table for each part of the hash values, so that threads share nothing. */
+/* A table for each thread, which takes parts of the hash values in turn, so
+ * that threads share nothing. */
 struct table {
     uint64_t *slot; /* upper hash bits and row + 1; 0: empty */
     size_t slots;   /* a power of two */
@@ -24,7 +27,8 @@ struct table {
 struct search {
     const double *xyz;
     uint64_t rows;
-    unsigned parts;
+    unsigned parts;  /* threads */
+    unsigned rounds; /* parts of the hash values for each */
     struct table table[PARTS_MAX];
     uint32_t *lowest; /* [rows], or NULL */
     uint8_t *doubled; /* [rows] 1 where an earlier row is equal, or NULL */
@@ -62,6 +66,7 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
         uint64_t slot = table->slot[at];
         if ((slot & UINT64_C(0xffffffff00000000)) == mark) {
             uint32_t other = (uint32_t)slot - 1;
+            host_call_trim(AROUND);
             if (same(s->xyz + 3 * (size_t)other, s->xyz + 3 * (size_t)row))
                 return other;
         }
@@ -72,24 +77,26 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
 
 /* Rows whose hash belongs to the part, in input order: so the first of equal
  * rows is the lowest. */
-static void search_part(void *context, unsigned part) {
-    struct search *s = context;
-    struct table *table = &s->table[part];
+static uint64_t search_round(struct search *s, struct table *table,
+                             unsigned part) {
+    const uint64_t parts = (uint64_t)s->parts * s->rounds;
     uint64_t waiting[AHEAD];
     uint32_t waiting_row[AHEAD];
     uint64_t queued = 0, taken = 0, distinct = 0;
     for (uint64_t row = 0; row < s->rows || taken < queued;) {
         if (row < s->rows && queued - taken < AHEAD) {
             uint64_t h = hash(s->xyz + 3 * row);
-            if ((h >> 40) * s->parts >> 24 == part) {
+            if ((h >> 40) * parts >> 24 == part) {
                 waiting[queued % AHEAD] = h;
                 waiting_row[queued % AHEAD] = (uint32_t)row;
                 __builtin_prefetch(&table->slot[h & (table->slots - 1)], 1);
                 queued++;
             }
             row++;
+            if (row % POLL_ROWS == 0)
+                host_call_trim((size_t)POLL_ROWS * 3 * sizeof(double));
             if (row % POLL_ROWS == 0 && host_call_cancelled())
-                return;
+                break;
             continue;
         }
         uint32_t mine = waiting_row[taken % AHEAD];
@@ -101,7 +108,17 @@ static void search_part(void *context, unsigned part) {
         if (s->doubled != NULL && other != mine)
             s->doubled[mine] = 1;
     }
-    s->distinct[part] = distinct;
+    return distinct;
+}
+
+static void search_part(void *context, unsigned part) {
+    struct search *s = context;
+    struct table *table = &s->table[part];
+    for (unsigned i = 0; i < s->rounds && !host_call_cancelled(); i++) {
+        if (i > 0)
+            memset(table->slot, 0, table->slots * sizeof *table->slot);
+        s->distinct[part] += search_round(s, table, part * s->rounds + i);
+    }
 }
 
 static bool run_search(struct search *s) {
@@ -109,9 +126,12 @@ static bool run_search(struct search *s) {
     s->parts = s->rows < FORK_ROWS   ? 1
                : threads > PARTS_MAX ? PARTS_MAX
                                      : threads;
-    size_t slots = 64;
-    while (slots < s->rows / s->parts * 3 / 2 + 64)
+    size_t most = host_call_share() / sizeof(uint64_t), slots = 64;
+    while (slots < s->rows / s->parts * 3 / 2 + 64 && slots <= most / 2)
         slots *= 2;
+    s->rounds = 1;
+    while (slots < s->rows / s->parts / s->rounds * 3 / 2 + 64)
+        s->rounds++;
     bool enough = true;
     for (unsigned i = 0; i < s->parts; i++) {
         s->table[i].slots = slots;
@@ -135,8 +155,11 @@ static uint64_t part_start(const struct search *s, unsigned part) {
 static void count_part(void *context, unsigned part) {
     struct search *s = context;
     uint64_t count = 0, last = part_start(s, part + 1);
-    for (uint64_t row = part_start(s, part); row < last; row++)
+    for (uint64_t row = part_start(s, part); row < last; row++) {
+        if (row % POLL_ROWS == 0)
+            host_call_trim(POLL_ROWS);
         count += s->doubled[row] == 0;
+    }
     s->first[part + 1] = count;
 }
 
@@ -147,6 +170,8 @@ static void fill_part(void *context, unsigned part) {
     uint64_t last = part_start(s, part + 1);
     for (uint64_t row = part_start(s, part); row < last; row++) {
         const double *p = s->xyz + 3 * row;
+        if (row % POLL_COPIED == 0)
+            host_call_trim(POLL_COPIED * (3 * sizeof *p + sizeof *to));
         for (int d = 0; d < 3; d++)
             negative_zeros += p[d] == 0.0 && signbit(p[d]);
         if (s->doubled[row] == 0) {

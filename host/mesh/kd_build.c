@@ -9,22 +9,27 @@
 enum {
     SAMPLE_MAX = 128,     /* items looked at to choose a pivot */
     SORT_MAX = 16,        /* fewer items than this are sorted by insertion */
+    AROUND = 1 << 16,     /* bytes that one item far from others touches */
     FORK_ITEMS = 1 << 13, /* fewer items than this are not worth a thread */
-    POLL_ITEMS = 1 << 18  /* between two polls of whether it is cancelled */
+    POLL_ITEMS = 1 << 11  /* between two polls of whether it is cancelled */
 };
 
 void host_kd_box(const struct host_item *items, size_t n, double lo[3],
                  double hi[3]) {
     double l0 = INFINITY, l1 = INFINITY, l2 = INFINITY;
     double h0 = -INFINITY, h1 = -INFINITY, h2 = -INFINITY;
-    for (size_t i = 0; i < n; i++) {
-        const double *c = items[i].c;
-        l0 = c[0] < l0 ? c[0] : l0;
-        l1 = c[1] < l1 ? c[1] : l1;
-        l2 = c[2] < l2 ? c[2] : l2;
-        h0 = c[0] > h0 ? c[0] : h0;
-        h1 = c[1] > h1 ? c[1] : h1;
-        h2 = c[2] > h2 ? c[2] : h2;
+    for (size_t i = 0; i < n;) {
+        size_t end = n - i > POLL_ITEMS ? i + POLL_ITEMS : n;
+        host_call_trim((end - i) * sizeof *items);
+        for (; i < end; i++) {
+            const double *c = items[i].c;
+            l0 = c[0] < l0 ? c[0] : l0;
+            l1 = c[1] < l1 ? c[1] : l1;
+            l2 = c[2] < l2 ? c[2] : l2;
+            h0 = c[0] > h0 ? c[0] : h0;
+            h1 = c[1] > h1 ? c[1] : h1;
+            h2 = c[2] > h2 ? c[2] : h2;
+        }
     }
     lo[0] = l0, lo[1] = l1, lo[2] = l2;
     hi[0] = h0, hi[1] = h1, hi[2] = h2;
@@ -62,8 +67,9 @@ static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
                              double pivot) {
     size_t m = 0;
     for (size_t i = 0; i < n && !host_call_cancelled();) {
-        for (size_t end = n - i > POLL_ITEMS ? i + POLL_ITEMS : n; i < end;
-             i++) {
+        size_t end = n - i > POLL_ITEMS ? i + POLL_ITEMS : n;
+        host_call_trim(2 * (end - i) * sizeof *a);
+        for (; i < end; i++) {
             double key = sign * a[i].c[d];
             exchange(&a[i], &a[m]);
             m += key < pivot;
@@ -75,10 +81,14 @@ static size_t partition_less(struct host_item *a, size_t n, int d, double sign,
 static size_t partition_not_greater(struct host_item *a, size_t n, int d,
                                     double sign, double pivot) {
     size_t m = 0;
-    for (size_t i = 0; i < n; i++) {
-        double key = sign * a[i].c[d];
-        exchange(&a[i], &a[m]);
-        m += key <= pivot;
+    for (size_t i = 0; i < n;) {
+        size_t end = n - i > POLL_ITEMS ? i + POLL_ITEMS : n;
+        host_call_trim(2 * (end - i) * sizeof *a);
+        for (; i < end; i++) {
+            double key = sign * a[i].c[d];
+            exchange(&a[i], &a[m]);
+            m += key <= pivot;
+        }
     }
     return m;
 }
@@ -143,6 +153,7 @@ static double choose_pivot(const struct host_item *a, size_t n, size_t k, int d,
         size_t stretch = n / s;
         size_t at = i * stretch + (size_t)(*state >> 33) % stretch;
         key[i] = sign * a[at].c[d];
+        host_call_trim(s == SAMPLE_MAX ? AROUND : 0);
     }
     sort_keys(key, s);
     size_t margin = s >= 64 ? s / 20 : s >= 16 ? 1 : 0;

@@ -4,6 +4,7 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "host/base/parallel.h"
 #include "incode/predicates/simd.h"
 
 /* ---- lumps ---- */
@@ -310,6 +311,7 @@ static void extents(const struct cloud *cloud, const double from[3],
         most[k] = -least[k];
     }
     for (uint32_t b = 0; b < cloud->bricks; b++) {
+        host_call_trim(sizeof cloud->brick[b]);
         for (int i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
             incode_vd t[3];
             relative(cloud, &cloud->brick[b], i, from, t);
@@ -333,6 +335,7 @@ static double least_above(const struct cloud *cloud, const double o[3],
                           const double q[3]) {
     incode_vd least = incode_vd_all(INFINITY);
     for (uint32_t b = 0; b < cloud->bricks; b++) {
+        host_call_trim(sizeof cloud->brick[b]);
         for (int i = 0; i < INCODE_BRICK_POINTS; i += INCODE_VD_LANES) {
             incode_vd t[3];
             relative(cloud, &cloud->brick[b], i, o, t);

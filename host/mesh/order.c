@@ -13,7 +13,12 @@
 #include "lift.h"
 #include "incode/complex/complex.h"
 
-enum { FORK_POINTS = 1 << 13 };
+enum {
+    FORK_POINTS = 1 << 13,
+    /* Bytes of arrays that are touched for a brick, its row numbers and its
+     * lump included. */
+    BRICK_TOUCHES = 2 * sizeof(struct incode_brick)
+};
 
 /* Vertex numbers of all bricks must stay below INCODE_NONE. */
 static const uint64_t bricks_max = (UINT64_C(1) << 26) - 1024;
@@ -133,6 +138,7 @@ static void store_brick(void *context, uint32_t number,
         row[i] = i < count ? (uint32_t)item->row : INCODE_NONE;
     }
     order->fill[number] = (uint8_t)count;
+    host_call_trim(BRICK_TOUCHES);
     host_lump_brick(&spread->lump[number], brick);
 }
 
@@ -230,6 +236,7 @@ static void make_pages(void *context, unsigned part) {
         const struct host_lump *first = below + i * INCODE_FANOUT;
         uint32_t count = children - i * INCODE_FANOUT;
         count = count > INCODE_FANOUT ? INCODE_FANOUT : count;
+        host_call_trim((count + 1) * sizeof *first + sizeof *boxes);
         host_lump_join(all, first, count);
         incode_boxes_init(boxes, all->lo, all->hi);
         move_origin(boxes, first, count);
@@ -311,6 +318,7 @@ static int make_grid(struct host_order *order, struct host_error *error) {
     uint32_t *first = order->first_of_cell;
     for (int pass = 0; pass < 2; pass++) {
         for (uint32_t b = order->bricks; b-- > 0;) {
+            host_call_trim(BRICK_TOUCHES);
             for (uint32_t i = order->fill[b]; i-- > 0;) {
                 uint32_t v = b * INCODE_BRICK_POINTS + i;
                 double p[3];
@@ -343,6 +351,7 @@ static int check_dimension(struct host_order *order, const char *where,
     host_vertex(order, last * INCODE_BRICK_POINTS + order->fill[last] - 1u, b);
     bool plane = false;
     for (uint32_t k = 0; k < order->bricks && !host_call_cancelled(); k++) {
+        host_call_trim(BRICK_TOUCHES);
         for (uint32_t i = 0; i < order->fill[k]; i++) {
             host_vertex(order, k * INCODE_BRICK_POINTS + i, d);
             if (!plane) {
@@ -534,6 +543,7 @@ static void add_some(struct incode_complex *x, const struct host_order *order,
     uint32_t added = 0;
     for (uint32_t b = 0; b < order->bricks && added < count; b++) {
         const struct incode_brick *brick = &order->brick[b];
+        host_call_trim(BRICK_TOUCHES);
         for (; added < count; added++) {
             uint64_t slot = added * points / count - rank;
             if (slot >= order->fill[b])

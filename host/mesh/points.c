@@ -4,13 +4,15 @@
 #include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/base/progress.h"
 #include "incode/triangulator.h"
 #include "order.h"
 
 enum { ROWS_SHOWN = 1 << 14 }; /* a clock a point would cost too much */
 
-enum { ROW_BYTES = 3 * sizeof(double) };
+/* READ_BYTES: with what a row was read from. */
+enum { ROW_BYTES = 3 * sizeof(double), READ_BYTES = 128 };
 
 /* Makes room for `rows` more, by half of what there is; where that is much, not
  * beyond the memory that is available, which the kernel would give and then end
@@ -52,6 +54,7 @@ int host_points_append(struct host_points *points, const double *xyz,
         grow(points, rows, error) != 0)
         return error->code;
     memcpy(points->xyz + 3 * points->count, xyz, rows * ROW_BYTES);
+    host_call_trim(rows * READ_BYTES);
     points->count += rows;
     return 0;
 }

@@ -55,14 +55,16 @@ struct mapping {
 };
 
 static void map_part(void *context, unsigned part) {
-    enum { POLL = 1 << 16 };
+    enum { POLL = 1 << 12, TOUCHED = 40 /* bytes a row */ };
     const struct mapping *m = context;
     uint64_t each = m->count / m->parts, i = each * part;
     uint64_t last = part + 1 == m->parts ? m->count : i + each;
-    while (i < last && !host_call_cancelled())
+    while (i < last && !host_call_cancelled()) {
+        host_call_trim((size_t)POLL * TOUCHED);
         for (uint64_t end = last - i > POLL ? i + POLL : last; i < end; i++)
             for (int k = 0; k < 4; k++)
                 m->to[i][k] = m->map[m->from[i][k]];
+    }
 }
 
 static void map_rows(uint32_t (*to)[4], const uint32_t (*from)[4],
@@ -101,11 +103,13 @@ int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
 enum {
     DIGIT_BITS = 10,
     BUCKETS = 1 << DIGIT_BITS,
+    ASIDE_BITS = 4, /* where not all rows are in memory */
     INSERTION_MAX = 40,
     FORK_ROWS = 1 << 16,
     SAMPLE = 63,
-    AHEAD = 8,          /* rows */
-    POLL_ROWS = 1 << 18 /* between two polls of whether it is cancelled */
+    AHEAD = 8,           /* rows */
+    POLL_ROWS = 1 << 12, /* between two polls of whether it is cancelled */
+    AROUND = 1 << 16     /* bytes that one row far from others touches */
 };
 
 typedef uint32_t row_t[4];
@@ -201,9 +205,12 @@ static inline __attribute__((always_inline)) void
 exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
     size_t next[BUCKETS], sum = 0, buckets = (size_t)d.mask + 1;
     memset(end, 0, buckets * sizeof *end);
-    for (size_t i = 0; i < n && !host_call_cancelled();)
-        for (size_t to = n - i > POLL_ROWS ? i + POLL_ROWS : n; i < to; i++)
+    for (size_t i = 0; i < n && !host_call_cancelled();) {
+        size_t to = n - i > POLL_ROWS ? i + POLL_ROWS : n;
+        host_call_trim((to - i) * sizeof *v);
+        for (; i < to; i++)
             end[word(v[i], w) >> d.shift & d.mask]++;
+    }
     if (host_call_cancelled()) /* counts that are not whole lead astray */
         return;
     for (size_t b = 0; b < buckets; b++) {
@@ -211,8 +218,14 @@ exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
         sum += end[b];
         end[b] = sum;
     }
+    size_t moved = 0;
     for (size_t b = 0; b < buckets && !host_call_cancelled(); b++) {
         while (next[b] < end[b]) {
+            if (moved >= POLL_ROWS) {
+                host_call_trim(moved * sizeof *v);
+                moved = 0;
+            }
+            moved++;
             row_t t;
             memcpy(t, v[next[b]], sizeof t);
             size_t to = word(t, w) >> d.shift & d.mask;
@@ -220,6 +233,7 @@ exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
                 row_t u;
                 memcpy(u, v[next[to]], sizeof u);
                 memcpy(v[next[to]++], t, sizeof t);
+                moved++;
                 /* So many streams are more than the processor foresees. */
                 __builtin_prefetch(&v[next[to] + AHEAD], 1);
                 memcpy(t, u, sizeof t);
@@ -237,17 +251,29 @@ static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS]) {
         exchange_by(v, n, d.word, d, end);
 }
 
-/* Sorts by a digit and goes on below it.  Depth: at most 16. */
+/* Bits for so many rows.  Every bucket has a place of its own where rows are
+ * read and written. */
+static int bits_for(size_t n, int bits) {
+    return n > host_call_share() / sizeof(row_t) && bits > ASIDE_BITS
+               ? ASIDE_BITS
+               : bits;
+}
+
+/* Sorts by a digit and goes on below it.  Depth: at most 16, or where arrays
+ * are put aside 32. */
 static void flag_sort(row_t *v, size_t n, struct digit digit, int bits) {
     size_t end[BUCKETS], first = 0, buckets = (size_t)digit.mask + 1;
     exchange(v, n, digit, end);
-    if (host_call_cancelled() || !go_down(&digit, bits))
+    if (host_call_cancelled())
         return;
     for (size_t b = 0; b < buckets; first = end[b++]) {
         size_t m = end[b] - first;
+        struct digit below = digit;
+        if (!go_down(&below, bits_for(m, bits)))
+            return;
         if (m > INSERTION_MAX)
-            flag_sort(v + first, m, digit, bits);
-        else if (digit.word > 0)
+            flag_sort(v + first, m, below, bits);
+        else if (below.word > 0)
             sort_star(v + first, m);
         else
             insertion_sort(v + first, m);
@@ -265,6 +291,7 @@ static uint32_t middle(row_t *v, size_t n) {
     uint32_t key[SAMPLE] = {0};
     for (size_t i = 0; i < SAMPLE; i++) {
         uint32_t k = v[n / SAMPLE * i][0];
+        host_call_trim(AROUND);
         size_t j = i;
         for (; j > 0 && k < key[j - 1]; j--)
             key[j] = key[j - 1];
@@ -280,6 +307,7 @@ static void sort_rows(void *argument) {
         size_t below = 0;
         for (size_t i = 0; i < s->n && !host_call_cancelled();) {
             size_t end = s->n - i > POLL_ROWS ? i + POLL_ROWS : s->n;
+            host_call_trim(2 * (end - i) * sizeof *s->v);
             for (; i < end; i++) {
                 row_t t;
                 memcpy(t, s->v[i], sizeof t);
@@ -304,14 +332,18 @@ static void sort_rows(void *argument) {
         return;
     }
     uint32_t top = 1;
-    for (size_t i = 0; i < s->n; i++)
-        top |= s->v[i][0];
+    for (size_t i = 0; i < s->n;) {
+        size_t end = s->n - i > POLL_ROWS ? i + POLL_ROWS : s->n;
+        host_call_trim((end - i) * sizeof *s->v);
+        for (; i < end; i++)
+            top |= s->v[i][0];
+    }
     /* The first word in as few digits as there may be, of equal size. */
     int used = 32 - __builtin_clz(top);
     int digits = (used + DIGIT_BITS - 1) / DIGIT_BITS;
     int bits = (used + digits - 1) / digits;
     struct digit digit = {0, used, 0};
-    (void)go_down(&digit, bits);
+    (void)go_down(&digit, bits_for(s->n, bits));
     flag_sort(s->v, s->n, digit, bits);
 }
 
@@ -328,6 +360,7 @@ static void canonical_part(void *context, unsigned part) {
     bool disordered = false;
     for (uint64_t i = first; i < last && !host_call_cancelled();) {
         uint64_t end = last - i > POLL_ROWS ? i + POLL_ROWS : last;
+        host_call_trim((size_t)(end - i) * sizeof *c->tets->v);
         for (; i < end; i++) {
             canonical(c->tets->v[i]);
             disordered = disordered ||
