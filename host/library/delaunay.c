@@ -254,9 +254,6 @@ static void do_region(struct worker *w, uint32_t number) {
         if (step == INCODE_FINISHED)
             return;
         if (step == INCODE_FULL || w->is_hopeless) {
-                fprintf(stderr, "FULL region %u of %u points %u hopeless %d\n",
-                        number, w->run->order->regions, r->points,
-                        w->is_hopeless);
             give_up_region(w, r);
             return;
         }
