@@ -13,21 +13,21 @@ limit=(--host-memory 16M --scratch "$aside")
 limited() {
     within "$BUILD/tests/peak" "$scratch/peak" "$INCODE" "$@" "${limit[@]}"
 }
+below() { [ "$(cat "$scratch/peak")" -lt 16384 ]; }
 # same NAME MADE WANTED COMMAND...: the command ends with 0 below the limit, MADE
 # is as WANTED, and nothing is left of what was put aside.
 same() {
-    local name=$1 made=$2 wanted=$3 status peak
+    local name=$1 made=$2 wanted=$3 status
     shift 3
-    rm -f "$scratch/peak"
+    echo 16384 > "$scratch/peak"
     limited "$@" 2> "$scratch/errors" > "$scratch/said"
     status=$?
-    peak=$(cat "$scratch/peak")
-    check "stream/$name" \
-        "exit $status, ${peak:-?} KiB, other bytes, or left:\
- $(ls -A "$aside") $(last "$scratch/errors")" \
-        eval '[ $status = 0 ] && [ "${peak:-16384}" -lt 16384 ] &&
-            cmp -s "$made" "$wanted" && [ -z "$(ls -A "$aside")" ]'
+    check "stream/$name" "exit $status, $(cat "$scratch/peak") KiB, other bytes, or\
+ left: $(ls -A "$aside") $(last "$scratch/errors")" is_same "$status"
     [ "$made" = "$scratch/said" ] || rm -f "$made"
+}
+is_same() {
+    [ "$1" = 0 ] && below && cmp -s "$made" "$wanted" && [ -z "$(ls -A "$aside")" ]
 }
 
 u=$scratch/u out=$scratch/out
@@ -88,8 +88,9 @@ printf '\0\0\0\0' |
     dd of="$scratch/wrong.npy" bs=1 seek=160128 conv=notrunc status=none
 limited verify "$u.npy" "$scratch/wrong.npy" > "$scratch/said" 2> "$scratch/errors"
 status=$?
-check 'stream/verify finds what is wrong' "exit $status: $(last "$scratch/errors")" \
-    eval '[ $status = 5 ] && [ "$(cat "$scratch/peak")" -lt 16384 ]'
+finds() { [ $status = 5 ] && below; }
+check 'stream/verify finds what is wrong' \
+    "exit $status, $(cat "$scratch/peak") KiB: $(last "$scratch/errors")" finds
 
 # --- what is wrong ------------------------------------------------------------
 
