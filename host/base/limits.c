@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "parallel.h"
+#include "progress.h"
 #include "scratch.h"
 
 static struct host_call call;
@@ -41,6 +42,7 @@ int host_limits_enter(const struct host_limits *limits, unsigned threads,
     call.threads = threads;
     call.memory_max = UINT64_MAX;
     if (limits->memory > 0) {
+        /* Each takes as much as one does. */
         call.threads = most < threads ? (unsigned)most : threads;
         if (host_scratch_begin(&scratch, folder, limits->memory, call.threads,
                                error) != 0)
@@ -48,6 +50,25 @@ int host_limits_enter(const struct host_limits *limits, unsigned threads,
         call.scratch = &scratch;
     }
     host_call_enter(&call);
+    return 0;
+}
+
+int host_limits_check(uint64_t need, bool noted, struct host_error *error) {
+    const double mb = 1e6;
+    if (host_call() != &call || call.scratch == NULL)
+        return 0;
+    uint64_t room = host_scratch_free(&scratch) + scratch.bytes;
+    if (room < need) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: %.0f MB are free on its file system, and %.0f MB "
+                         "may be put aside; free some, or give another as "
+                         "--scratch DIR",
+                         scratch.directory, (double)room / mb,
+                         (double)need / mb);
+    }
+    if (noted)
+        host_note("up to %.0f MB are put aside in %s", (double)need / mb,
+                  scratch.directory);
     return 0;
 }
 

@@ -38,6 +38,10 @@ struct host_limits {
 int host_limits_enter(const struct host_limits *limits, unsigned threads,
                       const char *output, struct host_error *error);
 
+/* Where so many bytes may be put aside in all: notes that, or HOST_INPUT if the
+ * disk has no room for them.  Nothing without a limit. */
+int host_limits_check(uint64_t need, bool noted, struct host_error *error);
+
 /* Ends it, if one has begun.  The most bytes that were put aside at a time. */
 uint64_t host_limits_leave(void);
 

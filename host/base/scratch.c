@@ -182,6 +182,10 @@ static bool place(struct host_scratch *s, struct host_scratch_array *a,
         s->wanted = bytes - a->bytes;
         return false;
     }
+    /* What the kernel reads ahead, it keeps in pieces of up to 2 MiB, and maps
+     * a whole piece once a byte of it is touched (since Linux 6.18). */
+    (void)madvise(space, bytes, MADV_NOHUGEPAGE);
+    (void)madvise(space, bytes, MADV_RANDOM);
     count(s, a->bytes, bytes);
     a->at = space;
     a->bytes = bytes;

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "host/base/create.h"
+#include "host/base/parallel.h"
 #include "host/base/progress.h"
 #include "write.h"
 
@@ -304,6 +305,7 @@ static void put_out(struct host_output *out, const char *bytes, size_t size) {
 
 static void flush(struct host_output *out) {
     put_out(out, out->buffer, out->used);
+    host_call_trim(out->used); /* it was written from about as much */
     out->used = 0;
 }
 

@@ -641,7 +641,9 @@ static enum host_direct run_order(struct common *common,
     for (unsigned i = 0; i < threads && sums != NULL; i++)
         sums->part[i].statistics.tetrahedra_kept = list[i].count;
     if (outcome == HOST_DIRECT_DONE &&
-        host_tetrahedra_join(list, threads, order->row, common->error) != 0)
+        host_tetrahedra_join(
+            list, threads, sums != NULL && sums->by_vertex ? NULL : order->row,
+            common->error) != 0)
         outcome = HOST_DIRECT_MEMORY;
     if (outcome == HOST_DIRECT_DONE) {
         *tets = list[0];

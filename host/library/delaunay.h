@@ -34,6 +34,7 @@ struct host_direct_sums {
      * done. */
     void (*committed)(uint32_t bricks);
     _Atomic uint32_t bricks;
+    bool by_vertex; /* vertex numbers of the order, not rows of the input */
     unsigned threads;
     struct host_direct_part part[HOST_THREADS_MAX];
 };
@@ -43,9 +44,9 @@ struct host_direct_sums {
 uint32_t host_direct_regions(unsigned threads, uint64_t points);
 
 /* Appends the tetrahedra of all regions to an empty list, as rows of the input
- * in no order.  sums: NULL, or what each thread has done.  The calling thread's
- * host_call, if there is one, limits threads and memory, may be cancelled, and
- * counts bricks. */
+ * (unless sums->by_vertex) in no order.  sums: NULL, or what each thread has
+ * done.  The calling thread's host_call, if there is one, limits threads and
+ * memory, may be cancelled, and counts bricks. */
 enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,

@@ -1,12 +1,23 @@
 #include "adjacency.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 
-enum { POLL_ROWS = 1 << 16 }; /* between two polls of whether it is cancelled */
+enum {
+    POLL_ROWS = 1 << 10, /* between two polls of whether it is cancelled */
+    AROUND = 1 << 16     /* bytes that one place far from others touches */
+};
+
+/* Every so many tetrahedra, of which each touches a place of its own. */
+static bool is_to_end(uint64_t i) {
+    if (i % POLL_ROWS == 0)
+        host_call_trim(POLL_ROWS * 256);
+    return i % POLL_ROWS == 0 && host_call_cancelled();
+}
 
 static uint32_t lower(uint32_t a, uint32_t b) {
     return a < b ? a : b;
@@ -22,7 +33,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
                      uint32_t *order) {
     const struct host_tetrahedra *tets = a->tets;
     for (uint64_t i = 0; i < tets->count; i++) {
-        if (i % POLL_ROWS == 0 && host_call_cancelled())
+        if (is_to_end(i))
             return;
         first[tets->v[i][rank] + 1]++;
     }
@@ -31,7 +42,7 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
     if (order == NULL)
         return;
     for (uint64_t i = 0; i < tets->count; i++) {
-        if (i % POLL_ROWS == 0 && host_call_cancelled())
+        if (is_to_end(i))
             return;
         order[first[tets->v[i][rank]]++] = (uint32_t)i;
     }
@@ -144,6 +155,7 @@ int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
     }
     for (; j < last; j++) {
         const uint32_t *v = a->tets->v[a->by_second[j]];
+        host_call_trim(AROUND);
         add(group, v[2], v[3], a->by_second[j], 0);
     }
     sort_group(group);

@@ -60,8 +60,13 @@ static void map_part(void *context, unsigned part) {
     uint64_t each = m->count / m->parts, i = each * part;
     uint64_t last = part + 1 == m->parts ? m->count : i + each;
     while (i < last && !host_call_cancelled()) {
+        uint64_t end = last - i > POLL ? i + POLL : last;
         host_call_trim((size_t)POLL * TOUCHED);
-        for (uint64_t end = last - i > POLL ? i + POLL : last; i < end; i++)
+        if (m->map == NULL) {
+            memmove(m->to[i], m->from[i], (size_t)(end - i) * sizeof *m->to);
+            i = end;
+        }
+        for (; i < end; i++)
             for (int k = 0; k < 4; k++)
                 m->to[i][k] = m->map[m->from[i][k]];
     }
@@ -86,7 +91,8 @@ int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
         all += tets[i].count;
     if (all > 0 && host_tetrahedra_room(&tets[0], all, error) == NULL)
         return error->code;
-    host_tetrahedra_map(&tets[0], map);
+    if (map != NULL)
+        host_tetrahedra_map(&tets[0], map);
     for (unsigned i = 1; i < lists; i++) {
         map_rows(tets[0].v + tets[0].count, (const uint32_t(*)[4])tets[i].v,
                  tets[i].count, map);

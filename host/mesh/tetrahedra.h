@@ -37,7 +37,8 @@ void host_tetrahedra_cut(struct host_tetrahedra *tets, uint64_t count);
 /* Replaces every vertex number by map[vertex]. */
 void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map);
 
-/* The same, of all lists, whose rows are put together in the first. */
+/* The same, of all lists, whose rows are put together in the first; map: NULL
+ * leaves the numbers as they are. */
 int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
                          const uint32_t *map, struct host_error *error);
 

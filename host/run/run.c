@@ -512,6 +512,10 @@ static int look_at_points(const struct host_run_options *options,
     return 0;
 }
 
+/* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
+ * and the points in order. */
+enum { ASIDE_BYTES = 320 };
+
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
@@ -520,9 +524,10 @@ int host_run(const struct host_run_options *options,
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
-        host_limits_enter(&options->limits, options->threads,
-                          options->outputs > 0 ? options->output[0] : NULL,
-                          error) != 0)
+        (options->direct &&
+         host_limits_enter(&options->limits, options->threads,
+                           options->outputs > 0 ? options->output[0] : NULL,
+                           error) != 0))
         return error->code;
     result->host_memory = options->limits.memory > 0
                               ? options->limits.memory
@@ -536,6 +541,9 @@ int host_run(const struct host_run_options *options,
     result->time_read_s = seconds_since(start);
     if (status == 0)
         status = look_at_points(options, &points, error);
+    if (status == 0)
+        status = host_limits_check(points.count * ASIDE_BYTES, !options->quiet,
+                                   error);
     if (status == 0)
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
@@ -583,6 +591,44 @@ static void take_sums(const struct host_direct_sums *sums,
     host_run_sum_nodes(r);
 }
 
+/* The exact check where it is asked for.  The count of the hull's facets, which
+ * only statistics need, comes from the check that the tetrahedra tile.  What is
+ * put aside is checked by vertex numbers of the order, as neighbours have close
+ * ones: each place of it is read once. */
+static bool is_checked_in_order(const struct host_run_options *options) {
+    return options->limits.memory > 0 &&
+           (options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL);
+}
+
+static int check(const struct host_run_options *options,
+                 const struct host_points *points,
+                 const struct host_order *order,
+                 const struct host_tetrahedra *tets, struct host_run_result *r,
+                 struct host_error *error) {
+    bool exact = options->verifying == HOST_VERIFY_ALWAYS;
+    enum host_check_depth depth =
+        exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING;
+    if (!exact && options->stats == NULL)
+        return 0;
+    uint64_t start = host_now_us();
+    host_progress_phase("checking", NULL);
+    struct host_sites sites = {0};
+    if (order != NULL)
+        sites = host_sites_of_order(order);
+    int status = order != NULL
+                     ? host_check(&sites, tets, depth, NULL, &r->check, error)
+                     : host_verify(points, tets, depth, &r->check, error);
+    r->hull_facets = r->check.hull_facets;
+    r->verified = status == 0 && exact;
+    r->checks_failed = status == HOST_UNVERIFIED;
+    r->time_verify_s = 1e-6 * (double)(host_now_us() - start);
+    if (status == HOST_UNVERIFIED) {
+        host_progress_erase();
+        fputs(r->check.text, stderr);
+    }
+    return status;
+}
+
 static int triangulate(const struct host_run_options *options,
                        const struct host_points *points,
                        struct host_tetrahedra *tets, struct host_order *order,
@@ -605,34 +651,14 @@ static int triangulate(const struct host_run_options *options,
     host_progress_phase("triangulating", NULL);
     memset(&sums, 0, sizeof sums);
     sums.committed = show_progress;
+    sums.by_vertex = is_checked_in_order(options);
     if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
         return error->code;
     take_sums(&sums, r);
-    return 0;
-}
-
-/* The exact check where it is asked for.  The count of the hull's facets, which
- * only statistics need, comes from the check that the tetrahedra tile. */
-static int check(const struct host_run_options *options,
-                 const struct host_points *points,
-                 const struct host_tetrahedra *tets, struct host_run_result *r,
-                 struct host_error *error) {
-    bool exact = options->verifying == HOST_VERIFY_ALWAYS;
-    if (!exact && options->stats == NULL)
+    if (!sums.by_vertex)
         return 0;
-    uint64_t start = host_now_us();
-    host_progress_phase("checking", NULL);
-    int status = host_verify(points, tets,
-                             exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING,
-                             &r->check, error);
-    r->hull_facets = r->check.hull_facets;
-    r->verified = status == 0 && exact;
-    r->checks_failed = status == HOST_UNVERIFIED;
-    r->time_verify_s = 1e-6 * (double)(host_now_us() - start);
-    if (status == HOST_UNVERIFIED) {
-        host_progress_erase();
-        fputs(r->check.text, stderr);
-    }
+    status = check(options, points, order, tets, r, error);
+    host_tetrahedra_map(tets, order->row);
     return status;
 }
 
@@ -654,10 +680,13 @@ static int host_triangulate_direct(const struct host_run_options *options,
     double before_s = (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
     int status = triangulate(options, points, tets, &order, result, error);
     host_order_free(&order);
-    result->time_triangulation_s = 1e-6 * (double)(host_now_us() - start);
+    result->time_triangulation_s =
+        1e-6 * (double)(host_now_us() - start) - result->time_verify_s;
     (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     result->host_triangulation_cpu_s =
         (double)used.tv_sec + 1e-9 * (double)used.tv_nsec - before_s;
     result->tetrahedra = tets->count;
-    return status == 0 ? check(options, points, tets, result, error) : status;
+    return status == 0 && !is_checked_in_order(options)
+               ? check(options, points, NULL, tets, result, error)
+               : status;
 }

@@ -270,7 +270,7 @@ int host_verify(const struct host_points *points,
  * Without a fault every facet has a tetrahedron on either side, or on one side
  * only: then it belongs to the boundary. */
 
-enum { BATCH = 64, TABLE_MIN = 64 };
+enum { BATCH = 64, TABLE_MIN = 64, TOUCHED = 1024 /* bytes a tetrahedron */ };
 
 /* --- The lists ------------------------------------------------------------ */
 
@@ -293,6 +293,8 @@ static void list_entries(void *context, unsigned number) {
     for (int fill = 0; fill < 2; fill++) {
         for (uint64_t i = 0; i < n; i++) {
             uint32_t tet = tet_of(part, i), low[2];
+            if (i % BATCH == 0)
+                host_call_trim((size_t)BATCH * TOUCHED);
             if (check_is_bad(c, part->first + tet))
                 continue;
             check_lowest_two(v[tet], low);
@@ -306,6 +308,8 @@ static void list_entries(void *context, unsigned number) {
         }
         for (uint64_t i = 0; i < count && fill == 0; i++) {
             uint32_t here = next[i];
+            if (i % BATCH == 0)
+                host_call_trim(BATCH * sizeof *next);
             next[i] = sum;
             sum += here;
         }
@@ -522,6 +526,7 @@ static void walk_vertex(struct walk *w, uint32_t p) {
         return; /* most */
     for (unsigned i = 0; i < c->parts; i++)
         tets += c->part[i].end[(size_t)p + 1] - c->part[i].end[p];
+    host_call_trim(tets * TOUCHED);
     if (tets == 0 || clear_slots(w, tets) != 0)
         return;
     for (unsigned i = 0; i < c->parts; i++) {

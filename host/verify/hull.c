@@ -14,7 +14,8 @@ enum {
     DIRECTIONS = 64,       /* rays tried before giving up */
     INSIDE_TRIES = 100000, /* tetrahedra tried for a point inside */
     TURN = 1 << 10,        /* facets or vertices a turn of a thread */
-    FACETS_MAX = 1 << 30,  /* as edges are numbered */
+    AROUND = 1 << 16,     /* bytes that a tetrahedron far from others touches */
+    FACETS_MAX = 1 << 30, /* as edges are numbered */
 };
 
 int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
@@ -75,6 +76,7 @@ static void at(const struct hull_check *c, uint32_t vertex, double p[3]) {
 
 static void outward(const struct hull_check *c, size_t facet, uint32_t v[3]) {
     const struct host_hull_facet *f = &c->hull->facet[facet];
+    host_call_trim(AROUND);
     host_facet_outward(c->hull->tets->v[f->tet], f->corner, v);
 }
 
@@ -110,6 +112,7 @@ static void run_some(void *context, unsigned part) {
     while ((i = __atomic_fetch_add(&all->c->next, TURN, __ATOMIC_RELAXED)) <
            all->count) {
         uint64_t last = all->count - i < TURN ? all->count : i + TURN;
+        host_call_trim((size_t)(last - i) * sizeof *all->c->edge);
         all->function(all->c, (size_t)i, (size_t)last);
     }
 }
@@ -221,6 +224,8 @@ static void list_edges(struct hull_check *c) {
         }
         for (uint64_t i = 0; i < c->hull->sites->count && fill == 0; i++) {
             uint32_t here = next[i];
+            if (i % TURN == 0)
+                host_call_trim(TURN * sizeof *next);
             next[i] = sum;
             sum += here;
         }

@@ -20,7 +20,8 @@
 #include "host/base/parallel.h"
 #include "parts.h"
 
-enum { BLOCK = 64 }; /* tetrahedra at a time: a word of `bad` */
+enum { TOUCHED = 1 << 16 }; /* bytes that a block may touch, far from others */
+enum { BLOCK = 64 };        /* tetrahedra at a time: a word of `bad` */
 
 /* The mark of a vertex: the finaliser of Steele, Lea and Flood's SplitMix64,
  * with a second key between its two steps. */
@@ -233,6 +234,7 @@ static void sum_part(void *context, unsigned number) {
         b.first = i;
         b.n = (uint32_t)(check_end(i, BLOCK, part->last) - i);
         b.v = (const uint32_t(*)[4])c->tets->v + i;
+        host_call_trim(TOUCHED);
         b.bad = 0;
         sort_vertices(&b);
         check_orientation(&b);
@@ -253,6 +255,7 @@ static void find_hot(void *context, unsigned number) {
     uint64_t count = c->sites->count, i, distinct = 0;
     while ((i = check_take(c, CHECK_VERTICES, count)) < count) {
         uint64_t end = check_end(i, CHECK_VERTICES, count);
+        host_call_trim(CHECK_VERTICES * c->parts * 2 * sizeof(uint64_t));
         for (; i < end; i++) {
             uint64_t sum = 0, used = c->used[i];
             uint32_t v = (uint32_t)i;
@@ -290,6 +293,8 @@ static void list_part(void *context, unsigned number) {
     uint64_t listed = 0;
     for (uint64_t i = part->first; i < part->last; i++) {
         const uint32_t *t = c->tets->v[i];
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * 2 * sizeof *c->tets->v);
         if (check_is_bad(c, i) ||
             (hot[t[0]] | hot[t[1]] | hot[t[2]] | hot[t[3]]) == 0)
             continue; /* most */
@@ -335,7 +340,11 @@ static void sum_all(struct check *c) {
 static void sum_carefully(struct check *c) {
     size_t count = (size_t)c->sites->count;
     for (unsigned i = 0; i < c->parts; i++)
-        memset(c->part[i].sum, 0, count * sizeof *c->part[i].sum);
+        for (size_t v = 0; v < count; v += CHECK_VERTICES) {
+            size_t n = (size_t)check_end(v, CHECK_VERTICES, count) - v;
+            memset(c->part[i].sum + v, 0, n * sizeof *c->part[i].sum);
+            host_call_trim(n * sizeof *c->part[i].sum);
+        }
     memset(c->used, 0, count);
     memset(c->bad, 0, ((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
     c->any_bad = c->any_unused = false;

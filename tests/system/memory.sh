@@ -1,0 +1,77 @@
+#!/usr/bin/env bash
+# `incode run` in less memory than its points and tetrahedra take: the same bytes
+# as in memory, and no more resident than the limit.  Then what ends such a run:
+# a folder or a disk that takes nothing, sizes and options that do not go.
+. tests/system/lib.sh
+
+# limited NAME POINTS SIZE OPTION...: the peak is below SIZE (MiB), and each
+# output NAME.* is that of the run in memory, whole.*.
+limited() {
+    local name=$1 points=$2 size=$3 stats=$scratch/stats.json peak
+    shift 3
+    succeeds "memory/$name" incode run "$points" -q --stats "$stats" \
+        --host-memory "${size}M" --scratch "$scratch" "$@"
+    peak=$(stat_of "$stats" host_peak_bytes)
+    check "memory/$name: peak" "$peak bytes of $size MiB" \
+        [ "$peak" -lt $((size << 20)) ]
+    check "memory/$name: stated" "$(stat_of "$stats" host_memory_bytes)" \
+        [ "$(stat_of "$stats" host_memory_bytes)" = $((size << 20)) ]
+}
+
+incode gen uniform 2000000 --seed 2 -o "$scratch/large.npy"
+succeeds 'memory/in memory' incode run "$scratch/large.npy" -q \
+    -o "$scratch/whole.npy"
+limited '2,000,000 in 64M' "$scratch/large.npy" 64 -o "$scratch/part.npy"
+check 'memory/2,000,000 in 64M: bytes' 'they differ' \
+    cmp -s "$scratch/whole.npy" "$scratch/part.npy"
+rm -f "$scratch"/*.npy
+
+# Every format, with a set that 16M do not hold.
+incode gen bubbles 40000 --seed 3 -o "$scratch/small.npy"
+formats='npy ele vtu vtk msh mesh'
+for size in '' 16; do
+    outputs=()
+    for format in $formats; do
+        outputs+=(-o "$scratch/${size:-whole}.$format")
+    done
+    if [ -z "$size" ]; then
+        succeeds 'memory/formats in memory' incode run "$scratch/small.npy" -q \
+            "${outputs[@]}"
+    else
+        limited 'formats' "$scratch/small.npy" $size "${outputs[@]}"
+    fi
+done
+for format in $formats node neigh face; do
+    check "memory/formats: .$format" 'its bytes differ' \
+        cmp -s "$scratch/whole.$format" "$scratch/16.$format"
+done
+
+# A scratch that takes nothing, or not all.
+exits 'memory/no such folder' 3 incode run "$scratch/small.npy" -q \
+    --host-memory 16M --scratch "$scratch/absent"
+check 'memory/no such folder: message' "$(last "$scratch/errors")" \
+    grep -q 'absent: no scratch file .* --scratch DIR' "$scratch/errors"
+exits 'memory/full' 3 bash -c 'ulimit -f 1024; exec "$@"' - "$INCODE" run \
+    "$scratch/small.npy" -q --host-memory 16M --scratch "$scratch"
+check 'memory/full: message' "$(last "$scratch/errors")" \
+    grep -q 'no room for .* bytes .* --scratch DIR' "$scratch/errors"
+
+# What does not go.
+for options in '--host-memory 1M' '--host-memory some' '--scratch /tmp' \
+    '--host-memory 64M --nodes 2'; do
+    # shellcheck disable=SC2086
+    exits "memory/$options" 2 incode run "$scratch/small.npy" -q $options
+done
+
+# Real sets: their digests.
+need_data 'memory/sets'
+while read -r set file points _ tetrahedra digest; do
+    [ "$tetrahedra" = 0 ] && continue
+    if [ -n "$(no_set "$file" "$points")" ]; then
+        skip "memory/$set" "$(no_set "$file" "$points")"
+        continue
+    fi
+    limited "$set" "$INCODE_DATA/$file" 16
+    check "memory/$set: digest" "$(stat_of "$scratch/stats.json" digest)" \
+        [ "$(stat_of "$scratch/stats.json" digest)" = "sha256:$digest" ]
+done < <(list_sets)
