@@ -126,7 +126,7 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
          HOST_AT(struct simple, output)},
         {"format", 0, "NAME", "What FILE is to be, where no extension tells:",
          HOST_AT(struct simple, format), .fill = list_written},
-        HOST_LIMITS_ROWS(struct simple, limits),
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
         {0}};
     struct host_points points = {0};
     struct simple s = {.seed = 1};
@@ -201,7 +201,7 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
     static const struct host_option options[] = {
         {"format", 0, "NAME", "What POINTS holds, where no extension tells:",
          HOST_AT(struct simple, format), .fill = list_read},
-        HOST_LIMITS_ROWS(struct simple, limits),
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
         {0}};
     struct simple s = {0};
     if (parse(
@@ -221,7 +221,7 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
 
 static int command_digest(int argc, char **argv, struct host_error *error) {
     static const struct host_option options[] = {
-        HOST_LIMITS_ROWS(struct simple, limits), {0}};
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder), {0}};
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
     struct simple s = {0};
@@ -246,7 +246,7 @@ static int command_convert(int argc, char **argv, struct host_error *error) {
         {"format", 0, "NAME",
          "IN holds points, and no extension tells of what format:",
          HOST_AT(struct simple, format), .fill = list_read},
-        HOST_LIMITS_ROWS(struct simple, limits),
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
         {0}};
     struct simple s = {0};
     if (parse(argc, argv, options, "IN OUT",

@@ -1,6 +1,5 @@
 #include "limits.h"
 
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +13,7 @@ static struct host_scratch scratch;
 
 /* Where to put aside what is not said. */
 static const char *folder_for(const char *output) {
-    static char folder[PATH_MAX];
+    static char folder[4096];
     const char *temporary = getenv("TMPDIR");
     if (temporary != NULL && temporary[0] != '\0')
         return temporary;

@@ -4,7 +4,7 @@
  *
  *   struct mine { struct host_limits limits; ... };
  *   static const struct host_option rows[] = {
- *       HOST_LIMITS_ROWS(struct mine, limits), {0}};
+ *       HOST_LIMITS_ROWS(struct mine, limits.memory, limits.folder), {0}};
  *   if (host_limits_enter(&mine.limits, 0, output, error) == 0)
  *       work();
  *   host_limits_leave(); */
@@ -20,16 +20,22 @@ struct host_limits {
     const char *folder; /* NULL: $TMPDIR, else that of the output, else /tmp */
 };
 
-#define HOST_LIMITS_ROWS(type, member)                                         \
-    {"host-memory", 0, "SIZE",                                                 \
+#define HOST_LIMITS_ROWS(type, memory, folder)                                 \
+    {"host-memory",                                                            \
+     0,                                                                        \
+     "SIZE",                                                                   \
      "Memory that the host may use, as 2G; the rest of points and tetrahedra " \
      "is put aside on disk. 16M or more. Default: all is held in memory",      \
-     HOST_AT(type, member.memory), .least = HOST_RESIDENT_MIN,                 \
+     HOST_AT(type, memory),                                                    \
+     .least = HOST_RESIDENT_MIN,                                               \
      .bytes = "give 16M or more, as in 2G"},                                   \
-        {"scratch", 0, "DIR",                                                  \
-         "Folder for what --host-memory puts aside. Default: $TMPDIR, else "   \
-         "that of the first output, else /tmp",                                \
-         HOST_AT(type, member.folder)}
+    {                                                                          \
+        "scratch", 0, "DIR",                                                   \
+            "Folder for what --host-memory puts aside. Default: $TMPDIR, "     \
+            "else "                                                            \
+            "that of the first output, else /tmp",                             \
+            HOST_AT(type, folder)                                              \
+    }
 
 /* From now on all that this thread does is a call (parallel.h) of `threads`
  * threads (0: one a processor) within these limits: there is one at a time.

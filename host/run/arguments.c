@@ -211,7 +211,7 @@ static const struct host_option rows[] = {
      "of a cube. Default: one a processor",
      HOST_AT(struct host_run_options, threads), .least = 1,
      .most = HOST_THREADS_MAX},
-    HOST_LIMITS_ROWS(struct host_run_options, limits),
+    HOST_LIMITS_ROWS(struct host_run_options, limits.memory, limits.folder),
     {.help = CUBE_HEADING},
     {"strategy", 0, "NAME", "How the work is shared out:",
      .take = take_strategy, .fill = list_strategies},
