@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "host/base/limits.h"
 #include "host/base/options.h"
 #include "host/base/text.h"
 #include "host/bench/bench.h"
@@ -44,6 +45,7 @@ struct simple {
     const char *format;
     uint64_t seed;
     bool sign;
+    struct host_limits limits;
     const char *wanted; /* names of the arguments */
 };
 
@@ -124,6 +126,7 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
          HOST_AT(struct simple, output)},
         {"format", 0, "NAME", "What FILE is to be, where no extension tells:",
          HOST_AT(struct simple, format), .fill = list_written},
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
         {0}};
     struct host_points points = {0};
     struct simple s = {.seed = 1};
@@ -158,34 +161,22 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
                          "FILE, or -o - to see them");
     }
     s.output = s.output == NULL ? "-" : s.output;
-    int status = host_gen(s.argument[0], n, s.seed, &points, error);
-    if (status == 0)
+    if (host_limits_enter(&s.limits, 0, s.output, error) == 0 &&
+        host_gen(s.argument[0], n, s.seed, &points, error) == 0)
         host_points_write_as(s.output, s.format, &points, error);
     host_points_free(&points);
+    (void)host_limits_leave();
     return host_output_commit(error);
 }
 
-static int command_verify(int argc, char **argv, struct host_error *error) {
-    static const struct host_option options[] = {
-        {"format", 0, "NAME", "What POINTS holds, where no extension tells:",
-         HOST_AT(struct simple, format), .fill = list_read},
-        {0}};
+static int verify(const struct simple *s, struct host_error *error) {
     static struct host_check_report report;
     struct host_points points = {0};
     struct host_tetrahedra tets = {0};
-    struct simple s = {0};
-    if (parse(
-            argc, argv, options, "POINTS TETS",
-            "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
-            "every tetrahedron positive, no vertex inside the sphere of a "
-            "neighbour, facets in pairs or on the convex hull, every distinct "
-            "point a vertex.",
-            2, &s, error) != 0)
-        return error->code;
-    int status = host_points_read_as(s.argument[0], s.format, &points, error);
+    int status = host_points_read_as(s->argument[0], s->format, &points, error);
     if (status == 0) {
-        host_points_note(s.argument[0], &points);
-        status = host_tetrahedra_read(s.argument[1], &tets, NULL, error);
+        host_points_note(s->argument[0], &points);
+        status = host_tetrahedra_read(s->argument[1], &tets, NULL, error);
     }
     if (status == 0) {
         status =
@@ -197,32 +188,57 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
         host_say(stdout,
                  "%s: %llu tetrahedra, %llu hull facets: the Delaunay "
                  "triangulation of %llu distinct points of %s\n",
-                 s.argument[1], (unsigned long long)report.tetrahedra,
+                 s->argument[1], (unsigned long long)report.tetrahedra,
                  (unsigned long long)report.hull_facets,
-                 (unsigned long long)report.distinct, s.argument[0]);
+                 (unsigned long long)report.distinct, s->argument[0]);
     }
     host_points_free(&points);
     host_tetrahedra_free(&tets);
     return status;
 }
 
+static int command_verify(int argc, char **argv, struct host_error *error) {
+    static const struct host_option options[] = {
+        {"format", 0, "NAME", "What POINTS holds, where no extension tells:",
+         HOST_AT(struct simple, format), .fill = list_read},
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
+        {0}};
+    struct simple s = {0};
+    if (parse(
+            argc, argv, options, "POINTS TETS",
+            "Checks exactly that TETS is the Delaunay triangulation of POINTS: "
+            "every tetrahedron positive, no vertex inside the sphere of a "
+            "neighbour, facets in pairs or on the convex hull, every distinct "
+            "point a vertex.",
+            2, &s, error) != 0)
+        return error->code;
+    int status = host_limits_enter(&s.limits, 0, NULL, error);
+    if (status == 0)
+        status = verify(&s, error);
+    (void)host_limits_leave();
+    return status;
+}
+
 static int command_digest(int argc, char **argv, struct host_error *error) {
+    static const struct host_option options[] = {
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder), {0}};
     struct host_tetrahedra tets = {0};
     struct host_digest digest;
     struct simple s = {0};
-    if (parse(argc, argv, NULL, "TETS",
+    if (parse(argc, argv, options, "TETS",
               "Prints the digest of a file of tetrahedra: SHA-256 of its rows, "
               "vertices and rows in ascending order.",
               1, &s, error) != 0)
         return error->code;
-    int status = host_tetrahedra_read(s.argument[0], &tets, NULL, error);
-    if (status == 0) {
+    if (host_limits_enter(&s.limits, 0, NULL, error) == 0 &&
+        host_tetrahedra_read(s.argument[0], &tets, NULL, error) == 0) {
         host_tetrahedra_sort(&tets);
         host_digest(&tets, &digest);
         printf("%s\n", digest.text);
     }
     host_tetrahedra_free(&tets);
-    return status;
+    (void)host_limits_leave();
+    return error->code;
 }
 
 static int command_convert(int argc, char **argv, struct host_error *error) {
@@ -230,6 +246,7 @@ static int command_convert(int argc, char **argv, struct host_error *error) {
         {"format", 0, "NAME",
          "IN holds points, and no extension tells of what format:",
          HOST_AT(struct simple, format), .fill = list_read},
+        HOST_LIMITS_ROWS(struct simple, limits.memory, limits.folder),
         {0}};
     struct simple s = {0};
     if (parse(argc, argv, options, "IN OUT",
@@ -237,14 +254,20 @@ static int command_convert(int argc, char **argv, struct host_error *error) {
               "files' extensions.",
               2, &s, error) != 0)
         return error->code;
-    return host_convert(s.argument[0], s.format, s.argument[1], error);
+    if (host_limits_enter(&s.limits, 0, s.argument[1], error) == 0)
+        (void)host_convert(s.argument[0], s.format, s.argument[1], error);
+    (void)host_limits_leave();
+    return error->code;
 }
 
 static int command_draw(int argc, char **argv, struct host_error *error) {
     struct host_draw_options options = {0};
     if (host_draw_arguments(argc, argv, &options, error) != 0)
         return error->code;
-    return host_draw(&options, error);
+    if (host_limits_enter(&options.limits, 0, options.output, error) == 0)
+        (void)host_draw(&options, error);
+    (void)host_limits_leave();
+    return error->code;
 }
 
 static int command_key(int argc, char **argv, struct host_error *error) {

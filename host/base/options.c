@@ -252,6 +252,13 @@ static void take_row(const struct host_option *row, void *into,
                              &nodes, error) != 0)
             return;
         n = nodes;
+    } else if (row->bytes != NULL) {
+        if (host_parse_bytes(value, &n) != 0 || n < row->least) {
+            host_fail(error, HOST_USAGE,
+                      "--%s %s: not a size of memory that is allowed; %s",
+                      row->name, value, row->bytes);
+            return;
+        }
     } else if (row->kind == HOST_OPTION_NUMBER ||
                row->kind == HOST_OPTION_UNSIGNED) {
         if (host_option_number(row->name, value, row->least, row->most, &n,

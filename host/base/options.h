@@ -38,6 +38,8 @@ struct host_option {
     size_t at;                  /* of the member in the command's struct */
     uint64_t least, most;       /* of a number */
     uint64_t unit;              /* a number is multiplied by it; 0: by 1 */
+    const char *bytes;          /* a number of bytes, `least` or more, as 2G;
+                                   what an error says to give; or NULL */
     host_row_name *names;       /* an unsigned is the index of one of these */
     const char *powers;         /* an unsigned is a power of two up to `most`;
                                    what an error says behind them; or NULL */

@@ -166,6 +166,8 @@ int host_draw_arguments(int argc, char **argv,
         {"width", 0, "PIXELS", "Of the picture, 16 to 8192. Default: 640",
          HOST_AT(struct host_draw_options, width), .least = HOST_PICTURE_MIN,
          .most = HOST_PICTURE_MAX},
+        HOST_LIMITS_ROWS(struct host_draw_options, limits.memory,
+                         limits.folder),
         {"quiet", 'q', NULL, "Print nothing but errors",
          HOST_AT(struct host_draw_options, quiet)},
         {0}};

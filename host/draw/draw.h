@@ -5,6 +5,7 @@
 #include <stdbool.h>
 
 #include "host/base/error.h"
+#include "host/base/limits.h"
 
 struct host_draw_options {
     const char *points, *tets, *output;
@@ -13,6 +14,7 @@ struct host_draw_options {
     double at;
     unsigned width; /* pixels */
     bool quiet;
+    struct host_limits limits; /* which the caller enters */
 };
 
 /* The command's arguments.  Wrong usage: HOST_USAGE, as in arguments.h. */

@@ -9,8 +9,13 @@
 #include <strings.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 
-enum { HEIGHT_MAX = 2, MARGIN = 1 };
+enum {
+    HEIGHT_MAX = 2,
+    MARGIN = 1,
+    AROUND = 1 << 16 /* bytes that one place far from others touches */
+};
 
 static const struct host_picture_format formats[] = {
     {".svg", host_picture_svg}, {".png", host_picture_png}};
@@ -98,6 +103,7 @@ static void add_line(struct host_raster *raster, unsigned y, double x0,
                      double x1, const float channels[HOST_CHANNELS]) {
     x0 = fmax(x0, 0.0);
     x1 = fmin(x1, raster->width);
+    host_call_trim(AROUND);
     for (unsigned x = (unsigned)fmax(x0, 0.0); x < x1; x++)
         add_part(raster, x, y, fmin(x1, x + 1.0) - fmax(x0, x), channels);
 }
@@ -156,6 +162,7 @@ static void draw_cells(struct host_raster *raster,
     const struct host_section *section = picture->section;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
+        host_call_trim(sizeof *cell);
         float channels[HOST_CHANNELS];
         double corner[4][2];
         unsigned colour = host_picture_colour(picture, cell);
@@ -180,6 +187,7 @@ static void blend(const struct host_raster *raster, png_byte *bytes) {
     channels_of(HOST_PICTURE_EDGES, edges);
     for (size_t i = 0; i < (size_t)raster->width * raster->height; i++) {
         const float *pixel = raster->pixels[i];
+        host_call_trim(sizeof raster->pixels[i] + 3);
         double clear = fmax(0.0, 1.0 - (double)pixel[3]);
         double dark = fmin(1.0, (double)pixel[4]);
         for (int k = 0; k < 3; k++) {
@@ -207,9 +215,25 @@ static int write_png(struct host_output *out, unsigned width, unsigned height,
     return error->code;
 }
 
+/* libpng takes pixels and file as a whole, which the limit of memory has to
+ * allow. */
+static int check_size(const struct host_picture *picture,
+                      struct host_error *error) {
+    size_t once = (size_t)6 * picture->width * picture->height;
+    if (once / host_threads() / 2 <= host_call_share())
+        return 0;
+    return host_fail(error, HOST_INPUT,
+                     "--width: a .png of %u x %u pixels is made as a whole; "
+                     "give --host-memory %zuM or more, a smaller --width, or "
+                     "an .svg",
+                     picture->width, picture->height, (4 * once >> 20) + 1);
+}
+
 int host_picture_png(struct host_output *out, struct host_picture *picture,
                      struct host_error *error) {
     struct host_raster raster = {picture->width, picture->height, NULL};
+    if (check_size(picture, error) != 0)
+        return error->code;
     size_t pixels = (size_t)picture->width * picture->height;
     png_byte *bytes = host_map(3 * pixels);
     raster.pixels = host_map(pixels * sizeof *raster.pixels);
@@ -283,6 +307,7 @@ static void merge(struct svg *s) {
     const struct host_section *section = s->picture->section;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
+        host_call_trim(sizeof *cell + AROUND);
         long at[4][2] = {{0}};
         unsigned n = quarters(s->picture, cell, at);
         struct pixel *pixel = pixel_of(s, at, n);
@@ -324,6 +349,7 @@ static void put_pixels(struct svg *s, unsigned colour) {
     bool any = false;
     for (size_t i = 0; i < (size_t)width * height; i++) {
         const struct pixel *p = &s->pixels[i];
+        host_call_trim(sizeof *p);
         if (p->cells == 0 || p->colours / p->cells != colour)
             continue;
         if (!any)
@@ -341,6 +367,7 @@ static void put_cells(struct svg *s, unsigned colour) {
     bool any = false;
     for (uint64_t i = 0; i < section->count; i++) {
         const struct host_cell *cell = &section->cells[i];
+        host_call_trim(sizeof *cell);
         if (host_picture_colour(s->picture, cell) != colour)
             continue;
         long at[4][2] = {{0}};

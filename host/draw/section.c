@@ -5,14 +5,22 @@
 #include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 
 /* Differences of doubles that are far apart, or next to 0, want the range of
  * the longer format. */
 typedef long double wide;
 
+enum {
+    BLOCK = 1 << 12, /* rows between two trims */
+    AROUND = 1 << 16 /* bytes that one place far from others touches */
+};
+
 /* What all of this module's functions know. */
 struct cut {
     const double *xyz;
+    uint64_t *above; /* a bit a point: it is above the plane */
+    size_t above_bytes;
     struct host_plane plane;
     unsigned side[2]; /* the axes of the picture */
     wide lo[2], scale;
@@ -22,6 +30,8 @@ static void bounds(const struct host_points *points, unsigned axis, double *lo,
                    double *hi) {
     *lo = *hi = points->xyz[axis];
     for (uint64_t i = 1; i < points->count; i++) {
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * 3 * sizeof *points->xyz);
         double x = points->xyz[3 * i + axis];
         *lo = x < *lo ? x : *lo;
         *hi = x > *hi ? x : *hi;
@@ -50,16 +60,39 @@ struct host_plane host_plane_through_middle(const struct host_points *points) {
     return (struct host_plane){least, host_plane_middle(points, least)};
 }
 
+static bool is_above(const struct cut *c, uint32_t v) {
+    return (c->above[v / 64] >> v % 64 & 1) != 0;
+}
+
 /* How many vertices are above the plane, and which are: first those, then the
- * others. */
+ * others.  The points themselves, which lie in no order, are read of a
+ * tetrahedron that is cut alone. */
 static unsigned split(const struct cut *c, const uint32_t v[4],
                       const double *vertex[4]) {
     unsigned above = 0, below = 4;
+    bool all = c->above_bytes <= host_call_share();
+    host_call_trim(all ? sizeof(uint32_t[4]) : 4 * AROUND);
     for (unsigned k = 0; k < 4; k++) {
-        const double *p = c->xyz + 3 * (uint64_t)v[k];
-        vertex[p[c->plane.axis] >= c->plane.at ? above++ : --below] = p;
+        vertex[is_above(c, v[k]) ? above++ : --below] =
+            c->xyz + 3 * (uint64_t)v[k];
     }
+    host_call_trim(above > 0 && above < 4 ? 4 * AROUND : 0);
     return above;
+}
+
+static int find_above(struct cut *c, const struct host_points *points,
+                      struct host_error *error) {
+    c->above_bytes = ((size_t)points->count / 64 + 1) * sizeof *c->above;
+    c->above = host_map(c->above_bytes);
+    if (c->above == NULL)
+        return host_fail_memory(error, "the points above the plane");
+    for (uint64_t i = 0; i < points->count; i++) {
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * 3 * sizeof *points->xyz);
+        bool above = points->xyz[3 * i + c->plane.axis] >= c->plane.at;
+        c->above[i / 64] |= (uint64_t)above << i % 64;
+    }
+    return 0;
 }
 
 /* Where the plane meets the edge, which is the same for all that share it. */
@@ -147,6 +180,7 @@ static void take(const struct cut *c, const struct host_tetrahedra *tets,
         if (above == 0 || above == 4)
             continue;
         struct host_cell *cell = &section->cells[section->count++];
+        host_call_trim(sizeof *cell);
         cell->corners = corners(c, vertex, above, at);
         cell->size = (float)size_of(vertex);
         sum += (double)cell->size;
@@ -167,6 +201,19 @@ static int beside(const struct host_points *points, struct host_plane plane,
                      plane.at, "xyz"[plane.axis], lo, hi);
 }
 
+static int make(struct host_section *section, const struct host_points *points,
+                const struct host_tetrahedra *tets, struct cut *c,
+                struct host_error *error) {
+    uint64_t count = measure(c, tets, section);
+    if (section->proportion[0] <= 0.0 || section->proportion[1] <= 0.0)
+        return beside(points, c->plane, error);
+    section->cells = host_map(count * sizeof *section->cells);
+    if (section->cells == NULL)
+        return host_fail_memory(error, "the section");
+    take(c, tets, section);
+    return 0;
+}
+
 int host_section_make(struct host_section *section,
                       const struct host_points *points,
                       const struct host_tetrahedra *tets,
@@ -175,14 +222,10 @@ int host_section_make(struct host_section *section,
     memset(section, 0, sizeof *section);
     c.side[0] = plane.axis == 0 ? 1 : 0;
     c.side[1] = plane.axis == 2 ? 1 : 2;
-    uint64_t count = measure(&c, tets, section);
-    if (section->proportion[0] <= 0.0 || section->proportion[1] <= 0.0)
-        return beside(points, plane, error);
-    section->cells = host_map(count * sizeof *section->cells);
-    if (section->cells == NULL)
-        return host_fail_memory(error, "the section");
-    take(&c, tets, section);
-    return 0;
+    if (find_above(&c, points, error) == 0)
+        (void)make(section, points, tets, &c, error);
+    host_unmap(c.above, c.above_bytes);
+    return error->code;
 }
 
 void host_section_free(struct host_section *section) {

@@ -2,9 +2,9 @@
  * it, and what reads and writes points and tetrahedra in it.  A new format is a
  * file of this room that defines one, host_format_NAME, and a row of formats.c.
  *
- * A reader takes bytes in memory.  For a packed file it takes the beginning,
- * and then what host_source_more adds, if its format sets `pieces`; else all of
- * it. It returns whatever the bytes are.  Sizes that a file claims are checked
+ * A reader takes bytes in memory.  If its format sets `pieces`, it takes the
+ * beginning of a file that is packed, or that a call which puts arrays aside
+ * reads, and then what host_source_more adds; else all of it.  It returns whatever the bytes are.  Sizes that a file claims are checked
  * against its length before memory is reserved. */
 #ifndef HOST_FORMAT_H
 #define HOST_FORMAT_H
@@ -60,7 +60,7 @@ struct host_format {
      * is that of a format that reads points. */
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
-    bool pieces; /* its readers take a packed file piece by piece, see above */
+    bool pieces; /* its readers take a file piece by piece, see above */
     bool apart;  /* its bytes are read in a process of its own (hdf5.h) */
     /* Of a format that is known and not read: the message "WHY; WHAT TO DO
      * NEXT", and the test whether a file that begins with these bytes has the

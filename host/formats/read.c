@@ -76,10 +76,11 @@ static int refuse_unread(const struct host_source *source,
 }
 
 /* Refuses what is not read, and replaces such CRs by LFs, in the file's own
- * bytes or, if the bytes are the caller's, in a copy.  A packed file is held
+ * bytes or, if the bytes are the caller's, in a copy.  The file is held
  * whole if its lines end so, or if its format needs that. */
 static int prepare(struct host_source *source, const struct host_format *format,
                    struct host_error *error) {
+    enum { PIECE = 1 << 16 };
     if (refuse_unread(source, error) != 0)
         return error->code;
     bool mends = ends_in_cr(source);
@@ -99,6 +100,8 @@ static int prepare(struct host_source *source, const struct host_format *format,
     for (size_t i = 0; i < source->bytes; i++) {
         bool alone =
             i + 1 == source->bytes || strchr("\r\n", text[i + 1]) == NULL;
+        if (i % PIECE == 0)
+            host_call_trim(PIECE);
         text[i] = text[i] == '\r' && alone ? '\n' : text[i];
     }
     return 0;
@@ -108,8 +111,8 @@ static int take_points(struct host_source *source,
                        const struct host_format *format,
                        struct host_points *points, struct host_error *error) {
     struct host_mesh mesh = {.points = points};
-    host_progress_phase("reading", "Mpoint");
     if (prepare(source, format, error) == 0) {
+        host_progress_phase("reading", "Mpoint");
         format->read_points(source, &mesh, error);
         host_source_fault(source, error);
     }
@@ -224,7 +227,10 @@ int host_tetrahedra_parse(const char *path, const void *data, size_t bytes,
 int host_rows_check(const char *path, const struct host_tetrahedra *tets,
                     const struct host_points *points,
                     struct host_error *error) {
+    enum { BLOCK = 1 << 12 };
     for (uint64_t i = 0; i < tets->count; i++) {
+        if (i % BLOCK == 0)
+            host_call_trim(BLOCK * sizeof *tets->v);
         for (int k = 0; k < 4; k++) {
             if (tets->v[i][k] >= points->count) {
                 return host_fail(error, HOST_INPUT,

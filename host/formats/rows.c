@@ -136,6 +136,7 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
                             const uint64_t vertex[4],
                             const struct host_source *source,
                             struct host_error *error) {
+    enum { READ_BYTES = 128 }; /* of a row, with what it was read from */
     uint32_t(*row)[4] = host_tetrahedra_room(tets, 1, error);
     if (row == NULL)
         return error->code;
@@ -149,6 +150,7 @@ int host_append_tetrahedron(struct host_tetrahedra *tets,
         row[0][k] = (uint32_t)vertex[k];
     }
     host_tetrahedra_keep(tets, 1);
+    host_call_trim(READ_BYTES);
     return 0;
 }
 

@@ -1,10 +1,13 @@
-/* A file as bytes in memory: whole, or, where it is packed, as a window over
- * what it unpacks to.
+/* A file as bytes in memory: whole, or as a window over what it holds or, where
+ * it is packed, unpacks to.  Files are read, never mapped: one that becomes
+ * shorter is an error.
  *
  * Memory: for a plain file, at most half of the memory available when reading
  * begins, as the points need the rest.  For a packed file a window of 1 MiB,
  * or 16 MiB if it has long lines; if the format needs the whole file, at most
- * a quarter of the available memory.  16 MiB are always allowed. */
+ * a quarter of the available memory.  16 MiB are always allowed.  In a call that
+ * puts arrays aside (scratch.h), plain files have a window, too, and what is
+ * held whole is put aside, as far as there is room. */
 #ifndef HOST_SOURCE_H
 #define HOST_SOURCE_H
 
@@ -22,7 +25,6 @@ struct host_source {
     size_t bytes;
     void *owned; /* what close gives back, `capacity` bytes */
     size_t capacity;
-    size_t most;            /* bytes that it may take; 0: not yet known */
     size_t bound;           /* most bytes that its caller takes; 0: none */
     struct host_feed *feed; /* NULL: data is whole; else a beginning */
     const char *what;
@@ -31,9 +33,9 @@ struct host_source {
 /* Whether a name ends in .gz, in letters of either case. */
 bool host_is_packed(const char *path);
 
-/* Opens it ("-": standard input).  `data` has the beginning of a packed file,
- * or all of a plain one.  A missing, unreadable, empty or damaged file, or one
- * too large for the memory: HOST_INPUT. */
+/* Opens it ("-": standard input).  `data` has the beginning, or all of a plain
+ * file where nothing is put aside.  A missing, unreadable, empty or damaged
+ * file, or one too large for the memory: HOST_INPUT. */
 int host_source_begin(struct host_source *source, const char *path, bool packed,
                       struct host_error *error);
 
@@ -44,7 +46,7 @@ int host_source_hold(struct host_source *source, struct host_error *error);
 int host_source_open(struct host_source *source, const char *path, bool packed,
                      struct host_error *error);
 
-/* Moves the window over a packed file: keeps the bytes from *at to *end (at
+/* Moves the window over the file: keeps the bytes from *at to *end (at
  * first a part of `data`), appends more, and sets *at and *end to where they
  * are now. False: the file has ended, or has a fault, which host_source_fault
  * reports. */
@@ -55,12 +57,16 @@ bool host_source_more(const struct host_source *source, const uint8_t **at,
 int host_source_all(const struct host_source *source, const uint8_t **at,
                     const uint8_t **end, struct host_error *error);
 
-/* If a packed file had a fault, reports it in place of the reader's error,
+/* If such a file had a fault, reports it in place of the reader's error,
  * which its early end has caused.  Returns error->code. */
 int host_source_fault(const struct host_source *source,
                       struct host_error *error);
 
-/* The same, not unpacked, of a file of at most so many bytes, the most that
+/* The first place of a word in `data`, or NULL. */
+const char *host_source_find(const struct host_source *source,
+                             const char *word);
+
+/* The same as host_source_open, not unpacked, of a file of at most so many bytes, the most that
  * `what` has; a longer one, or one without an end: HOST_INPUT. */
 int host_source_open_bounded(struct host_source *source, const char *path,
                              size_t most, const char *what,

@@ -2,7 +2,6 @@
  * text, base64 or appended, plain or packed by zlib. */
 #include <expat.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <zlib.h>
@@ -13,6 +12,7 @@
 
 #include "format.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "rows.h"
 #include "scan.h"
 #include "read.h"
@@ -28,22 +28,25 @@ struct coding {
 };
 
 struct bytes {
-    uint8_t *data;
+    const uint8_t *data;
     size_t bytes;
+    uint8_t *owned; /* `capacity` bytes, or NULL: they are the file's */
     size_t capacity;
 };
 
 /* A deflated byte holds at most 1,032 (zlib's own figure). */
 enum { INFLATION_MAX = 1032 };
 
+enum { BLOCK = 1 << 16 }; /* bytes between two trims */
+
 static void free_array(struct bytes *array) {
-    host_unmap(array->data, array->capacity);
+    host_unmap(array->owned, array->capacity);
     *array = (struct bytes){0};
 }
 
 static int reserve(struct bytes *array, size_t bytes,
                    struct host_error *error) {
-    array->data = host_map(bytes);
+    array->data = array->owned = host_map(bytes);
     array->capacity = bytes;
     array->bytes = 0;
     return array->data == NULL ? host_fail_memory(error, "an array") : 0;
@@ -68,6 +71,8 @@ static size_t decode(const uint8_t *from, size_t bytes, uint8_t *to,
     for (size_t i = 0; i < bytes && done < most; i++) {
         uint8_t c = from[i];
         int value = value_of(c);
+        if (i % BLOCK == 0)
+            host_call_trim(2 * BLOCK);
         if (c == ' ' || c == '\n' || c == '\r' || c == '\t')
             continue;
         if (value < 0 && (c != '=' || count < 2))
@@ -94,15 +99,13 @@ struct packed {
 /* The first `most` bytes of what is packed, decoded. */
 static int plain(struct bytes *out, const struct packed *p, size_t most,
                  struct host_error *error) {
-    size_t limit = p->bytes;
-    if (reserve(out, most < limit ? most : limit, error) != 0)
+    size_t limit = most < p->bytes ? most : p->bytes;
+    if (!p->coding->base64)
+        *out = (struct bytes){.data = p->from, .bytes = limit};
+    else if (reserve(out, limit, error) == 0)
+        out->bytes = decode(p->from, p->bytes, out->owned, limit);
+    else
         return error->code;
-    if (p->coding->base64) {
-        out->bytes = decode(p->from, p->bytes, out->data, out->capacity);
-    } else {
-        memcpy(out->data, p->from, out->capacity);
-        out->bytes = out->capacity;
-    }
     if (out->bytes < most) {
         return host_source_fail(p->source, error,
                                 "an array ends before its stated length; the "
@@ -134,10 +137,11 @@ static int inflate_blocks(struct bytes *out, const struct packed *p,
         uLongf n = (uLongf)(b + 1 == blocks && last != 0 ? last : size);
         uLongf expected = n;
         if (packed > in->bytes - at || n > out->capacity - out->bytes ||
-            uncompress(out->data + out->bytes, &n, in->data + at,
+            uncompress(out->owned + out->bytes, &n, in->data + at,
                        (uLong)packed) != Z_OK ||
             n != expected)
             return damaged(p, error);
+        host_call_trim((size_t)(n + packed));
         at += (size_t)packed;
         out->bytes += n;
     }
@@ -190,7 +194,7 @@ static int unpack_plain(struct bytes *out, const struct packed *p,
     }
     free_array(&head);
     if (error->code == 0 && plain(out, p, word + (size_t)bytes, error) == 0) {
-        memmove(out->data, out->data + word, (size_t)bytes);
+        out->data += word;
         out->bytes = (size_t)bytes;
     }
     return error->code;
@@ -380,7 +384,7 @@ static void XMLCALL characters(void *context, const char *text, int length) {
     }
     if (x->text_capacity - x->text_bytes < n) {
         size_t capacity = x->text_capacity * 2 + n + 4096;
-        char *grown = realloc(x->text, capacity);
+        char *grown = host_remap(x->text, x->text_capacity, capacity);
         if (grown == NULL) {
             host_fail_memory(x->error, "an array");
             return;
@@ -389,6 +393,7 @@ static void XMLCALL characters(void *context, const char *text, int length) {
         x->text_capacity = capacity;
     }
     memcpy(x->text + x->text_bytes, text, n);
+    host_call_trim(2 * n);
     x->text_bytes += n;
 }
 
@@ -397,8 +402,8 @@ static void end_array(struct xml *x) {
     if (x->reading_base64) {
         unpack(x, x->reading, true, (const uint8_t *)x->text, x->text_bytes);
     } else { /* the text itself changes hands; it is freed with the piece */
-        a->bytes.data = (uint8_t *)x->text;
-        a->bytes.bytes = x->text_bytes;
+        a->bytes = (struct bytes){(uint8_t *)x->text, x->text_bytes,
+                                  (uint8_t *)x->text, x->text_capacity};
         x->text = NULL;
         x->text_capacity = 0;
     }
@@ -474,10 +479,7 @@ static void end_piece(struct xml *x) {
         }
     }
     for (int i = 0; i < WANTS; i++) {
-        if (x->array[i].text)
-            free(x->array[i].bytes.data);
-        else
-            free_array(&x->array[i].bytes);
+        free_array(&x->array[i].bytes);
         x->array[i] = (struct array){0};
     }
 }
@@ -501,7 +503,7 @@ static void XMLCALL end_element(void *context, const char *name) {
 static size_t find_appended(struct xml *x) {
     const char *begin = (const char *)x->source->data;
     size_t bytes = x->source->bytes;
-    const char *tag = memmem(begin, bytes, "<AppendedData", 13);
+    const char *tag = host_source_find(x->source, "<AppendedData");
     if (tag == NULL)
         return bytes;
     size_t rest = bytes - (size_t)(tag - begin);
@@ -524,7 +526,7 @@ static void parse(struct xml *x, size_t bytes) {
     XML_SetElementHandler(x->parser, start_element, end_element);
     XML_SetCharacterDataHandler(x->parser, characters);
     while (bytes > 0 && x->error->code == 0) {
-        size_t n = bytes > (size_t)1 << 20 ? (size_t)1 << 20 : bytes;
+        size_t n = bytes > BLOCK ? BLOCK : bytes;
         if (XML_Parse(x->parser, at, (int)n, whole && n == bytes) !=
             XML_STATUS_OK) {
             char text[160];
@@ -532,6 +534,7 @@ static void parse(struct xml *x, size_t bytes) {
                            XML_ErrorString(XML_GetErrorCode(x->parser)));
             fail(x, text);
         }
+        host_call_trim(n);
         at += n;
         bytes -= n;
     }
@@ -557,7 +560,7 @@ static int read_vtkxml(const struct host_source *source, struct host_mesh *mesh,
     x.piece_points = x.piece_cells = 0;
     end_piece(&x); /* frees what an error left behind */
     XML_ParserFree(x.parser);
-    free(x.text);
+    host_unmap(x.text, x.text_capacity);
     return error->code;
 }
 

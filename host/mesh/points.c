@@ -1,5 +1,6 @@
 #include "points.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -16,13 +17,15 @@ enum { ROW_BYTES = 3 * sizeof(double), READ_BYTES = 128 };
 
 /* Makes room for `rows` more, by half of what there is; where that is much, not
  * beyond the memory that is available, which the kernel would give and then end
- * the program for. */
+ * the program for; a file is reserved whole. */
 static int grow(struct host_points *points, uint64_t rows,
                 struct host_error *error) {
     const uint64_t much = ((uint64_t)64 << 20) / ROW_BYTES;
     uint64_t more = points->capacity / 2 + rows + 1024;
+    const struct host_call *call = host_call();
+    bool aside = call != NULL && call->scratch != NULL;
     void *grown = NULL;
-    if (more > much) {
+    if (more > much && !aside) {
         uint64_t room = host_memory_available() / ROW_BYTES;
         more = room <= much ? 0 : room < more ? room : more;
     }
@@ -31,6 +34,8 @@ static int grow(struct host_points *points, uint64_t rows,
         grown = host_remap(points->xyz, points->capacity * ROW_BYTES,
                            capacity * ROW_BYTES);
     }
+    if (grown == NULL && aside)
+        return host_fail_memory(error, "the points");
     if (grown == NULL) {
         return host_fail(error, HOST_INPUT,
                          "host: more than %llu points are no longer held by "

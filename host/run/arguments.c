@@ -131,17 +131,6 @@ static void take_memory(void *into, const char *value,
     *bytes = *bytes / 4096 * 4096;
 }
 
-static void take_host_memory(void *into, const char *value,
-                             struct host_error *error) {
-    uint64_t *bytes = &((struct host_run_options *)into)->host_memory;
-    if (host_parse_bytes(value, bytes) != 0 || *bytes < HOST_RESIDENT_MIN) {
-        host_fail(error, HOST_USAGE,
-                  "--host-memory %s: not a size of memory that is allowed; "
-                  "give 16M or more, as in 2G",
-                  value);
-    }
-}
-
 static void take_output(void *into, const char *value,
                         struct host_error *error) {
     struct host_run_options *o = into;
@@ -222,14 +211,7 @@ static const struct host_option rows[] = {
      "of a cube. Default: one a processor",
      HOST_AT(struct host_run_options, threads), .least = 1,
      .most = HOST_THREADS_MAX},
-    {"host-memory", 0, "SIZE",
-     "Memory that the host may use, as 2G; the rest of points and tetrahedra "
-     "is put aside on disk. 16M or more. Default: all is held in memory",
-     .take = take_host_memory},
-    {"scratch", 0, "DIR",
-     "Folder for what is put aside. Default: $TMPDIR, else that of the first "
-     "output, else /tmp",
-     HOST_AT(struct host_run_options, scratch)},
+    HOST_LIMITS_ROWS(struct host_run_options, limits.memory, limits.folder),
     {.help = CUBE_HEADING},
     {"strategy", 0, "NAME", "How the work is shared out:",
      .take = take_strategy, .fill = list_strategies},
@@ -379,7 +361,7 @@ static int check_together(struct host_run_options *o, uint64_t given,
         {"window", bare, "this board's firmware settles it"},
         {"node-program", bare, "this board has firmware"},
         {"node-program", ranks, "not with --link mpi"},
-        {"scratch", o->host_memory == 0, "goes with --host-memory alone"},
+        {"scratch", o->limits.memory == 0, "goes with --host-memory alone"},
         {"progress", o->quiet, "-q prints none"},
         {"explain", o->quiet, "-q prints nothing"},
         {"explain", o->strategy != NULL, "goes with --strategy auto alone"},
@@ -472,7 +454,7 @@ static int parse_run(int argc, char **argv, bool silent,
                          "a cube of nodes; leave one of the two out",
                          of_cube);
     }
-    if (!options->direct && options->host_memory > 0) {
+    if (!options->direct && options->limits.memory > 0) {
         return host_fail(error, HOST_USAGE,
                          "--host-memory: limits a run on threads, and --%s "
                          "speaks of a cube of nodes; leave one of the two out",

@@ -11,7 +11,6 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/base/progress.h"
-#include "host/base/scratch.h"
 #include "host/formats/output.h"
 #include "host/formats/write.h"
 #include "host/formats/formats.h"
@@ -19,7 +18,6 @@
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
 #include "choose.h"
-#include "limit.h"
 #include "report.h"
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
@@ -514,20 +512,25 @@ static int look_at_points(const struct host_run_options *options,
     return 0;
 }
 
+/* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
+ * and the points in order. */
+enum { ASIDE_BYTES = 320 };
+
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
-    static struct host_scratch scratch;
-    struct host_call call;
     struct host_points points = {0};
     uint64_t start = host_now_us();
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
-        host_limit_begin(options, &call, &scratch, error) != 0)
+        (options->direct &&
+         host_limits_enter(&options->limits, options->threads,
+                           options->outputs > 0 ? options->output[0] : NULL,
+                           error) != 0))
         return error->code;
-    result->host_memory = options->host_memory > 0
-                              ? options->host_memory
+    result->host_memory = options->limits.memory > 0
+                              ? options->limits.memory
                               : host_memory_available() / 2;
     if (options->anywhere)
         host_progress_begin_anywhere();
@@ -538,13 +541,14 @@ int host_run(const struct host_run_options *options,
     result->time_read_s = seconds_since(start);
     if (status == 0)
         status = look_at_points(options, &points, error);
-    if (status == 0 && call.scratch != NULL)
-        status = host_limit_check(options, &scratch, points.count, error);
+    if (status == 0)
+        status = host_limits_check(points.count * ASIDE_BYTES, !options->quiet,
+                                   error);
     if (status == 0)
         status = run_on(options, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
-    host_limit_end(&call, result);
+    result->scratch_bytes = host_limits_leave();
     result->host_peak_bytes = host_memory_peak();
     result->time_total_s = seconds_since(start);
     if (status == 0 && options->stats != NULL)
@@ -592,7 +596,7 @@ static void take_sums(const struct host_direct_sums *sums,
  * put aside is checked by vertex numbers of the order, as neighbours have close
  * ones: each place of it is read once. */
 static bool is_checked_in_order(const struct host_run_options *options) {
-    return options->host_memory > 0 &&
+    return options->limits.memory > 0 &&
            (options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL);
 }
 

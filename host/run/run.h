@@ -7,6 +7,7 @@
 
 #include <sys/types.h>
 
+#include "host/base/limits.h"
 #include "host/verify/check.h"
 #include "host/nodes/boards.h"
 #include "host/nodes/cluster.h"
@@ -16,7 +17,7 @@
 #include "host/service/service.h"
 #include "host/service/strategies/strategies.h"
 
-enum { HOST_OUTPUTS_MAX = 16, HOST_RESIDENT_MIN = 16 << 20 };
+enum { HOST_OUTPUTS_MAX = 16 };
 
 struct host_run_result;
 
@@ -41,8 +42,7 @@ struct host_run_options {
      * a second of the host's wire; 0: there are none, or it is fast. */
     unsigned processors;
     uint64_t wire_bytes_s;
-    uint64_t host_memory; /* of the host, the rest is put aside; 0: as it is */
-    const char *scratch;  /* the folder for that; NULL: see run.c */
+    struct host_limits limits; /* of the host's memory */
     uint64_t memory;
     uint64_t patience_s; /* for a node that does not answer */
     const char *cube;    /* a file that describes real nodes, or NULL */

@@ -270,7 +270,13 @@ int host_verify(const struct host_points *points,
  * Without a fault every facet has a tetrahedron on either side, or on one side
  * only: then it belongs to the boundary. */
 
-enum { BATCH = 64, TABLE_MIN = 64, TOUCHED = 1024 /* bytes a tetrahedron */ };
+enum { BATCH = 64, TABLE_MIN = 64 };
+
+/* Bytes that so many tetrahedra touch.  Where vertices lie in no order, each
+ * has pages of its own. */
+static size_t touched(const struct check *c, size_t tets) {
+    return tets * (c->sites->order != NULL ? 1 << 10 : 12 << 10);
+}
 
 /* --- The lists ------------------------------------------------------------ */
 
@@ -294,7 +300,7 @@ static void list_entries(void *context, unsigned number) {
         for (uint64_t i = 0; i < n; i++) {
             uint32_t tet = tet_of(part, i), low[2];
             if (i % BATCH == 0)
-                host_call_trim((size_t)BATCH * TOUCHED);
+                host_call_trim(touched(c, BATCH));
             if (check_is_bad(c, part->first + tet))
                 continue;
             check_lowest_two(v[tet], low);
@@ -526,7 +532,7 @@ static void walk_vertex(struct walk *w, uint32_t p) {
         return; /* most */
     for (unsigned i = 0; i < c->parts; i++)
         tets += c->part[i].end[(size_t)p + 1] - c->part[i].end[p];
-    host_call_trim(tets * TOUCHED);
+    host_call_trim(touched(c, tets));
     if (tets == 0 || clear_slots(w, tets) != 0)
         return;
     for (unsigned i = 0; i < c->parts; i++) {

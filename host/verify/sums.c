@@ -21,6 +21,7 @@
 #include "parts.h"
 
 enum { TOUCHED = 1 << 16 }; /* bytes that a block may touch, far from others */
+enum { NO_ORDER = 16 };     /* times as many where vertices lie in no order */
 enum { BLOCK = 64 };        /* tetrahedra at a time: a word of `bad` */
 
 /* The mark of a vertex: the finaliser of Steele, Lea and Flood's SplitMix64,
@@ -234,7 +235,7 @@ static void sum_part(void *context, unsigned number) {
         b.first = i;
         b.n = (uint32_t)(check_end(i, BLOCK, part->last) - i);
         b.v = (const uint32_t(*)[4])c->tets->v + i;
-        host_call_trim(TOUCHED);
+        host_call_trim(c->sites->order != NULL ? TOUCHED : NO_ORDER * TOUCHED);
         b.bad = 0;
         sort_vertices(&b);
         check_orientation(&b);

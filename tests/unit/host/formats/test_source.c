@@ -10,6 +10,8 @@
 #include <zlib.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "host/formats/source.h"
 #include "host/formats/read.h"
 
@@ -333,6 +335,142 @@ TEST(points_beyond_the_memory) {
     assert_int_equal(told, points.count);
     assert_true(24 * points.count > 96 << 20);
     host_points_free(&points);
+}
+
+/* --- where arrays are put aside ------------------------------------------- */
+
+enum { LONG = 5 << 20 };
+
+static struct host_scratch scratch;
+static struct host_call call;
+
+static void begin_call(void) {
+    struct host_error error = {0};
+    call = (struct host_call){
+        .threads = 1, .memory_max = UINT64_MAX, .scratch = &scratch};
+    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 64 << 20, 1, &error),
+                     0);
+    host_call_enter(&call);
+}
+
+static void end_call(void) {
+    host_call_enter(NULL);
+    assert_int_equal(scratch.arrays, 0);
+    assert_int_equal(call.memory, 0);
+    host_scratch_end(&scratch);
+}
+
+static uint8_t byte_at(size_t i) {
+    return (uint8_t)(i * 2654435761u >> 24);
+}
+
+static void write_long(const char *name) {
+    static uint8_t bytes[LONG];
+    for (size_t i = 0; i < LONG; i++)
+        bytes[i] = byte_at(i);
+    FILE *file = fopen(name, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, LONG, file), LONG);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* Of a plain file there is a window of 1 MiB, and no byte is lost. */
+TEST(a_window_of_a_plain_file) {
+    struct host_source source;
+    struct host_error error = {0};
+    write_long("long");
+    begin_call();
+    assert_int_equal(host_source_begin(&source, "long", false, &error), 0);
+    assert_int_equal(source.bytes, 1 << 20);
+    const uint8_t *at = source.data, *end = source.data + source.bytes;
+    size_t seen = 0, wrong = 0;
+    do {
+        assert_true(end - at <= 1 << 20);
+        while (end - at > 100) { /* which are kept */
+            wrong += *at != byte_at(seen++);
+            at++;
+        }
+    } while (host_source_more(&source, &at, &end));
+    for (; at < end; at++)
+        wrong += *at != byte_at(seen++);
+    assert_int_equal(host_source_fault(&source, &error), 0);
+    assert_int_equal(wrong, 0);
+    assert_int_equal(seen, LONG);
+    host_source_close(&source);
+    assert_int_equal(host_source_open(&source, "long", false, &error), 0);
+    assert_int_equal(source.bytes, LONG);
+    assert_int_equal(source.capacity, LONG + 1);
+    for (size_t i = 0; i < LONG; i++)
+        wrong += source.data[i] != byte_at(i);
+    assert_int_equal(wrong, 0);
+    host_source_close(&source);
+    end_call();
+    assert_int_equal(unlink("long"), 0);
+}
+
+/* Whatever reads the rest of a file that has become shorter, says so. */
+TEST(a_file_that_becomes_shorter) {
+    static const char said[] =
+        "long: it has become shorter while it was read, 3000000 bytes instead "
+        "of 5242880; let nothing write to it, and run again";
+    struct host_source source;
+    begin_call();
+    for (int way = 0; way < 3; way++) {
+        struct host_error error = {0};
+        write_long("long");
+        assert_int_equal(host_source_begin(&source, "long", false, &error), 0);
+        assert_int_equal(truncate("long", 3000000), 0);
+        const uint8_t *at = source.data, *end = source.data + source.bytes;
+        if (way == 0) {
+            while (host_source_more(&source, &at, &end))
+                at = end;
+            assert_int_equal(host_source_fault(&source, &error), HOST_INPUT);
+        } else if (way == 1) {
+            assert_int_equal(host_source_all(&source, &at, &end, &error),
+                             HOST_INPUT);
+        } else {
+            assert_int_equal(host_source_hold(&source, &error), HOST_INPUT);
+            assert_null(source.data);
+        }
+        assert_string_equal(error.text, said);
+        host_source_close(&source);
+    }
+    end_call();
+    assert_int_equal(unlink("long"), 0);
+}
+
+/* The same of a packed one, which is cut short then. */
+TEST(a_packed_file_that_becomes_shorter) {
+    struct host_source source;
+    struct host_error error = {0};
+    gzFile file = gzopen("long.gz", "wb0");
+    assert_non_null(file);
+    for (size_t i = 0; i < LONG; i++)
+        assert_int_equal(gzputc(file, byte_at(i)), byte_at(i));
+    assert_int_equal(gzclose(file), Z_OK);
+    assert_int_equal(host_source_begin(&source, "long.gz", true, &error), 0);
+    assert_int_equal(truncate("long.gz", 3000000), 0);
+    assert_int_equal(host_source_hold(&source, &error), HOST_INPUT);
+    assert_non_null(strstr(error.text, "long.gz: it has become shorter while"));
+    assert_int_equal(unlink("long.gz"), 0);
+}
+
+/* A file that is held whole takes as much room as it has bytes: its error says
+ * how much there is, before it is read. */
+TEST(a_file_beyond_the_room) {
+    struct host_source source;
+    struct host_error error = {0};
+    int file = open("huge.vtu", O_WRONLY | O_CREAT, 0666);
+    assert_true(file >= 0);
+    assert_int_equal(ftruncate(file, (off_t)1 << 42), 0); /* all of it a hole */
+    (void)close(file);
+    begin_call();
+    assert_int_equal(host_source_open(&source, "huge.vtu", false, &error),
+                     HOST_INPUT);
+    end_call();
+    assert_non_null(strstr(error.text, "huge.vtu: 4398046.5 MB or more to put "
+                                       "aside, and /tmp has "));
+    assert_int_equal(unlink("huge.vtu"), 0);
 }
 
 TEST_GROUP(enter, leave)

@@ -1,0 +1,54 @@
+/* How much memory a command may have resident: --host-memory and --scratch,
+ * which all commands that read or make points or tetrahedra have.  What is
+ * beyond it is put aside (scratch.h).
+ *
+ *   struct mine { struct host_limits limits; ... };
+ *   static const struct host_option rows[] = {
+ *       HOST_LIMITS_ROWS(struct mine, limits.memory, limits.folder), {0}};
+ *   if (host_limits_enter(&mine.limits, 0, output, error) == 0)
+ *       work();
+ *   host_limits_leave(); */
+#ifndef HOST_LIMITS_H
+#define HOST_LIMITS_H
+
+#include "options.h"
+
+enum { HOST_RESIDENT_MIN = 16 << 20 };
+
+struct host_limits {
+    uint64_t memory;    /* bytes; 0: all is held in memory */
+    const char *folder; /* NULL: $TMPDIR, else that of the output, else /tmp */
+};
+
+#define HOST_LIMITS_ROWS(type, memory, folder)                                 \
+    {"host-memory",                                                            \
+     0,                                                                        \
+     "SIZE",                                                                   \
+     "Memory that the host may use, as 2G; the rest of points and tetrahedra " \
+     "is put aside on disk. 16M or more. Default: all is held in memory",      \
+     HOST_AT(type, memory),                                                    \
+     .least = HOST_RESIDENT_MIN,                                               \
+     .bytes = "give 16M or more, as in 2G"},                                   \
+    {                                                                          \
+        "scratch", 0, "DIR",                                                   \
+            "Folder for what --host-memory puts aside. Default: $TMPDIR, "     \
+            "else "                                                            \
+            "that of the first output, else /tmp",                             \
+            HOST_AT(type, folder)                                              \
+    }
+
+/* From now on all that this thread does is a call (parallel.h) of `threads`
+ * threads (0: one a processor) within these limits: there is one at a time.
+ * output: the first, or NULL.  0, HOST_USAGE for a folder without a limit, or
+ * HOST_INPUT: nothing can be put aside there. */
+int host_limits_enter(const struct host_limits *limits, unsigned threads,
+                      const char *output, struct host_error *error);
+
+/* Where so many bytes may be put aside in all: notes that, or HOST_INPUT if the
+ * disk has no room for them.  Nothing without a limit. */
+int host_limits_check(uint64_t need, bool noted, struct host_error *error);
+
+/* Ends it, if one has begun.  The most bytes that were put aside at a time. */
+uint64_t host_limits_leave(void);
+
+#endif
