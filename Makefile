@@ -88,8 +88,7 @@ fuzzers      := $(fuzz:tests/fuzz/%.c=$(BUILD)/fuzzers/%)
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: all unit points planted bare arithmetic fuzzers python \
-	python-files run check test \
+.PHONY: all unit points planted bare arithmetic fuzzers python run check test \
 	test-full bench firmware nodes cross fuzz lint install uninstall clean \
 	compdb hooks help deps deps-run deps-python deps-nodes deps-test deps-bench \
 	deps-full FORCE

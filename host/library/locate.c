@@ -29,6 +29,9 @@ struct locate {
     _Atomic uint64_t infinite; /* the lowest query of these */
     _Atomic uint64_t answered; /* of all */
     _Atomic unsigned status;   /* the first that is not INCODE_OK */
+
+    struct library_query few[FEW]; /* the block and walker of few queries */
+    struct library_walker one;
 };
 
 /* --- order ---------------------------------------------------------------- */
@@ -208,14 +211,12 @@ static enum incode_status answer_all(struct locate *l) {
 /* --- the call ------------------------------------------------------------- */
 
 static enum incode_status locate_few(struct locate *l) {
-    struct library_query block[FEW];
-    struct library_walker walker;
-    l->block = block;
-    l->walker = &walker;
+    l->block = l->few;
+    l->walker = &l->one;
     l->threads = 1;
-    library_walker_begin(&walker, &l->mesh);
+    library_walker_begin(&l->one, &l->mesh);
     enum incode_status status = answer_all(l);
-    library_walker_end(&walker);
+    library_walker_end(&l->one);
     return status;
 }
 
@@ -260,8 +261,8 @@ enum incode_status incode_locate(const double *xyz, uint64_t points,
                        .mesh = {xyz, points, t},
                        .query = query,
                        .queries = queries,
-                       .found = found,
-                       .at = at,
                        .infinite = UINT64_MAX};
+    l.found = found;
+    l.at = at;
     return library_call(&l.call, options, 1 + queries / THREAD_QUERIES);
 }

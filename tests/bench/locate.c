@@ -20,17 +20,22 @@ static double seconds(clockid_t clock) {
 /* x, y, z of each row; NULL: it cannot be read. */
 static double *read_npy(const char *path, uint64_t *rows) {
     uint8_t head[10];
+    double *xyz = NULL;
     FILE *f = fopen(path, "rb");
-    if (f == NULL || fread(head, 1, 10, f) != 10 || fseek(f, 0, SEEK_END) != 0)
+    if (f == NULL)
         return NULL;
-    long end = ftell(f), begin = 10 + head[8] + 256 * head[9];
-    size_t bytes = end > begin ? (size_t)(end - begin) : 0;
-    double *xyz = malloc(bytes + 1);
-    if (xyz == NULL || fseek(f, begin, SEEK_SET) != 0 ||
-        fread(xyz, 1, bytes, f) != bytes)
-        return NULL;
+    if (fread(head, 1, 10, f) == 10 && fseek(f, 0, SEEK_END) == 0) {
+        long end = ftell(f), begin = 10 + head[8] + 256 * head[9];
+        size_t bytes = end > begin ? (size_t)(end - begin) : 0;
+        xyz = malloc(bytes + 1);
+        *rows = bytes / 24;
+        if (xyz != NULL && (fseek(f, begin, SEEK_SET) != 0 ||
+                            fread(xyz, 1, bytes, f) != bytes)) {
+            free(xyz);
+            xyz = NULL;
+        }
+    }
     (void)fclose(f);
-    *rows = bytes / 24;
     return xyz;
 }
 
@@ -47,7 +52,7 @@ static uint64_t mix(const double *xyz, const uint32_t v[4]) {
 }
 
 int main(int count, char **word) {
-    uint64_t points, queries, inside = 0, sum = 0;
+    uint64_t points = 0, queries = 0, inside = 0, sum = 0;
     if (count != 4)
         return 2;
     double *xyz = read_npy(word[1], &points);
@@ -55,10 +60,10 @@ int main(int count, char **word) {
     struct incode_options o = {.flags = INCODE_NEIGHBORS};
     struct incode_tetrahedra t;
     if (xyz == NULL || query == NULL)
-        return 3;
+        exit(3);
     uint64_t *found = malloc(queries * sizeof *found + 1);
     if (found == NULL || incode_delaunay(xyz, points, &o, &t) != INCODE_OK)
-        return 3;
+        exit(3);
     o = (struct incode_options){.threads = (unsigned)atoi(word[3])};
     double cpu = -seconds(CLOCK_PROCESS_CPUTIME_ID);
     double wall = -seconds(CLOCK_MONOTONIC);
@@ -68,7 +73,7 @@ int main(int count, char **word) {
     wall += seconds(CLOCK_MONOTONIC);
     if (status != INCODE_OK) {
         fprintf(stderr, "%s\n", incode_status_text(status));
-        return 1;
+        exit(1);
     }
     for (uint64_t i = 0; i < queries; i++) {
         if (found[i] == INCODE_NONE64)

@@ -9,7 +9,8 @@ package_all := $(package_py) $(package)/_incode.abi3.so
 $(package)/%.py: host/library/python/incode/%.py
 	@mkdir -p $(@D)
 	@cp $< $@
-$(BUILD)/python/_incode.c: host/library/python/binding.py host/library/incode.h
+$(BUILD)/python/_incode.c: host/library/python/binding.py host/library/incode.h \
+		| deps-python
 	@mkdir -p $(@D)
 	@$(PYTHON) $< $@ > $@.said || { cat $@.said; false; }
 # cffi's text is not held to the warnings of ours.
@@ -21,7 +22,5 @@ $(package)/_incode.abi3.so: $(BUILD)/python/_incode.c $(BUILD)/libincode.a
 		-I$$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_path("include"))') \
 		-Ihost/library $^ -lm -pthread -o $@
 
-python: deps-python
-	@$(MAKE) --no-print-directory python-files
-python-files: $(package_all)
+python: $(package_all)
 	@:
