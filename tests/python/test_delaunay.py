@@ -93,6 +93,30 @@ def test_orientation(rng):
     assert (((h[:, 0] - points.mean(0)) * normal).sum(1) > 0).all()
 
 
+def test_transform(rng):
+    points = rng.random((500, 3))
+    tri, xi = incode.Delaunay(points), rng.random((500, 3))
+    theirs = scipy.spatial.Delaunay(points)
+    assert tri.transform.shape == theirs.transform.shape
+    found = tri.find_simplex(xi)
+    xi, found = xi[found >= 0], found[found >= 0]
+    maps = tri.transform[found]
+    weights = np.einsum("nij,nj->ni", maps[:, :3], xi - maps[:, 3])
+    weights = np.c_[weights, 1 - weights.sum(1)]
+    assert weights.min() > -1e-9
+    corners = points[tri.simplices[found]]
+    assert np.allclose((corners * weights[:, :, None]).sum(1), xi, atol=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_transform_of_what_is_flat_in_float64():
+    points = np.vstack([np.zeros(3), np.eye(3), [[2, 0, 1]]])
+    for scale in ([1, 1, 5e-324], [1e-120] * 3):
+        maps = incode.Delaunay(points * scale).transform
+        assert len(maps) == 2 and np.isnan(maps[:, :3]).all()
+        assert not np.isnan(maps[:, 3]).any()
+
+
 def sets():
     path = os.environ.get("INCODE_SETS", os.devnull)
     with open(path, encoding="utf-8") as lines:

@@ -261,6 +261,21 @@ class Delaunay:
         return first
 
     @cached_property
+    def transform(self):
+        """Affine maps to barycentric coordinates, shape (nsimplex, 4, 3): the
+        first three of x are transform[i, :3] @ (x - transform[i, 3]).  NaN
+        where a simplex is flat in float64."""
+        corners = self.points[self.simplices]
+        last = corners[:, 3]
+        a, b, c = (corners[:, i] - last for i in range(3))
+        maps = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], 1)
+        volume = (a * maps[:, 0]).sum(1)
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            maps /= volume[:, None, None]
+        maps[~np.isfinite(maps).all((1, 2))] = np.nan
+        return np.concatenate([maps, last[:, None]], 1)
+
+    @cached_property
     def coplanar(self):
         """Duplicates, shape (m, 3): the row that is no vertex, a simplex at its
         point, and the lower row with the same point, which is the vertex."""
