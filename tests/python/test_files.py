@@ -89,6 +89,51 @@ def test_the_program(tmp_path, monkeypatch):
     assert incode.read(tmp_path / "p.xyz").shape == (1, 3)
 
 
+@pytest.mark.parametrize("kind", ["file", "mapped", "float32", "list"])
+def test_stream(rng, tmp_path, kind):
+    scratch, path = tmp_path / "scratch", tmp_path / "p.npy"
+    scratch.mkdir()
+    points = rng.random((70000 if kind == "mapped" else 3000, 3)).astype("f4")
+    np.save(path, points if kind == "float32" else points.astype("f8"))
+    given = {
+        "file": lambda: path,
+        "mapped": lambda: np.load(path, mmap_mode="r"),
+        "float32": lambda: np.load(path),
+        "list": points.tolist,
+    }[kind]()
+    rows = incode.stream(given, host_memory="16M", scratch=scratch, threads=2)
+    assert os.listdir(scratch) == []
+    expected = incode.Delaunay(points).simplices
+    assert rows.dtype == expected.dtype and not rows.flags.writeable
+    assert (rows == expected).all()
+
+
+def test_stream_keeps_its_file(rng, tmp_path):
+    points = rng.random((1000, 3))
+    rows = incode.stream(points, tmp_path / "t.npy", host_memory=1 << 25)
+    assert os.listdir(tmp_path) == ["t.npy"]
+    assert (np.load(tmp_path / "t.npy") == rows).all() and len(rows) > 6000
+
+
+def test_errors_of_stream(rng, tmp_path):
+    points = rng.random((10, 3))
+    flat = points * [1, 1, 0]
+    for given, options, said in [
+        (points, {"out": tmp_path / "t.vtu"}, r"t\.vtu.*\.npy"),
+        (points, {"host_memory": "1K"}, "incode: .*--host-memory 1K"),
+        (points, {"threads": -1}, "threads=-1"),
+        (points[:, :2], {}, r"shape \(10, 2\)"),
+        (flat, {}, "incode: .*plane"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            incode.stream(given, **{"scratch": tmp_path, **options})
+    with pytest.raises(FileNotFoundError):
+        incode.stream(tmp_path / "none.xyz", scratch=tmp_path)
+    with pytest.raises(FileNotFoundError):
+        incode.stream(points, scratch=tmp_path / "none")
+    assert os.listdir(tmp_path) == []
+
+
 def test_an_interrupt_ends_the_program(tmp_path, monkeypatch):
     program = tmp_path / "program"
     program.write_text(

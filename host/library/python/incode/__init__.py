@@ -9,6 +9,6 @@
 -1
 """
 from ._delaunay import Delaunay, __version__
-from ._program import read, write
+from ._program import read, stream, write
 
-__all__ = ["Delaunay", "read", "write"]
+__all__ = ["Delaunay", "read", "stream", "write"]

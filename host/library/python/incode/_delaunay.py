@@ -18,7 +18,7 @@ _FLOAT64 = np.dtype(np.float64)
 _ERRORS = {
     lib.INCODE_NO_MEMORY: (
         MemoryError,
-        "free memory, or use fewer points or threads",
+        "free memory, use fewer threads, or call incode.stream",
     ),
     lib.INCODE_BAD_ARGUMENT: (
         ValueError,

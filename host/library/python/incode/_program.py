@@ -1,4 +1,5 @@
 """Files, read and written by the program `incode`, which knows the formats."""
+import json
 import os
 import pathlib
 import shutil
@@ -8,7 +9,7 @@ import warnings
 
 import numpy as np
 
-from ._delaunay import Delaunay, _coordinates, _rows_kind
+from ._delaunay import Delaunay, _coordinates, _rows_kind, _thread_count
 
 
 def _program():
@@ -129,3 +130,64 @@ def _rows(simplices, points):
             f"{points} points"
         )
     return array.astype(np.uint32, order="C")
+
+
+def stream(points, out=None, *, host_memory="1G", scratch=None, threads=0):
+    """The tetrahedra of more points than fit in memory, mapped from a file.
+
+    points: the path of a file of points, or an array (n, 3), which is copied to
+        a file.  It may be mapped from a file itself.
+    out: a path that ends in .npy and keeps the result.  None: a file that goes
+        with the array.
+    host_memory: what the program may use, as "2G", or bytes; 16M or more.
+    scratch: a folder on a disk for the rest.  Default: that of `out`, else that
+        of the module tempfile.
+    threads: how many work; 0: one a processor.
+
+    The array has shape (m, 4) and is read-only, with rows as in
+    Delaunay.simplices.
+    """
+    if out is not None:
+        out = os.path.abspath(os.fspath(out))
+        if not out.endswith(".npy"):
+            raise ValueError(
+                f"{out}: the result is mapped; give a name in .npy"
+            )
+    if scratch is None and out is not None:
+        scratch = os.path.dirname(out)
+    with tempfile.TemporaryDirectory(prefix="incode-", dir=scratch) as folder:
+        result = out or os.path.join(folder, "out.npy")
+        stats = os.path.join(folder, "stats.json")
+        count = _thread_count(threads)
+        _run(
+            *("run", _points_file(points, folder), "-q", "-o", result),
+            *("--stats", stats, "--scratch", folder),
+            *("--host-memory", host_memory),
+            *(("--threads", count) if count else ()),
+        )
+        with open(stats, encoding="utf-8") as file:
+            rows = json.load(file)["points"]
+        return np.load(result, mmap_mode="r").view(_rows_kind(rows))
+
+
+def _points_file(points, folder):
+    """The path of a file of points, which may be made in `folder`."""
+    if isinstance(points, (str, os.PathLike)):
+        path = os.path.abspath(os.fspath(points))
+        with open(path, "rb"):
+            return path
+    array = np.asarray(points)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(
+            f"points has the shape {array.shape}; (n, 3) is needed"
+        )
+    path = os.path.join(folder, "points.npy")
+    with open(path, "wb") as file:
+        np.lib.format.write_array_header_1_0(
+            file,
+            {"descr": "<f8", "fortran_order": False, "shape": array.shape},
+        )
+        for first in range(0, len(array), 1 << 16):
+            block = _coordinates(array[first : first + (1 << 16)], "points")
+            block.astype("<f8", copy=False).tofile(file)
+    return path
