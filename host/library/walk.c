@@ -173,13 +173,19 @@ static void free_list(struct library_walker *w) {
         host_unmap(w->list, 3 * w->room * sizeof *w->list);
 }
 
+/* The list stays, and the table comes behind the room that it has then. */
 static bool grow(struct library_walker *w, uint64_t count) {
     uint64_t room = 2 * w->room;
-    uint32_t *list = host_map(3 * room * sizeof *list);
+    bool is_own = w->list == w->own;
+    uint32_t *list =
+        host_remap(is_own ? NULL : w->list, 3 * w->room * sizeof *list,
+                   3 * room * sizeof *list);
     if (list == NULL)
         return false;
-    memcpy(list, w->list, count * sizeof *list);
-    free_list(w);
+    if (is_own)
+        memcpy(list, w->own, count * sizeof *list);
+    else
+        memset(list + count, 0, (3 * w->room - count) * sizeof *list);
     w->list = list;
     w->table = list + room;
     w->room = room;

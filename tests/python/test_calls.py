@@ -1,13 +1,16 @@
 """What is refused, what is raised, interrupts, and threads of Python."""
+import gc
 import subprocess
 import sys
 import textwrap
 import threading
+import weakref
 
 import numpy as np
 import pytest
 
 import incode
+from incode import _delaunay
 
 
 REFUSED = {
@@ -155,6 +158,66 @@ def test_exception_of_progress(rng, count):
 
     with pytest.raises(Enough):
         incode.Delaunay(rng.random((count, 3)), progress=progress)
+
+
+def test_exception_of_progress_comes_before_other_errors(rng):
+    points = rng.random((3000, 3))
+    points[2999] = np.nan
+
+    def progress(done):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        incode.Delaunay(points, progress=progress)
+
+
+def test_interrupt_among_queries_that_are_not_finite(rng, monkeypatch):
+    """A call that ends with another status, and is followed by another."""
+    tri = incode.Delaunay(rng.random((100, 3)))
+    queries = rng.random((2000, 3))
+    queries[0] = np.nan
+
+    class Interrupted(_delaunay._Call):
+        times = 0
+
+        @property
+        def progress(self):
+            Interrupted.times += 1
+            if Interrupted.times == 1:
+                raise KeyboardInterrupt
+
+        @progress.setter
+        def progress(self, function):
+            pass
+
+    monkeypatch.setattr(_delaunay, "_Call", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        tri.find_simplex(queries)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_calls_are_freed_without_the_collector(rng, fails):
+    points, kept = rng.random((2000, 3)), []
+    freed = weakref.ref(points)
+
+    def progress(done):
+        if not kept:
+            kept.append(weakref.ref(progress))
+        if fails:
+            raise ArithmeticError
+
+    gc.disable()
+    try:
+        try:
+            tri = incode.Delaunay(points, progress=progress)
+            tri.find_simplex(points)
+        except ArithmeticError:
+            tri = None
+        calls = [x for x in gc.get_objects() if type(x) is _delaunay._Call]
+        del tri, points, progress
+        assert not calls and freed() is None and kept[0]() is None
+    finally:
+        gc.enable()
 
 
 INTERRUPT = """

@@ -1,8 +1,10 @@
 """incode.Delaunay against scipy's, against digests, with each kind of array."""
+import copy
 import fractions
 import gc
 import hashlib
 import os
+import pickle
 
 import numpy as np
 import pytest
@@ -324,3 +326,16 @@ def test_memory_is_freed(rng):
     gc.collect()
     # One that stays of ten is found.
     assert resident() - before < 10 * size
+
+
+@pytest.mark.parametrize(
+    "again",
+    [copy.copy, copy.deepcopy, lambda tri: pickle.loads(pickle.dumps(tri))],
+    ids=["copy", "deepcopy", "pickle"],
+)
+def test_copies_and_pickles(rng, again):
+    tri = incode.Delaunay(rng.random((500, 3)), threads=2)
+    other = again(tri)
+    assert (other.points == tri.points).all()
+    assert (other.simplices == tri.simplices).all()
+    assert (other.find_simplex(tri.points) == tri.vertex_to_simplex).all()

@@ -1,6 +1,6 @@
 """incode.Delaunay over the functions of incode.h."""
 import operator
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -61,11 +61,16 @@ class _Call:
             self.options.context = self.handle
             self.options.progress = lib.incode_tick
 
-    def check(self, status):
-        self.handle = None  # which refers to this object
-        if self.error is not None:
-            raise self.error
-        _check(status)
+    def end(self):
+        """Raises the error of `progress`, whatever the status is.  Afterwards
+        nothing refers to itself: arrays are freed without the collector."""
+        self.handle = None
+        error, self.error = self.error, None
+        if error is not None:
+            try:
+                raise error
+            finally:
+                del error
 
 
 def _failed(kind, error, trace):
@@ -176,12 +181,13 @@ class Delaunay:
         result = ffi.new("struct incode_tetrahedra *")
         status = lib.incode_delaunay(self._xyz, n, call.options, result)
         self._result = t = ffi.gc(result, lib.incode_tetrahedra_free)
+        call.end()
         if status == lib.INCODE_NOT_FINITE:
             raise ValueError(
                 f"row {t.at} of points is {points[t.at]}; remove rows that are "
                 "not finite: points[numpy.isfinite(points).all(1)]"
             )
-        call.check(status)
+        _check(status)
         kind = _rows_kind(n)
         self.nsimplex = t.count
         self.simplices = _view(t, t.vertex, (t.count, 4), kind)
@@ -189,6 +195,10 @@ class Delaunay:
         self.neighbors = _view(t, t.neighbor, (t.count, 4), np.int64)
         self.convex_hull = _view(t, t.hull, (t.hull_count, 3), kind)
         self._duplicates = _view(t, t.duplicate, (t.duplicate_count, 2), kind)
+
+    def __reduce__(self):
+        """Copies and pickles hold the points, and compute the rest again."""
+        return partial(Delaunay, threads=self._threads), (self.points,)
 
     def find_simplex(self, xi, bruteforce=False, tol=None):
         """The lowest number of a simplex that contains each point, or -1.
@@ -221,10 +231,11 @@ class Delaunay:
             ffi.from_buffer("uint64_t[]", found),
             ffi.NULL,
         )
+        if call is not None:
+            call.end()
         if status == lib.INCODE_NOT_FINITE:
             return self._find_finite(xi)
-        if status != lib.INCODE_OK:
-            (call.check if call else _check)(status)
+        _check(status)
         return found
 
     def _find_finite(self, xi):
@@ -243,7 +254,8 @@ class Delaunay:
             self.npoints, self._result, call.options, result
         )
         a = ffi.gc(result, lib.incode_adjacency_free)
-        call.check(status)
+        call.end()
+        _check(status)
         indptr = _view(a, a.first, (self.npoints + 1,), np.int64)
         return indptr, _view(
             a, a.to, (int(indptr[-1]),), _rows_kind(self.npoints)

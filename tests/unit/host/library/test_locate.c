@@ -291,6 +291,11 @@ TEST(test_hub) {
     assert_int_equal(
         incode_locate(s.xyz, s.points, &s.t, s.query, 1, &o, s.found, NULL),
         INCODE_NO_MEMORY);
+    /* It fits what the header says. */
+    o.memory_max = 24 * s.t.count;
+    assert_int_equal(
+        incode_locate(s.xyz, s.points, &s.t, s.query, 1, &o, s.found, NULL),
+        INCODE_OK);
     set_free(&s);
 }
 
