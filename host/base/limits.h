@@ -1,13 +1,6 @@
 /* How much memory a command may have resident: --host-memory and --scratch,
  * which all commands that read or make points or tetrahedra have.  What is
- * beyond it is put aside (scratch.h).
- *
- *   struct mine { struct host_limits limits; ... };
- *   static const struct host_option rows[] = {
- *       HOST_LIMITS_ROWS(struct mine, limits.memory, limits.folder), {0}};
- *   if (host_limits_enter(&mine.limits, 0, output, error) == 0)
- *       work();
- *   host_limits_leave(); */
+ * beyond it is put aside (scratch.h). */
 #ifndef HOST_LIMITS_H
 #define HOST_LIMITS_H
 

@@ -3,8 +3,8 @@
  * the cells cover the section once, also where the plane goes through vertices
  * or along faces; it is then the limit of planes that come from below.
  *
- * Memory: a bit a point and 40 bytes a cell.  Work: two passes over the tetrahedra, 5 ns each,
- * and 300 ns a cell. */
+ * Memory: a bit a point and 40 bytes a cell.  Work: two passes over the
+ * tetrahedra, 5 ns each, and 300 ns a cell. */
 #ifndef HOST_SECTION_H
 #define HOST_SECTION_H
 

@@ -4,8 +4,9 @@
  *
  * A reader takes bytes in memory.  If its format sets `pieces`, it takes the
  * beginning of a file that is packed, or that a call which puts arrays aside
- * reads, and then what host_source_more adds; else all of it.  It returns whatever the bytes are.  Sizes that a file claims are checked
- * against its length before memory is reserved. */
+ * reads, and then what host_source_more adds; else all of it.  It returns
+ * whatever the bytes are.  Sizes that a file claims are checked against its
+ * length before memory is reserved. */
 #ifndef HOST_FORMAT_H
 #define HOST_FORMAT_H
 

@@ -5,9 +5,9 @@
  * Memory: for a plain file, at most half of the memory available when reading
  * begins, as the points need the rest.  For a packed file a window of 1 MiB,
  * or 16 MiB if it has long lines; if the format needs the whole file, at most
- * a quarter of the available memory.  16 MiB are always allowed.  In a call that
- * puts arrays aside (scratch.h), plain files have a window, too, and what is
- * held whole is put aside, as far as there is room. */
+ * a quarter of the available memory.  16 MiB are always allowed.  In a call
+ * that puts arrays aside (scratch.h), plain files have a window, too, and what
+ * is held whole is put aside, as far as there is room. */
 #ifndef HOST_SOURCE_H
 #define HOST_SOURCE_H
 
@@ -66,8 +66,9 @@ int host_source_fault(const struct host_source *source,
 const char *host_source_find(const struct host_source *source,
                              const char *word);
 
-/* The same as host_source_open, not unpacked, of a file of at most so many bytes, the most that
- * `what` has; a longer one, or one without an end: HOST_INPUT. */
+/* The same as host_source_open, not unpacked, of a file of at most so many
+ * bytes, the most that `what` has; a longer one, or one without an end:
+ * HOST_INPUT. */
 int host_source_open_bounded(struct host_source *source, const char *path,
                              size_t most, const char *what,
                              struct host_error *error);
