@@ -3,18 +3,8 @@
  * Its pages leave the process when there are too many, and come back from the
  * kernel's cache of files, or from the disk, when they are touched.
  *
- *   static struct host_scratch scratch;
- *   struct host_call call = {.threads = 2, .memory_max = UINT64_MAX};
- *   if (host_scratch_begin(&scratch, "/tmp", 64 << 20, 2, &error) == 0)
- *       call.scratch = &scratch;
- *   host_call_enter(&call);
- *   double *a = host_map(n * sizeof *a);      (memory.h; and host_unmap)
- *   for (size_t i = 0; i < n; i += BLOCK) {
- *       work(a + i, BLOCK);
- *       host_call_trim(BLOCK * sizeof *a);    (parallel.h)
- *   }
- *   host_call_enter(NULL);
- *   host_scratch_end(&scratch);
+ * A call whose `scratch` is set gets such arrays from host_map (memory.h).  A
+ * loop over them calls host_call_trim (parallel.h) after each block.
  *
  * An array is unmapped by a thread of the call that mapped it.  A file is
  * reserved whole, so that a full disk is an error of host_map and never a

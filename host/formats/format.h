@@ -61,8 +61,8 @@ struct host_format {
      * is that of a format that reads points. */
     const char *beside[HOST_BESIDE_MAX + 1];
     bool rows_only; /* a file of tetrahedra holds no points */
-    bool pieces; /* its readers take a file piece by piece, see above */
-    bool apart;  /* its bytes are read in a process of its own (hdf5.h) */
+    bool pieces;    /* its readers take a file piece by piece, see above */
+    bool apart;     /* its bytes are read in a process of its own (hdf5.h) */
     /* Of a format that is known and not read: the message "WHY; WHAT TO DO
      * NEXT", and the test whether a file that begins with these bytes has the
      * format, whatever its extension. */

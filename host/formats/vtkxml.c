@@ -5,8 +5,7 @@
 #include <string.h>
 #include <strings.h>
 #include <zlib.h>
-#if XML_MAJOR_VERSION > 2 ||                                                   \
-    XML_MINOR_VERSION >= 9 /* the other is deprecated */
+#if 100 * XML_MAJOR_VERSION + XML_MINOR_VERSION >= 209 /* it is deprecated */
 #define XML_GetCurrentLineNumber XML_GetCurrentLineNumber64
 #endif
 
@@ -34,10 +33,9 @@ struct bytes {
     size_t capacity;
 };
 
-/* A deflated byte holds at most 1,032 (zlib's own figure). */
-enum { INFLATION_MAX = 1032 };
-
-enum { BLOCK = 1 << 16 }; /* bytes between two trims */
+/* Bytes that a deflated one holds at most (zlib's own figure), and bytes
+ * between two trims. */
+enum { INFLATION_MAX = 1032, BLOCK = 1 << 16 };
 
 static void free_array(struct bytes *array) {
     host_unmap(array->owned, array->capacity);
@@ -46,9 +44,8 @@ static void free_array(struct bytes *array) {
 
 static int reserve(struct bytes *array, size_t bytes,
                    struct host_error *error) {
-    array->data = array->owned = host_map(bytes);
-    array->capacity = bytes;
-    array->bytes = 0;
+    *array = (struct bytes){.owned = host_map(bytes), .capacity = bytes};
+    array->data = array->owned;
     return array->data == NULL ? host_fail_memory(error, "an array") : 0;
 }
 
