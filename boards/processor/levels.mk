@@ -44,6 +44,7 @@ $(BUILD)/levels/$(1).o: $(levels:%=$(BUILD)/levels/$(1)-%.o) boards/processor/st
 	@$$(LD) -r $$(@:.o=-stubs.o) $$(filter %.o,$$^) -o $$@
 	@$$(OBJCOPY) --wildcard --localize-symbol='x86_64_*' $$@
 $(BUILD)/levels/$(1)-%.o: boards/processor/levels.mk
+	@mkdir -p $$(@D)
 	@$$(LD) -r $$(filter %.o,$$^) -o $$@
 	@nm -g --defined-only $$@ | awk '{ print $$$$3 } $$$$2 != "T" { \
 		print "$$@: " $$$$3 " is no function" > "/dev/stderr"; exit 1 }' \
