@@ -161,7 +161,7 @@ static int command_gen(int argc, char **argv, struct host_error *error) {
                          "FILE, or -o - to see them");
     }
     s.output = s.output == NULL ? "-" : s.output;
-    if (host_limits_enter(&s.limits, 0, s.output, error) == 0 &&
+    if (host_limits_enter(&s.limits, 0, NULL, s.output, error) == 0 &&
         host_gen(s.argument[0], n, s.seed, &points, error) == 0)
         host_points_write_as(s.output, s.format, &points, error);
     host_points_free(&points);
@@ -212,7 +212,7 @@ static int command_verify(int argc, char **argv, struct host_error *error) {
             "point a vertex.",
             2, &s, error) != 0)
         return error->code;
-    int status = host_limits_enter(&s.limits, 0, NULL, error);
+    int status = host_limits_enter(&s.limits, 0, s.argument[1], NULL, error);
     if (status == 0)
         status = verify(&s, error);
     (void)host_limits_leave();
@@ -230,7 +230,7 @@ static int command_digest(int argc, char **argv, struct host_error *error) {
               "vertices and rows in ascending order.",
               1, &s, error) != 0)
         return error->code;
-    if (host_limits_enter(&s.limits, 0, NULL, error) == 0 &&
+    if (host_limits_enter(&s.limits, 0, s.argument[0], NULL, error) == 0 &&
         host_tetrahedra_read(s.argument[0], &tets, NULL, error) == 0) {
         host_tetrahedra_sort(&tets);
         host_digest(&tets, &digest);
@@ -254,7 +254,8 @@ static int command_convert(int argc, char **argv, struct host_error *error) {
               "files' extensions.",
               2, &s, error) != 0)
         return error->code;
-    if (host_limits_enter(&s.limits, 0, s.argument[1], error) == 0)
+    if (host_limits_enter(&s.limits, 0, s.argument[0], s.argument[1], error) ==
+        0)
         (void)host_convert(s.argument[0], s.format, s.argument[1], error);
     (void)host_limits_leave();
     return error->code;
@@ -264,7 +265,8 @@ static int command_draw(int argc, char **argv, struct host_error *error) {
     struct host_draw_options options = {0};
     if (host_draw_arguments(argc, argv, &options, error) != 0)
         return error->code;
-    if (host_limits_enter(&options.limits, 0, options.output, error) == 0)
+    if (host_limits_enter(&options.limits, 0, options.tets, options.output,
+                          error) == 0)
         (void)host_draw(&options, error);
     (void)host_limits_leave();
     return error->code;

@@ -9,7 +9,8 @@
 enum { HOST_RESIDENT_MIN = 16 << 20 };
 
 struct host_limits {
-    uint64_t memory;    /* bytes; 0: all is held in memory */
+    uint64_t memory;    /* bytes; 0: half of what is available, where less than
+                           all would fit */
     const char *folder; /* NULL: $TMPDIR, else that of the output, else /tmp */
 };
 
@@ -18,13 +19,14 @@ struct host_limits {
      0,                                                                        \
      "SIZE",                                                                   \
      "Memory that the host may use, as 2G; the rest of points and tetrahedra " \
-     "is put aside on disk. 16M or more. Default: all is held in memory",      \
+     "is put aside on disk. 16M or more. Default: half of what is available, " \
+     "where a file is so large that it may not suffice",                       \
      HOST_AT(type, memory),                                                    \
      .least = HOST_RESIDENT_MIN,                                               \
      .bytes = "give 16M or more, as in 2G"},                                   \
     {                                                                          \
         "scratch", 0, "DIR",                                                   \
-            "Folder for what --host-memory puts aside. Default: $TMPDIR, "     \
+            "Folder for what is put aside. Default: $TMPDIR, "                 \
             "else "                                                            \
             "that of the first output, else /tmp",                             \
             HOST_AT(type, folder)                                              \
@@ -32,10 +34,15 @@ struct host_limits {
 
 /* From now on all that this thread does is a call (parallel.h) of `threads`
  * threads (0: one a processor) within these limits: there is one at a time.
- * output: the first, or NULL.  0, HOST_USAGE for a folder without a limit, or
- * HOST_INPUT: nothing can be put aside there. */
+ * input: the file that is read first, by whose size is judged whether all fits;
+ * output: the first.  Both may be NULL or "-".  0, or HOST_INPUT: nothing can
+ * be put aside there. */
 int host_limits_enter(const struct host_limits *limits, unsigned threads,
-                      const char *output, struct host_error *error);
+                      const char *input, const char *output,
+                      struct host_error *error);
+
+/* The limit that is in force, in bytes; 0: none. */
+uint64_t host_limits_memory(void);
 
 /* Where so many bytes may be put aside in all: notes that, or HOST_INPUT if the
  * disk has no room for them.  Nothing without a limit. */

@@ -525,12 +525,12 @@ int host_run(const struct host_run_options *options,
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
         (options->direct &&
-         host_limits_enter(&options->limits, options->threads,
+         host_limits_enter(&options->limits, options->threads, options->input,
                            options->outputs > 0 ? options->output[0] : NULL,
                            error) != 0))
         return error->code;
-    result->host_memory = options->limits.memory > 0
-                              ? options->limits.memory
+    result->host_memory = host_limits_memory() > 0
+                              ? host_limits_memory()
                               : host_memory_available() / 2;
     if (options->anywhere)
         host_progress_begin_anywhere();
@@ -596,7 +596,7 @@ static void take_sums(const struct host_direct_sums *sums,
  * put aside is checked by vertex numbers of the order, as neighbours have close
  * ones: each place of it is read once. */
 static bool is_checked_in_order(const struct host_run_options *options) {
-    return options->limits.memory > 0 &&
+    return host_limits_memory() > 0 &&
            (options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL);
 }
 

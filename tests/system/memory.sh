@@ -26,6 +26,22 @@ check 'memory/2,000,000 in 64M: bytes' 'they differ' \
     cmp -s "$scratch/whole.npy" "$scratch/part.npy"
 rm -f "$scratch"/*.npy
 
+# A file that half of the memory may not hold.
+incode gen uniform 400000 --seed 4 -o "$scratch/large.npy"
+succeeds 'memory/it fits' incode run "$scratch/large.npy" -q \
+    --stats "$scratch/fits.json" -o "$scratch/whole.npy"
+check 'memory/it fits: nothing is put aside' "$(stat_of "$scratch/fits.json" scratch_bytes)" \
+    [ "$(stat_of "$scratch/fits.json" scratch_bytes)" = 0 ]
+succeeds 'memory/it may not fit' bash -c 'ulimit -d 120000; exec "$@"' - "$INCODE" \
+    run "$scratch/large.npy" -q --stats "$scratch/stats.json" \
+    --scratch "$scratch" -o "$scratch/part.npy"
+check 'memory/it may not fit: the rest is put aside' "$(cat "$scratch/stats.json")" \
+    jq -e '.scratch_bytes > 1e7 and .host_peak_bytes < .host_memory_bytes and
+        .host_memory_bytes < 6e7' "$scratch/stats.json"
+check 'memory/it may not fit: bytes' 'they differ' \
+    cmp -s "$scratch/whole.npy" "$scratch/part.npy"
+rm -f "$scratch"/*.npy
+
 # Every format, with a set that 16M do not hold.
 incode gen bubbles 40000 --seed 3 -o "$scratch/small.npy"
 formats='npy ele vtu vtk msh mesh'
@@ -57,7 +73,7 @@ check 'memory/full: message' "$(last "$scratch/errors")" \
     grep -q 'no room for .* bytes .* --scratch DIR' "$scratch/errors"
 
 # What does not go.
-for options in '--host-memory 1M' '--host-memory some' '--scratch /tmp' \
+for options in '--host-memory 1M' '--host-memory some' '--scratch /tmp --nodes 2' \
     '--host-memory 64M --nodes 2'; do
     # shellcheck disable=SC2086
     exits "memory/$options" 2 incode run "$scratch/small.npy" -q $options
