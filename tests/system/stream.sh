@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # With --host-memory 16M, files, pipes and packed files of 300,000 points and
 # their tetrahedra are read, converted, digested and drawn as without it, and
-# those of 40,000 checked, in less than 16 MiB; and what is wrong with them, or with the room for what is
-# put aside, is said.
+# those of 40,000 checked, in less than 16 MiB.  What is wrong with them, or with
+# the room for what is put aside, is said.
 . tests/system/lib.sh
 
 aside=$scratch/aside
@@ -136,9 +136,12 @@ for command in "convert $u.npy $left" "gen uniform 9 -o $left" \
     refuses "stream/too small a limit for ${command%% *}" 2 \
         '^incode: --host-memory 15M: .*; give 16M or more' limited $command
 done
-limit=()
-refuses 'stream/a folder without a limit' 2 '^incode: --scratch: ' \
-    limited digest "$t.npy" --scratch "$aside"
+# Without a limit there is one where a file may not fit, and else none.
+limit=(--scratch "$scratch/absent")
+succeeds 'stream/a file that fits' limited digest "$t.npy"
+tight() { (ulimit -d 200000 && limited "$@"); }
+refuses 'stream/a file that may not fit' 3 'absent: no scratch file can be made' \
+    tight digest "$t.npy"
 limit=(--host-memory 16M --scratch "$aside")
 refused 'a picture beyond the limit' '^incode: --width: .*give --host-memory 9' \
     draw "$u.npy" "$t.npy" --width 2000 -o "$scratch/left/o.png"
