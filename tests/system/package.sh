@@ -27,8 +27,10 @@ cut -d ' ' -f 2 "$scratch/lists" > "$scratch/patterns"
 while read -r file; do
     count=0
     while read -r pattern; do
+        # A star stands for no slash, as where files are found.
         # shellcheck disable=SC2053
-        [[ $file = $pattern || $file = $pattern/* ]] && count=$((count + 1))
+        [[ $file = $pattern && ${file//[^\/]/} = "${pattern//[^\/]/}" ||
+            $file = $pattern/* ]] && count=$((count + 1))
     done < "$scratch/patterns"
     [ $count = 1 ] || echo "$file is in $count packages"
 done < "$scratch/installed" > "$scratch/wrong"
