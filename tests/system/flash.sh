@@ -63,7 +63,10 @@ head -c 30000 "$raw" > "$scratch/short.img"
 refuses_image 'a truncated image' '30000 bytes, fewer than the 40256' \
     "$scratch/short.img"
 cp "$raw" "$scratch/false.img"
-printf 'x' | dd of="$scratch/false.img" bs=1 seek=20000 conv=notrunc 2> /dev/null
+# Another than it is, whatever it is.
+byte=$(od -An -tu1 -j 20000 -N 1 "$raw")
+printf '%b' "\\x$(printf %02x $((byte ^ 255)))" |
+    dd of="$scratch/false.img" bs=1 seek=20000 conv=notrunc 2> /dev/null
 refuses_image 'a false byte' 'its code is not what was signed; ' \
     "$scratch/false.img"
 refuses 'flash/image: a false byte' 5 'its code is not what was signed; ' \
