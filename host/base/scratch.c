@@ -91,8 +91,8 @@ static bool is_over(const struct host_scratch *s) {
     return resident(s) > s->resident_max / 4 * 3;
 }
 
-/* Who finds too much waits for the thread that lets pages leave, and does not
- * touch more in the meantime. */
+/* A thread that finds too much waits for the one that lets pages leave, and
+ * touches no more in the meantime. */
 void host_scratch_trim(struct host_scratch *scratch) {
     if (!is_over(scratch))
         return;
