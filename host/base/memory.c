@@ -60,13 +60,22 @@ static struct host_scratch *aside(void) {
     return call == NULL ? NULL : call->scratch;
 }
 
+/* Whether an array of so many bytes, which are charged already, is one that is
+ * put aside. */
+static bool goes_aside(const struct host_scratch *scratch, size_t bytes) {
+    return scratch != NULL && bytes >= scratch->array_min &&
+           atomic_load(&host_call()->memory) > scratch->memory_first;
+}
+
 static void *map(size_t bytes) {
     struct host_scratch *scratch = aside();
     void *array = reserve(bytes);
     if (array == NULL)
         return NULL;
-    if (scratch == NULL || bytes < scratch->array_min) {
-        (void)madvise(array, space_of(bytes), MADV_HUGEPAGE);
+    bool large = scratch == NULL || bytes >= scratch->array_min;
+    if (!goes_aside(scratch, bytes)) {
+        (void)madvise(array, space_of(bytes),
+                      large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
     } else if (!host_scratch_map(scratch, array, bytes)) {
         (void)munmap(array, space_of(bytes));
         return NULL;
@@ -84,34 +93,48 @@ void *host_map(size_t bytes) {
     return array;
 }
 
+/* Copies what was in memory to where it is put aside, and gives it back on the
+ * way. */
+static void copy_aside(char *to, char *from, size_t bytes) {
+    enum { BLOCK = 256 << 10 };
+    for (size_t at = 0; at < bytes; at += BLOCK) {
+        size_t n = bytes - at < BLOCK ? bytes - at : BLOCK;
+        memcpy(to + at, from + at, n);
+        (void)madvise(from + at, n, MADV_DONTNEED);
+        host_call_trim(n);
+    }
+}
+
 /* The same of an array that is put aside, or will be. */
-static void *move_aside(struct host_scratch *scratch, void *old, size_t from,
-                        size_t bytes) {
+static void *move_aside(struct host_scratch *scratch, void *old,
+                        size_t old_bytes, size_t bytes) {
     bool has = host_scratch_has(scratch, old);
     void *space = has ? reserve(bytes) : map(bytes);
     if (space == NULL)
         return NULL;
     if (!has) {
-        memcpy(space, old, from); /* which is small */
+        copy_aside(space, old, old_bytes);
     } else if (!host_scratch_move(scratch, old, space, bytes)) {
         (void)munmap(space, space_of(bytes));
         return NULL;
     }
-    (void)munmap(old, from);
+    (void)munmap(old, space_of(old_bytes));
     return space;
 }
 
 static void *move(void *old, size_t old_bytes, size_t bytes) {
     struct host_scratch *scratch = aside();
     size_t from = space_of(old_bytes), to = space_of(bytes);
-    if (scratch != NULL && bytes > old_bytes &&
-        (bytes >= scratch->array_min || host_scratch_has(scratch, old)))
-        return move_aside(scratch, old, from, bytes);
+    if (bytes > old_bytes &&
+        (goes_aside(scratch, bytes) ||
+         (scratch != NULL && host_scratch_has(scratch, old))))
+        return move_aside(scratch, old, old_bytes, bytes);
     if (to <= from) { /* which cannot fail */
-        if (to < from)
-            (void)munmap((char *)old + to, from - to);
+        /* No trim may reach what is mapped there next. */
         if (scratch != NULL)
             host_scratch_cut(scratch, old, bytes);
+        if (to < from)
+            (void)munmap((char *)old + to, from - to);
         return old;
     }
     char *space = reserve(bytes);

@@ -104,19 +104,30 @@ static void *trampoline(void *argument) {
     return NULL;
 }
 
-void host_fork_start(struct host_fork *fork, void (*function)(void *),
-                     void *argument) {
+static void start(struct host_fork *fork, void (*function)(void *),
+                  void *argument, bool beside) {
     sigset_t all, before;
     fork->function = function;
     fork->argument = argument;
     fork->call = call_here;
     (void)sigfillset(&all);
+    (void)sigdelset(&all, SIGBUS); /* of what is put aside: limits.h */
     (void)pthread_sigmask(SIG_BLOCK, &all, &before);
-    fork->running = (call_here == NULL || call_here->threads > 1) &&
+    fork->running = (beside || call_here == NULL || call_here->threads > 1) &&
                     pthread_create(&fork->thread, NULL, trampoline, fork) == 0;
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (!fork->running)
         function(argument);
+}
+
+void host_fork_start(struct host_fork *fork, void (*function)(void *),
+                     void *argument) {
+    start(fork, function, argument, false);
+}
+
+void host_fork_beside(struct host_fork *fork, void (*function)(void *),
+                      void *argument) {
+    start(fork, function, argument, true);
 }
 
 void host_fork_join(struct host_fork *fork) {

@@ -36,9 +36,11 @@ bool host_call_cancelled(void);
 
 /* Of a call that puts arrays aside: this thread has touched so many more bytes
  * of them.  Loops over arrays that grow with the input call it after each
- * block, a small part of the limit: 64 KiB, or 64 KiB for each place where it
- * reads in no order, as the kernel maps so much around it. */
+ * block, a small part of the limit: 64 KiB, or HOST_CALL_AROUND for each place
+ * where it reads in no order, as the kernel maps so much around it. */
 void host_call_trim(size_t touched);
+
+enum { HOST_CALL_AROUND = 1 << 16 };
 
 /* Bytes of arrays that each thread of this thread's call may have resident at
  * once, beside what others need; SIZE_MAX: as many as there are. */
@@ -63,6 +65,10 @@ struct host_fork {
  * once on this one where no thread can be had. */
 void host_fork_start(struct host_fork *fork, void (*function)(void *),
                      void *argument);
+/* The same where this thread has to go on meanwhile: also in a call of one
+ * thread. */
+void host_fork_beside(struct host_fork *fork, void (*function)(void *),
+                      void *argument);
 void host_fork_join(struct host_fork *fork);
 
 /* Calls function(context, part) for every part of [0, parts), each on a thread

@@ -2,11 +2,13 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/statvfs.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 enum {
@@ -31,6 +33,30 @@ static int make_file(const char *directory) {
     return file;
 }
 
+static uint64_t resident(const struct host_scratch *s) {
+    char text[256], *end;
+    ssize_t n = pread(s->statm, text, sizeof text - 1, 0);
+    if (n <= 0)
+        return UINT64_MAX;
+    text[n] = '\0';
+    (void)strtoull(text, &end, 10); /* address space */
+    return strtoull(end, NULL, 10) * PAGE;
+}
+
+static bool is_over(const struct host_scratch *s) {
+    return resident(s) > s->resident_max / 4 * 3;
+}
+
+static int fail_over(const struct host_scratch *s, struct host_error *error) {
+    const uint64_t mb = 1 << 20;
+    uint64_t here = resident(s) / mb + 1;
+    return host_fail(error, HOST_USAGE,
+                     "--host-memory %lluM: this process takes %lluM before it "
+                     "has read a point, libraries included; give %lluM or more",
+                     (unsigned long long)(s->resident_max / mb),
+                     (unsigned long long)here, (unsigned long long)(2 * here));
+}
+
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                        uint64_t resident_max, unsigned threads,
                        struct host_error *error) {
@@ -47,6 +73,10 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                          "/proc/self/statm: %s; mount /proc, or leave the "
                          "limit of memory out",
                          strerror(errno));
+    }
+    if (is_over(scratch)) {
+        (void)close(scratch->statm);
+        return fail_over(scratch, error);
     }
     int file = make_file(directory);
     if (file < 0) {
@@ -75,21 +105,14 @@ uint64_t host_scratch_free(const struct host_scratch *scratch) {
                : (uint64_t)about.f_bavail * about.f_frsize;
 }
 
+bool host_scratch_in_memory(const struct host_scratch *scratch) {
+    struct statfs about;
+    return statfs(scratch->directory, &about) == 0 &&
+           ((unsigned long)about.f_type == TMPFS_MAGIC ||
+            (unsigned long)about.f_type == RAMFS_MAGIC);
+}
+
 /* --- trims ---------------------------------------------------------------- */
-
-static uint64_t resident(const struct host_scratch *s) {
-    char text[256], *end;
-    ssize_t n = pread(s->statm, text, sizeof text - 1, 0);
-    if (n <= 0)
-        return UINT64_MAX;
-    text[n] = '\0';
-    (void)strtoull(text, &end, 10); /* address space */
-    return strtoull(end, NULL, 10) * PAGE;
-}
-
-static bool is_over(const struct host_scratch *s) {
-    return resident(s) > s->resident_max / 4 * 3;
-}
 
 /* A thread that finds too much waits for the one that lets pages leave, and
  * touches no more in the meantime. */
@@ -199,11 +222,16 @@ bool host_scratch_map(struct host_scratch *scratch, void *space, size_t bytes) {
         struct host_scratch_array *a = &scratch->array[scratch->arrays];
         *a = (struct host_scratch_array){.file = make_file(scratch->directory)};
         done = a->file >= 0 && place(scratch, a, space, whole_pages(bytes));
-        if (a->file < 0)
+        if (a->file < 0) {
             scratch->failure = errno;
-        else if (!done)
+            scratch->wanted = bytes;
+        } else if (!done) {
             (void)close(a->file);
+        }
         scratch->arrays += done;
+    } else {
+        scratch->failure = ENFILE;
+        scratch->wanted = bytes;
     }
     (void)pthread_mutex_unlock(&scratch->lock);
     return done;
@@ -223,7 +251,8 @@ void host_scratch_cut(struct host_scratch *scratch, const void *array,
     (void)pthread_mutex_lock(&scratch->lock);
     struct host_scratch_array *a = find(scratch, array);
     size_t to = whole_pages(bytes);
-    if (a != NULL && to < a->bytes && ftruncate(a->file, (off_t)to) == 0) {
+    if (a != NULL && to < a->bytes) {
+        (void)ftruncate(a->file, (off_t)to); /* else its end stays unused */
         count(scratch, a->bytes, to);
         a->bytes = to;
     }

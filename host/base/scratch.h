@@ -36,6 +36,8 @@ struct host_scratch {
     const char *directory;
     uint64_t resident_max; /* bytes of this process */
     size_t array_min;      /* bytes of an array that becomes a file */
+    uint64_t memory_first; /* bytes of arrays of the call that stay in memory
+                              before any becomes a file */
     size_t step;           /* bytes that a thread touches between two looks */
     int statm;             /* tells how much is resident */
     pthread_mutex_t lock;  /* of all that follows */
@@ -47,7 +49,9 @@ struct host_scratch {
     _Atomic uint64_t touched;  /* by threads that have ended */
 };
 
-/* directory outlives the scratch.  HOST_INPUT: no file can be made there. */
+/* directory outlives the scratch.  HOST_INPUT: no file can be made there.
+ * HOST_USAGE: this process has too much resident already, whatever is put
+ * aside. */
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                        uint64_t resident_max, unsigned threads,
                        struct host_error *error);
@@ -56,6 +60,9 @@ void host_scratch_end(struct host_scratch *scratch);
 
 /* Bytes that the file system of the directory leaves to this user. */
 uint64_t host_scratch_free(const struct host_scratch *scratch);
+
+/* Whether that file system is itself in memory, as tmpfs is. */
+bool host_scratch_in_memory(const struct host_scratch *scratch);
 
 /* Lets all arrays' pages leave where more than three quarters of the limit are
  * resident. */

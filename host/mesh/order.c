@@ -325,14 +325,17 @@ static int make_grid(struct host_order *order, struct host_error *error) {
                 host_vertex(order, v, p);
                 uint32_t cell =
                     incode_cell_of(order->lo, order->hi, order->cells, p);
+                host_call_trim(HOST_CALL_AROUND);
                 if (pass == 0)
                     first[cell]++;
                 else
                     order->by_cell[--first[cell]] = v;
             }
         }
-        for (size_t cell = 1; pass == 0 && cell <= cells; cell++)
+        for (size_t cell = 1; pass == 0 && cell <= cells; cell++) {
+            host_call_trim(sizeof *first);
             first[cell] += first[cell - 1];
+        }
     }
     return 0;
 }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 
 enum { BLOCKS_MEMORY_DEFAULT = 131072, TABLE_START = 1024 };
 
@@ -25,9 +26,11 @@ struct host_spill_entry {
 
 int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
                     struct host_error *error) {
+    bool aside = host_call_share() < SIZE_MAX;
     memset(spill, 0, sizeof *spill);
-    spill->blocks_memory =
-        blocks_memory == 0 ? BLOCKS_MEMORY_DEFAULT : blocks_memory;
+    spill->blocks_memory = blocks_memory != 0 ? blocks_memory
+                           : aside            ? UINT32_MAX
+                                              : BLOCKS_MEMORY_DEFAULT;
     spill->free = HOST_SPILL_END;
     spill->file = -1;
     spill->table_size = TABLE_START;
@@ -36,7 +39,10 @@ int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
 }
 
 void host_spill_clear(struct host_spill *spill) {
-    memset(spill->table, 0, spill->table_size * sizeof *spill->table);
+    for (uint32_t i = 0; i < spill->table_size; i++) {
+        host_call_trim(sizeof *spill->table);
+        spill->table[i] = (struct host_spill_entry){0};
+    }
     spill->table_used = 0;
     spill->blocks_used = 0;
     spill->free = HOST_SPILL_END;
@@ -67,6 +73,7 @@ static off_t offset_of(const struct host_spill *s, uint32_t block) {
 static int load(const struct host_spill *s, uint32_t block,
                 struct host_spill_block *copy, struct host_error *error) {
     if (block < s->blocks_memory) {
+        host_call_trim(HOST_CALL_AROUND);
         *copy = s->blocks[block];
         return 0;
     }
@@ -81,6 +88,7 @@ static int store(struct host_spill *s, uint32_t block,
                  const struct host_spill_block *copy,
                  struct host_error *error) {
     if (block < s->blocks_memory) {
+        host_call_trim(sizeof *copy); /* beside what was loaded */
         s->blocks[block] = *copy;
         return 0;
     }
@@ -139,6 +147,7 @@ static int new_block(struct host_spill *s, uint32_t *block,
 static struct host_spill_entry *find(const struct host_spill *s, uint32_t node,
                                      uint32_t brick) {
     uint32_t at = (brick * 2654435761u ^ node * 40503u) % s->table_size;
+    host_call_trim(HOST_CALL_AROUND);
     while (s->table[at].used &&
            (s->table[at].node != node || s->table[at].brick != brick))
         at = (at + 1) % s->table_size;
@@ -155,7 +164,7 @@ static int grow_table(struct host_spill *s, struct host_error *error) {
         return host_fail_memory(error, "spilled faces");
     }
     for (uint32_t i = 0; i < old.table_size; i++)
-        if (old.table[i].used)
+        if (old.table[i].used) /* find trims */
             *find(s, old.table[i].node, old.table[i].brick) = old.table[i];
     host_unmap(old.table, old.table_size * sizeof *old.table);
     return 0;
@@ -276,36 +285,31 @@ int host_spill_take(struct host_spill *spill, struct host_spill_list *list,
 /* Appends the faces of a list's blocks. */
 static int copy_list(const struct host_spill *s,
                      const struct host_spill_list *list,
-                     struct incode_face *faces, uint64_t *count,
-                     struct host_error *error) {
+                     struct host_tetrahedra *faces, struct host_error *error) {
     struct host_spill_block block;
     uint64_t left = in_blocks(list);
     for (uint32_t at = list->head; left > 0; at = block.next) {
-        if (load(s, at, &block, error) != 0)
+        uint32_t(*row)[4] =
+            host_tetrahedra_room(faces, HOST_SPILL_BLOCK_FACES, error);
+        if (row == NULL || load(s, at, &block, error) != 0)
             return error->code;
-        for (unsigned i = block.first; i < block.end; i++, left--)
-            faces[(*count)++] = block.faces[i];
+        for (unsigned i = block.first; i < block.end; i++, left--) {
+            memcpy(*row, block.faces[i].v, sizeof block.faces[i].v);
+            (*row++)[3] = INCODE_NONE;
+        }
+        host_tetrahedra_keep(faces, block.end - block.first);
+        host_call_trim(sizeof block);
     }
     return 0;
 }
 
 int host_spill_copy(const struct host_spill *spill, uint32_t node,
-                    struct incode_face **faces, uint64_t *count,
-                    struct host_error *error) {
-    uint64_t all = 1;
-    *count = 0;
-    for (uint32_t i = 0; i < spill->table_size; i++) {
+                    struct host_tetrahedra *faces, struct host_error *error) {
+    for (uint32_t i = 0; i < spill->table_size && error->code == 0; i++) {
         const struct host_spill_entry *entry = &spill->table[i];
-        all += entry->used && entry->node == node ? in_blocks(&entry->list) : 0;
+        host_call_trim(sizeof *entry);
+        if (entry->used && entry->node == node)
+            copy_list(spill, &entry->list, faces, error);
     }
-    *faces = malloc((size_t)all * sizeof **faces);
-    if (*faces == NULL)
-        return host_fail_memory(error, "a look at spilled faces");
-    for (uint32_t i = 0; i < spill->table_size; i++) {
-        const struct host_spill_entry *entry = &spill->table[i];
-        if (entry->used && entry->node == node &&
-            copy_list(spill, &entry->list, *faces, count, error) != 0)
-            return error->code;
-    }
-    return 0;
+    return error->code;
 }

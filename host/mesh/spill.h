@@ -6,13 +6,15 @@
  * once, as one bit for the vertex.
  *
  * Memory: blocks of 512 bytes up to blocks_memory, and 48 bytes a list;
- * beyond it, disk. */
+ * beyond it, disk.  In a call that puts arrays aside (host/base/scratch.h) all
+ * of it may be on disk. */
 #ifndef HOST_SPILL_H
 #define HOST_SPILL_H
 
 #include <stdint.h>
 
 #include "host/base/error.h"
+#include "host/mesh/tetrahedra.h"
 #include "incode/triangulator.h"
 
 enum { HOST_SPILL_BLOCK_FACES = 42 };
@@ -38,7 +40,8 @@ struct host_spill {
     uint64_t faces, faces_max, faces_total;
 };
 
-/* blocks_memory: 0 for the default, 64 MiB. */
+/* blocks_memory: 0 for the default, 64 MiB, or all of them where the call puts
+ * arrays aside. */
 int host_spill_init(struct host_spill *spill, uint32_t blocks_memory,
                     struct host_error *error);
 /* Drops all lists. */
@@ -55,11 +58,10 @@ int host_spill_put(struct host_spill *spill, uint32_t node,
 struct host_spill_list host_spill_detach(struct host_spill *spill,
                                          uint32_t node, uint32_t brick);
 
-/* All faces of a node that are in the store, but no marks, in a new array that
- * the caller frees. */
+/* Appends all faces of a node that are in the store, but no marks, to a list:
+ * rows whose last number is INCODE_NONE. */
 int host_spill_copy(const struct host_spill *spill, uint32_t node,
-                    struct incode_face **faces, uint64_t *count,
-                    struct host_error *error);
+                    struct host_tetrahedra *faces, struct host_error *error);
 
 /* Moves up to max faces from the list's front, oldest first, to `faces`, sets
  * *count; the list is used up when list->faces is 0. */

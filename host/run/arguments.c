@@ -361,7 +361,6 @@ static int check_together(struct host_run_options *o, uint64_t given,
         {"window", bare, "this board's firmware settles it"},
         {"node-program", bare, "this board has firmware"},
         {"node-program", ranks, "not with --link mpi"},
-        {"scratch", !o->direct, "goes with a run on threads alone"},
         {"progress", o->quiet, "-q prints none"},
         {"explain", o->quiet, "-q prints nothing"},
         {"explain", o->strategy != NULL, "goes with --strategy auto alone"},
@@ -453,12 +452,6 @@ static int parse_run(int argc, char **argv, bool silent,
                          "--threads: are of this process, and --%s speaks of "
                          "a cube of nodes; leave one of the two out",
                          of_cube);
-    }
-    if (!options->direct && options->limits.memory > 0) {
-        return host_fail(error, HOST_USAGE,
-                         "--host-memory: limits a run on threads, and --%s "
-                         "speaks of a cube of nodes; leave one of the two out",
-                         of_cube == NULL ? "slow" : of_cube);
     }
     return check_together(options, given, error);
 }

@@ -524,10 +524,9 @@ int host_run(const struct host_run_options *options,
     memset(result, 0, sizeof *result);
     memset(&alone, 0, sizeof alone);
     if (check_outputs(options, error) != 0 ||
-        (options->direct &&
-         host_limits_enter(&options->limits, options->threads, options->input,
-                           options->outputs > 0 ? options->output[0] : NULL,
-                           error) != 0))
+        host_limits_enter(&options->limits, options->threads, options->input,
+                          options->outputs > 0 ? options->output[0] : NULL,
+                          error) != 0)
         return error->code;
     result->host_memory = host_limits_memory() > 0
                               ? host_limits_memory()

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/memory.h"
 #include "host/base/progress.h"
 #include "host/verify/judge.h"
 #include "host/service/strategies/strategies.h"
@@ -13,8 +14,9 @@
 #include "service.h"
 
 enum {
-    SMALL = 1 << 19,  /* tetrahedra that are checked in a few ms */
-    FAULTS_MAX = 4096 /* that the check locates */
+    SMALL = 1 << 19,   /* tetrahedra that are checked in a few ms */
+    FAULTS_MAX = 4096, /* that the check locates */
+    BRICK_TOUCHES = 4  /* bytes of what the ledger and the audit know of it */
 };
 
 /* --- the check, on a thread of its own ------------------------------------ */
@@ -175,10 +177,12 @@ static void look_beyond(const struct inquiry *q, struct missing *m,
  * committed its brick. */
 static void judge_missing(struct inquiry *q, struct missing *m) {
     const struct host_tetrahedra *all = q->s->tets;
-    for (uint64_t k = 0; m->count > 0 && k < all->count; k++)
+    for (uint64_t k = 0; m->count > 0 && k < all->count; k++) {
+        host_call_trim(sizeof *all->v);
         for (unsigned i = m->head[hash_of(all->v[k])]; i < MISSING_MAX;
              i = m->next[i])
             m->there[i] |= same_vertices(m->v[i], all->v[k]);
+    }
     for (unsigned i = 0; i < m->count; i++)
         if (!m->there[i])
             doubt_brick(q, owner(q, m->v[i]), "it left out", m->v[i]);
@@ -268,8 +272,10 @@ static void judge_places(struct inquiry *q, struct missing *m) {
 static void redo_guilty(struct inquiry *q) {
     const struct host_service *s = q->s;
     const struct host_ledger *ledger = &s->ledger;
-    for (uint32_t b = 0; b < ledger->bricks; b++)
+    for (uint32_t b = 0; b < ledger->bricks; b++) {
+        host_call_trim(BRICK_TOUCHES);
         q->audit->redo[b] |= q->audit->guilty[host_ledger_by(ledger, b)];
+    }
     uint64_t i = 0;
     for (size_t r = 0; r < ledger->runs; r++) {
         bool guilty = q->audit->guilty[ledger->found[r].node] != 0;
@@ -285,21 +291,26 @@ static void redo_guilty(struct inquiry *q) {
 static void redo_unclear(struct inquiry *q) {
     const struct host_ledger *ledger = &q->s->ledger;
     struct host_audit *a = q->audit;
+    bool together = a->unclear++ > 0, all = a->unclear > 2;
     uint32_t marked = 0;
-    if (a->unclear++ > 0)
-        for (uint32_t b = 0; b < ledger->bricks; b++)
-            a->redo[b] |= (ledger->by[b] & HOST_LEDGER_ALONE) == 0;
-    for (uint32_t b = 0; b < ledger->bricks; b++)
+    for (uint32_t b = 0; b < ledger->bricks; b++) {
+        host_call_trim(BRICK_TOUCHES);
+        a->redo[b] |=
+            all || (together && (ledger->by[b] & HOST_LEDGER_ALONE) == 0);
         marked += a->redo[b];
-    if (marked == 0 || a->unclear > 2)
-        memset(a->redo, 1, ledger->bricks);
+    }
+    for (uint32_t b = 0; b < ledger->bricks && marked == 0; b++) {
+        host_call_trim(BRICK_TOUCHES);
+        a->redo[b] = 1;
+    }
 }
 
 static void analyse(struct host_service *s, struct host_audit *a) {
     struct inquiry q = {.s = s, .audit = a};
     const struct host_sites sites = host_sites_of_order(s->order);
     struct missing *missing = malloc(sizeof *missing);
-    a->redo = calloc(s->ledger.bricks, 1);
+    a->bricks = s->ledger.bricks;
+    a->redo = host_map(a->bricks);
     a->guilty = calloc(s->machine->nodes, 1);
     if (a->redo == NULL || a->guilty == NULL || missing == NULL) {
         host_fail_memory(&a->error, "the search for the faulty node");
@@ -356,7 +367,7 @@ static void begin(struct host_service *s) {
     if (s->machine->virtual_time || (!a->exact && s->tets->count < SMALL))
         check(s);
     else
-        host_fork_start(&a->fork, check, s);
+        host_fork_beside(&a->fork, check, s);
 }
 
 void host_audit_alone(struct host_service *service) {
@@ -430,9 +441,11 @@ static int begin_again(struct host_service *s, struct host_error *error) {
     for (unsigned i = 0; i < s->machine->nodes; i++)
         s->ledger.job[i].epoch = 0; /* results under way do not count */
     host_progress_phase("triangulating", "Mtet");
-    for (uint32_t b = 0; b < s->ledger.bricks; b++)
+    for (uint32_t b = 0; b < s->ledger.bricks; b++) {
+        host_call_trim(BRICK_TOUCHES);
         if (a->redo[b] != 0)
             host_ledger_reopen(&s->ledger, b);
+    }
     host_audit_alone(s);
     a->lost_work = true;
     a->state = HOST_AUDIT_DUE;
@@ -441,7 +454,7 @@ static int begin_again(struct host_service *s, struct host_error *error) {
 }
 
 static void free_verdict(struct host_audit *a) {
-    free(a->redo);
+    host_unmap(a->redo, a->bricks);
     free(a->guilty);
     a->redo = a->guilty = NULL;
 }

@@ -67,6 +67,7 @@ struct host_audit {
     /* Of a check that has failed. */
     struct host_audit_place place[HOST_AUDIT_PLACES];
     unsigned places;
+    uint32_t bricks;
     uint8_t *redo;                  /* [bricks] 1: to be done again */
     uint8_t *guilty;                /* [nodes] 1: at fault */
     unsigned first;                 /* a node at fault, */

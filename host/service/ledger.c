@@ -3,29 +3,35 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
+
 int host_ledger_init(struct host_ledger *ledger, uint32_t bricks,
                      uint32_t nodes, struct host_error *error) {
     memset(ledger, 0, sizeof *ledger);
     ledger->bricks = bricks;
     ledger->nodes = nodes;
     ledger->piece_max = bricks;
-    ledger->open = malloc((size_t)bricks + 1);
-    ledger->by = malloc(((size_t)bricks + 1) * sizeof *ledger->by);
+    ledger->open = host_map(bricks);
+    ledger->by = host_map((size_t)bricks * sizeof *ledger->by);
     ledger->job = calloc(nodes, sizeof *ledger->job);
     if (ledger->open == NULL || ledger->by == NULL || ledger->job == NULL) {
         host_ledger_free(ledger);
         return host_fail_memory(error, "the list of bricks");
     }
-    memset(ledger->open, 0xff, bricks);
-    memset(ledger->by, 0xff, (size_t)bricks * sizeof *ledger->by);
+    for (uint32_t b = 0; b < bricks; b++) {
+        host_call_trim(sizeof *ledger->open + sizeof *ledger->by);
+        ledger->open[b] = UINT8_MAX;
+        ledger->by[b] = UINT16_MAX;
+    }
     return 0;
 }
 
 void host_ledger_free(struct host_ledger *ledger) {
-    free(ledger->open);
-    free(ledger->by);
+    host_unmap(ledger->open, ledger->bricks);
+    host_unmap(ledger->by, (size_t)ledger->bricks * sizeof *ledger->by);
     free(ledger->job);
-    free(ledger->found);
+    host_unmap(ledger->found, ledger->runs_max * sizeof *ledger->found);
     memset(ledger, 0, sizeof *ledger);
 }
 
@@ -46,14 +52,15 @@ bool host_ledger_next(struct host_ledger *ledger,
                       const struct host_order *order, uint32_t *first,
                       uint32_t *last) {
     uint32_t at = ledger->cursor;
-    while (at < ledger->bricks && host_ledger_committed(ledger, at))
-        at++;
+    for (; at < ledger->bricks && host_ledger_committed(ledger, at); at++)
+        host_call_trim(sizeof *ledger->open);
     *first = at;
     if (at < ledger->bricks) {
         uint32_t end = region_end(order, at);
-        while (at < end && at - *first < ledger->piece_max &&
-               !host_ledger_committed(ledger, at))
-            at++;
+        for (; at < end && at - *first < ledger->piece_max &&
+               !host_ledger_committed(ledger, at);
+             at++)
+            host_call_trim(sizeof *ledger->open);
     }
     *last = at;
     ledger->cursor = at;
@@ -106,6 +113,7 @@ uint32_t host_ledger_owner(const struct host_ledger *ledger,
                            const struct host_order *order,
                            const uint32_t v[4]) {
     double at[4][3];
+    host_call_trim((size_t)4 * HOST_CALL_AROUND);
     for (int i = 0; i < 4; i++)
         host_vertex(order, v[i], at[i]);
     const double *const p[4] = {at[0], at[1], at[2], at[3]};
@@ -124,7 +132,8 @@ int host_ledger_found(struct host_ledger *ledger, uint32_t node, uint64_t count,
     }
     if (runs == ledger->runs_max) {
         size_t more = runs == 0 ? 64 : 2 * runs;
-        void *moved = realloc(ledger->found, more * sizeof *ledger->found);
+        void *moved = host_remap(ledger->found, runs * sizeof *ledger->found,
+                                 more * sizeof *ledger->found);
         if (moved == NULL)
             return host_fail_memory(error, "the list of finders");
         ledger->found = moved;

@@ -7,7 +7,8 @@
  * tetrahedron, so that the check of the result (audit.h) can name the node.
  *
  * Memory: 3 bytes a brick, 40 bytes a node and 16 bytes for each change of
- * the finder between two tetrahedra that follow each other. */
+ * the finder between two tetrahedra that follow each other; in a call that puts
+ * arrays aside (host/base/scratch.h), all but those of nodes on disk. */
 #ifndef HOST_LEDGER_H
 #define HOST_LEDGER_H
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "parts.h"
+#include "host/base/parallel.h"
 #include "host/verify/judge.h"
 #include "node/result.h"
 #include "node/page_check.h"
@@ -113,49 +114,47 @@ static uint64_t draw(struct host_service *s, uint64_t count) {
     return (x >> 11) % count;
 }
 
-static int compare_rows(const void *p, const void *q) {
-    return memcmp(p, q, 4 * sizeof(uint32_t));
+/* The tetrahedra that the node's job has, in a list of their own. */
+static int rows_of_job(const struct host_service *s, const struct host_job *job,
+                       struct host_tetrahedra *rows, struct host_error *error) {
+    if (host_tetrahedra_room(rows, job->rows, error) == NULL)
+        return error->code;
+    for (uint64_t i = 0; i < s->tets->count; i++) {
+        const uint32_t *v = s->tets->v[i];
+        uint32_t brick = host_ledger_owner(&s->ledger, s->order, v);
+        if (brick >= job->first && brick < job->last && rows->count < job->rows)
+            memcpy(rows->v[rows->count++], v, sizeof *rows->v);
+    }
+    return 0;
 }
 
-static void ascend(uint32_t *v, unsigned count) {
-    for (unsigned i = 1; i < count; i++) {
-        for (unsigned k = i; k > 0 && v[k] < v[k - 1]; k--) {
-            uint32_t w = v[k];
-            v[k] = v[k - 1];
-            v[k - 1] = w;
-        }
+/* Whether rows are there twice, which are sorted then: of tetrahedra, in
+ * whatever order their vertices are, and of faces turned the same way. */
+static bool are_twice(struct host_tetrahedra *rows) {
+    bool twice = false;
+    host_tetrahedra_sort(rows);
+    for (uint64_t i = 1; i < rows->count && !twice; i++) {
+        const uint32_t *v = rows->v[i], *w = rows->v[i - 1];
+        bool mirrored = v[2] == w[3] && v[3] == w[2] && v[2] != INCODE_NONE &&
+                        v[3] != INCODE_NONE;
+        host_call_trim(sizeof *rows->v);
+        twice = v[0] == w[0] && v[1] == w[1] &&
+                ((v[2] == w[2] && v[3] == w[3]) || mirrored);
     }
-}
-
-/* The tetrahedra that the node's job has, in a list of their own; NULL without
- * memory. */
-static uint32_t (*rows_of_job(const struct host_service *s,
-                              const struct host_job *job, uint64_t *count))[4] {
-    uint32_t(*rows)[4] = malloc((size_t)(job->rows + 1) * sizeof *rows);
-    *count = 0;
-    for (uint64_t i = 0; rows != NULL && i < s->tets->count; i++) {
-        uint32_t brick = host_ledger_owner(&s->ledger, s->order, s->tets->v[i]);
-        if (brick >= job->first && brick < job->last && *count < job->rows)
-            memcpy(rows[(*count)++], s->tets->v[i], sizeof *rows);
-    }
-    return rows;
+    return twice;
 }
 
 /* Why rows are not all tetrahedra of the triangulation, each once; NULL: at
  * least most of them are. */
 static const char *why_too_many(struct host_service *s,
                                 const struct host_judge *judge,
-                                uint32_t (*rows)[4], uint64_t count) {
-    for (unsigned i = 0; i < SAMPLE && count > 0; i++)
-        if (!host_judge_tetrahedron(judge, rows[draw(s, count)]))
+                                struct host_tetrahedra *rows) {
+    for (unsigned i = 0; i < SAMPLE && rows->count > 0; i++)
+        if (!host_judge_tetrahedron(judge, rows->v[draw(s, rows->count)]))
             return "more results than its points allow, and wrong ones";
-    for (uint64_t i = 0; i < count; i++)
-        ascend(rows[i], 4);
-    qsort(rows, (size_t)count, sizeof *rows, compare_rows);
-    for (uint64_t i = 1; i < count; i++)
-        if (memcmp(rows[i], rows[i - 1], sizeof *rows) == 0)
-            return "more results than its points allow, and some twice";
-    return NULL;
+    return are_twice(rows)
+               ? "more results than its points allow, and some twice"
+               : NULL;
 }
 
 /* A job has more results than its bound.  They are judged.  If they are right,
@@ -166,15 +165,13 @@ static int look_through_rows(struct host_service *s, unsigned node,
     struct host_job *job = &s->ledger.job[node];
     const struct host_sites sites = host_sites_of_order(s->order);
     struct host_judge judge;
-    uint64_t count = 0;
+    struct host_tetrahedra rows = {0};
+    const char *why = NULL;
     if (host_judge_make(&judge, &sites, error) != 0)
         return error->code;
-    uint32_t(*rows)[4] = rows_of_job(s, job, &count);
-    const char *why =
-        rows == NULL ? NULL : why_too_many(s, &judge, rows, count);
-    if (rows == NULL)
-        host_fail_memory(error, "a look at a node's results");
-    free(rows);
+    if (rows_of_job(s, job, &rows, error) == 0)
+        why = why_too_many(s, &judge, &rows);
+    host_tetrahedra_free(&rows);
     host_judge_free(&judge);
     job->rows_max = 2 * job->rows;
     return error->code != 0 ? error->code
@@ -204,33 +201,17 @@ static bool is_facet(const struct host_judge *judge, const uint32_t f[3]) {
     return false;
 }
 
-static int compare_faces(const void *p, const void *q) {
-    return memcmp(p, q, 3 * sizeof(uint32_t));
-}
-
 /* Why faces are not all open faces of the node's front, each once; NULL: at
- * least most of them are.  A face is open once in each direction; it is turned
- * to begin with its smallest vertex. */
+ * least most of them are.  A face is open once in each direction. */
 static const char *why_spilled(struct host_service *s,
                                const struct host_judge *judge,
-                               struct incode_face *faces, uint64_t count) {
-    for (unsigned i = 0; i < SAMPLE && count > 0; i++)
-        if (!is_facet(judge, faces[draw(s, count)].v))
+                               struct host_tetrahedra *faces) {
+    for (unsigned i = 0; i < SAMPLE && faces->count > 0; i++)
+        if (!is_facet(judge, faces->v[draw(s, faces->count)]))
             return "more spilled faces than its points allow, and wrong ones";
-    for (uint64_t i = 0; i < count; i++) {
-        uint32_t *f = faces[i].v;
-        while (f[0] > f[1] || f[0] > f[2]) {
-            uint32_t first = f[0];
-            f[0] = f[1];
-            f[1] = f[2];
-            f[2] = first;
-        }
-    }
-    qsort(faces, (size_t)count, sizeof *faces, compare_faces);
-    for (uint64_t i = 1; i < count; i++)
-        if (memcmp(&faces[i], &faces[i - 1], sizeof *faces) == 0)
-            return "more spilled faces than its points allow, and some twice";
-    return NULL;
+    return are_twice(faces)
+               ? "more spilled faces than its points allow, and some twice"
+               : NULL;
 }
 
 /* As look_through_rows, for the faces that the host keeps for the node. */
@@ -239,19 +220,18 @@ static int look_through_faces(struct host_service *s, unsigned node,
     struct host_node *n = &s->node[node];
     const struct host_sites sites = host_sites_of_order(s->order);
     struct host_judge judge;
-    uint64_t count = 0;
-    struct incode_face *faces = NULL;
+    struct host_tetrahedra faces = {0};
     if (host_judge_make(&judge, &sites, error) != 0)
         return error->code;
-    if (host_spill_copy(&s->spill, node, &faces, &count, error) == 0) {
-        const char *why = why_spilled(s, &judge, faces, count);
+    if (host_spill_copy(&s->spill, node, &faces, error) == 0) {
+        const char *why = why_spilled(s, &judge, &faces);
         /* Faces that are on their way back are not judged. */
-        n->spilled_max =
-            n->spilled + (count > SPILLED_MIN ? count : SPILLED_MIN);
+        n->spilled_max = n->spilled + (faces.count > SPILLED_MIN ? faces.count
+                                                                 : SPILLED_MIN);
         if (why != NULL)
             (void)host_results_refuse(s, node, why, error);
     }
-    free(faces);
+    host_tetrahedra_free(&faces);
     host_judge_free(&judge);
     return error->code;
 }
@@ -308,6 +288,7 @@ int host_results_take(struct host_service *service,
         if (rows == NULL)
             return error->code;
         event = node_result_read(&reader, rows, room, &count);
+        host_call_trim(count * sizeof *rows);
         if (event == NODE_RESULT_GARBAGE) {
             return host_results_refuse(s, message->source, "invalid results",
                                        error);
@@ -370,6 +351,7 @@ static bool send_page(struct host_service *s, uint16_t to) {
     if (cube_room(s->cube, to) == 0)
         return false;
     body.head.page = node->pages[node->pages_first];
+    host_call_trim(HOST_CALL_AROUND);
     size_t size = host_page(s->order, body.head.page, body.data);
     if (!send_counted(s, to, NODE_PAGE, &body,
                       node_page_seal(&body, s->setup.page_key, size)))

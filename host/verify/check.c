@@ -148,6 +148,7 @@ static void find_beyond(void *context, unsigned number) {
         for (; i < end; i++) {
             const struct host_hull_facet *f = &c->hull.facet[i];
             uint32_t v[3];
+            host_call_trim((size_t)4 * HOST_CALL_AROUND);
             host_facet_outward(c->tets->v[f->tet], f->corner, v);
             if (host_judge_beyond(&b->judge, v)) {
                 check_fault(c, "facet",
@@ -494,19 +495,27 @@ static void add_tetrahedron(struct walk *w, uint32_t p, uint64_t tet) {
     }
 }
 
+static void free_slots(struct walk *w) {
+    host_unmap(w->slot, w->capacity * sizeof *w->slot);
+    w->slot = NULL;
+}
+
 /* Room for twice as many facets as there may be, all slots free. */
 static int clear_slots(struct walk *w, size_t tets) {
     size_t wanted = TABLE_MIN;
     while (wanted < 6 * tets)
         wanted *= 2;
     if (wanted > w->capacity) {
-        free(w->slot);
-        w->slot = malloc(wanted * sizeof *w->slot);
+        free_slots(w);
+        w->slot = host_map(wanted * sizeof *w->slot);
         w->capacity = w->slot == NULL ? 0 : wanted;
         if (w->slot == NULL)
             return host_fail_memory(&w->error, "the facets at a vertex");
     }
-    memset(w->slot, 0, wanted * sizeof *w->slot);
+    for (size_t i = 0; i < wanted; i += TABLE_MIN) {
+        memset(w->slot + i, 0, TABLE_MIN * sizeof *w->slot);
+        host_call_trim(TABLE_MIN * sizeof *w->slot);
+    }
     w->mask = wanted - 1;
     return 0;
 }
@@ -515,6 +524,7 @@ static int clear_slots(struct walk *w, size_t tets) {
 static void keep_open(struct walk *w) {
     struct check *c = w->c;
     for (size_t i = 0; i <= w->mask; i++) {
+        host_call_trim(sizeof *w->slot);
         if (w->slot[i].others != 0 && w->slot[i].facet != PAIRED) {
             uint64_t facet = w->slot[i].facet;
             (void)pthread_mutex_lock(&c->lock);
@@ -532,13 +542,16 @@ static void walk_vertex(struct walk *w, uint32_t p) {
         return; /* most */
     for (unsigned i = 0; i < c->parts; i++)
         tets += c->part[i].end[(size_t)p + 1] - c->part[i].end[p];
-    host_call_trim(touched(c, tets));
     if (tets == 0 || clear_slots(w, tets) != 0)
         return;
+    bool hub = w->mask * sizeof *w->slot > HOST_CALL_AROUND;
+    size_t each = touched(c, 1) + (hub ? (size_t)3 * HOST_CALL_AROUND : 0);
     for (unsigned i = 0; i < c->parts; i++) {
         const struct check_part *part = &c->part[i];
-        for (uint32_t e = part->end[p]; e < part->end[(size_t)p + 1]; e++)
+        for (uint32_t e = part->end[p]; e < part->end[(size_t)p + 1]; e++) {
+            host_call_trim(each);
             add_tetrahedron(w, p, part->first + part->entry[e]);
+        }
     }
     keep_open(w);
 }
@@ -550,11 +563,12 @@ static void walk_vertices(void *context, unsigned number) {
     uint64_t count = c->sites->count, i;
     while ((i = check_take(c, CHECK_VERTICES, count)) < count) {
         uint64_t end = check_end(i, CHECK_VERTICES, count);
+        host_call_trim(CHECK_VERTICES * (c->parts + 1) * sizeof(uint32_t));
         for (; i < end && w.error.code == 0; i++)
             walk_vertex(&w, (uint32_t)i);
     }
     check_spheres(c, &w.spheres, &w.tally);
-    free(w.slot);
+    free_slots(&w);
     check_fail(c, &w.error);
 }
 

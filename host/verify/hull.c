@@ -22,20 +22,22 @@ int host_hull_add(struct host_hull *hull, uint64_t tet, uint32_t corner,
                   struct host_error *error) {
     if (hull->count == hull->capacity) {
         size_t capacity = 2 * hull->capacity + 1024;
-        void *grown = realloc(hull->facet, capacity * sizeof *hull->facet);
-        if (grown == NULL || hull->count >= FACETS_MAX) {
-            hull->facet = grown == NULL ? hull->facet : grown;
-            return host_fail_memory(error, "the facets of the hull");
+        void *grown =
+            host_remap(hull->facet, hull->capacity * sizeof *hull->facet,
+                       capacity * sizeof *hull->facet);
+        if (grown != NULL) {
+            hull->facet = grown;
+            hull->capacity = capacity;
         }
-        hull->facet = grown;
-        hull->capacity = capacity;
+        if (grown == NULL || hull->count >= FACETS_MAX)
+            return host_fail_memory(error, "the facets of the hull");
     }
     hull->facet[hull->count++] = (struct host_hull_facet){tet, corner};
     return 0;
 }
 
 void host_hull_free(struct host_hull *hull) {
-    free(hull->facet);
+    host_unmap(hull->facet, hull->capacity * sizeof *hull->facet);
     hull->facet = NULL;
     hull->count = hull->capacity = 0;
 }
@@ -167,10 +169,38 @@ static int compare_edges(const void *p, const void *q) {
     return a->facet < b->facet ? -1 : a->facet > b->facet;
 }
 
+/* Moves the first of edges down to its place in the heap. */
+static void sift_down(struct edge *edge, size_t at, size_t n) {
+    struct edge e = edge[at];
+    for (size_t child; (child = 2 * at + 1) < n; at = child) {
+        child +=
+            child + 1 < n && compare_edges(&edge[child], &edge[child + 1]) < 0;
+        if (compare_edges(&e, &edge[child]) >= 0)
+            break;
+        edge[at] = edge[child];
+    }
+    edge[at] = e;
+}
+
+/* In place, as an edge array may be put aside. */
+static void sort_many(struct edge *edge, size_t n) {
+    for (size_t i = n / 2; i-- > 0;) {
+        host_call_trim(HOST_CALL_AROUND);
+        sift_down(edge, i, n);
+    }
+    for (size_t i = n; i-- > 1;) {
+        struct edge e = edge[0];
+        host_call_trim(HOST_CALL_AROUND);
+        edge[0] = edge[i];
+        edge[i] = e;
+        sift_down(edge, 0, i);
+    }
+}
+
 static void sort_edges(struct edge *edge, size_t n) {
     enum { FEW_MAX = 64 };
     if (n > FEW_MAX) {
-        qsort(edge, n, sizeof *edge, compare_edges);
+        sort_many(edge, n);
         return;
     }
     for (size_t i = 1; i < n; i++) {
@@ -293,6 +323,7 @@ static bool find_inside(struct hull_check *c) {
     for (uint64_t i = 0; i < tries; i++) {
         const uint32_t *v = c->hull->tets->v[count / tries * i];
         bool inside = true;
+        host_call_trim((size_t)5 * HOST_CALL_AROUND);
         for (int k = 0; k < 4; k++)
             inside = inside && v[k] < c->hull->sites->count;
         if (!inside)
@@ -410,6 +441,7 @@ static void find_shift(struct hull_check *c) {
     bool exact[3] = {true, true, true};
     for (int pass = 0; pass < 2; pass++) {
         for (uint64_t i = 0; i < sites->count; i++) {
+            host_call_trim(sizeof p);
             host_site(sites, (uint32_t)i, p);
             for (int d = 0; d < 3; d++) {
                 lowest[d] = fmin(lowest[d], p[d]);
@@ -430,6 +462,7 @@ static void magnify(struct hull_check *c) {
     double most[3] = {0}, p[3];
     find_shift(c);
     for (uint64_t i = 0; i < sites->count; i++) {
+        host_call_trim(sizeof p);
         host_site(sites, (uint32_t)i, p);
         for (int d = 0; d < 3; d++)
             most[d] = fmax(most[d], fabs(p[d] - c->shift[d]));

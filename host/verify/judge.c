@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "incode/predicates/predicates.h"
 
 enum { GROUP = INCODE_BRICK_POINTS }; /* bricks a group, points a brick */
@@ -24,6 +25,7 @@ static void cover(const struct host_judge *j, uint64_t box, const double lo[3],
 
 static void make_boxes(const struct host_judge *j) {
     for (uint64_t i = 0; i < j->bricks + j->groups; i++) {
+        host_call_trim(6 * sizeof(double));
         for (int d = 0; d < 3; d++) {
             j->side[d][i] = INFINITY;
             j->side[3 + d][i] = -INFINITY;
@@ -31,6 +33,7 @@ static void make_boxes(const struct host_judge *j) {
     }
     for (uint64_t v = 0; v < j->sites.count; v++) {
         double p[3];
+        host_call_trim(2 * sizeof p);
         if (host_site_is_vertex(&j->sites, (uint32_t)v)) {
             host_site(&j->sites, (uint32_t)v, p);
             cover(j, v / GROUP, p, p);
@@ -182,6 +185,7 @@ static void try_vertex(struct query *q, uint32_t v) {
 
 static void try_brick(struct query *q, uint64_t brick) {
     uint64_t first = brick * GROUP, left = q->judge->sites.count - first;
+    host_call_trim(HOST_CALL_AROUND);
     for (uint64_t i = 0; i < GROUP && i < left; i++) {
         try_vertex(q, (uint32_t)(first + i));
         if (q->found && q->any)
@@ -193,6 +197,7 @@ static void try_group(struct query *q, uint64_t group) {
     uint8_t may[GROUP];
     uint64_t first = group * GROUP, left = q->judge->bricks - first;
     uint64_t n = left < GROUP ? left : GROUP;
+    host_call_trim((size_t)6 * HOST_CALL_AROUND); /* the sides of boxes */
     mark_boxes(q, first, n, may);
     for (uint64_t i = 0; i < n && !(q->found && q->any); i++) {
         uint8_t still = may[i];

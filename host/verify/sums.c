@@ -337,17 +337,21 @@ static void sum_all(struct check *c) {
     run(c, host_threads(), find_hot);
 }
 
+static void clear(void *array, size_t bytes) {
+    for (size_t at = 0; at < bytes; at += TOUCHED) {
+        host_call_trim(TOUCHED);
+        memset((char *)array + at, 0,
+               bytes - at < TOUCHED ? bytes - at : TOUCHED);
+    }
+}
+
 /* Once more, with a look at each vertex. */
 static void sum_carefully(struct check *c) {
     size_t count = (size_t)c->sites->count;
     for (unsigned i = 0; i < c->parts; i++)
-        for (size_t v = 0; v < count; v += CHECK_VERTICES) {
-            size_t n = (size_t)check_end(v, CHECK_VERTICES, count) - v;
-            memset(c->part[i].sum + v, 0, n * sizeof *c->part[i].sum);
-            host_call_trim(n * sizeof *c->part[i].sum);
-        }
-    memset(c->used, 0, count);
-    memset(c->bad, 0, ((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
+        clear(c->part[i].sum, count * sizeof *c->part[i].sum);
+    clear(c->used, count);
+    clear(c->bad, ((size_t)c->tets->count / 64 + 1) * sizeof *c->bad);
     c->any_bad = c->any_unused = false;
     c->faults_kept = c->report->faults = c->report->distinct = 0;
     c->careful = true;

@@ -3,6 +3,7 @@
  * workers that hear nothing of each other. */
 #include <string.h>
 
+#include "host/base/parallel.h"
 #include "node/page_check.h"
 #include "regions.h"
 #include "strategies.h"
@@ -103,6 +104,7 @@ static bool send_regions(struct host_work *work, struct exchange *state) {
 static bool send_page(struct host_work *work, struct exchange *state) {
     struct node_page_message body;
     body.head.page = state->next - 1;
+    host_call_trim(sizeof body);
     size_t size = host_page(work->order, body.head.page, body.data);
     if (!work->write_to_all(work->context, NODE_PAGE_TO_ALL, &body,
                             node_page_seal(&body, work->page_key, size)))

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/base/parallel.h"
+
 /* Ranges a node after a loss: they differ in work, and whoever is free takes
  * the next; but each has a border, which is worked on from both sides. */
 enum { PIECES = 2 };
@@ -71,6 +73,7 @@ struct incode_job host_regions_job(const struct host_order *order,
     for (uint32_t v = first * INCODE_BRICK_POINTS;
          v < last * INCODE_BRICK_POINTS; v++) {
         double p[3];
+        host_call_trim(sizeof p);
         host_vertex(order, v, p);
         for (int k = 0; k < 3; k++) {
             job.lo[k] = p[k] < job.lo[k] ? p[k] : job.lo[k];

@@ -110,12 +110,12 @@ TEST(test_detached) {
 TEST(test_marks) {
     struct host_spill spill;
     struct host_error error = {0};
-    struct incode_face got[8], *faces = NULL;
+    struct host_tetrahedra faces = {0};
+    struct incode_face got[8];
     const struct incode_face face = {{64, 1, 2}},
                              low = {{64, INCODE_NONE, INCODE_NONE}},
                              high = {{127, INCODE_NONE, INCODE_NONE}};
     uint32_t count;
-    uint64_t copied;
     assert_int_equal(host_spill_init(&spill, 0, &error), 0);
     for (int i = 0; i < 1000; i++) {
         assert_int_equal(host_spill_put(&spill, 3, &high, 1, &error), 0);
@@ -125,10 +125,11 @@ TEST(test_marks) {
     assert_int_equal(host_spill_put(&spill, 4, &face, 1, &error), 0);
     assert_int_equal(spill.faces, 4);
     assert_int_equal(spill.blocks_used, 2);
-    assert_int_equal(host_spill_copy(&spill, 3, &faces, &copied, &error), 0);
-    assert_int_equal(copied, 1);
-    assert_memory_equal(faces, &face, sizeof face);
-    free(faces);
+    assert_int_equal(host_spill_copy(&spill, 3, &faces, &error), 0);
+    assert_int_equal(faces.count, 1);
+    assert_memory_equal(faces.v[0], &face, sizeof face);
+    assert_int_equal(faces.v[0][3], INCODE_NONE);
+    host_tetrahedra_free(&faces);
     struct host_spill_list list = host_spill_detach(&spill, 3, 1);
     assert_int_equal(list.faces, 3);
     assert_int_equal(host_spill_take(&spill, &list, got, 1, &count, &error), 0);
