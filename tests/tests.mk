@@ -46,7 +46,7 @@ $(BUILD)/fuzzers/%: $(obj)/tests/fuzz/%.o $(BUILD)/libhost.a \
 
 # The program with a fault in it, for the test that the simulation finds it.
 planted_programs := $(addprefix $(BUILD)/tests/incode-,twice lost-batch answer \
-	taken-by-two kept late)
+	taken-by-two kept late untrimmed)
 planted: $(planted_programs)
 $(BUILD)/tests/incode-twice: planted = incode/triangulator.c -DINCODE_PLANT_TWICE
 $(BUILD)/tests/incode-twice: incode/triangulator.c
@@ -62,6 +62,9 @@ $(BUILD)/tests/incode-answer: planted = incode/paper/manager.c -DINCODE_PLANT_AN
 $(BUILD)/tests/incode-answer: incode/paper/manager.c
 $(BUILD)/tests/incode-late: planted = incode/front/loan.c -DINCODE_PLANT_LATE
 $(BUILD)/tests/incode-late: incode/front/loan.c
+$(BUILD)/tests/incode-untrimmed: planted = \
+	host/verify/sums.c -DINCODE_PLANT_UNTRIMMED
+$(BUILD)/tests/incode-untrimmed: host/verify/sums.c
 $(planted_programs): $(obj)/host/main.o $(BUILD)/libhost.a $(BUILD)/libcore.a
 	@mkdir -p $(@D)
 	$(say) LINK $@

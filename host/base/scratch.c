@@ -57,16 +57,34 @@ static int fail_over(const struct host_scratch *s, struct host_error *error) {
                      (unsigned long long)here, (unsigned long long)(2 * here));
 }
 
-int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads,
-                       struct host_error *error) {
+static void prepare(struct host_scratch *scratch, const char *directory,
+                    uint64_t resident_max, unsigned threads) {
     uint64_t share = resident_max / SHARE;
     memset(scratch, 0, sizeof *scratch);
     scratch->directory = directory;
     scratch->resident_max = resident_max;
     scratch->array_min = share < ARRAY_MIN ? (size_t)share : ARRAY_MIN;
     scratch->step = (size_t)(resident_max / BETWEEN / threads);
+    scratch->statm = scratch->pagemap = -1;
     (void)pthread_mutex_init(&scratch->lock, NULL);
+}
+
+static int probe(const struct host_scratch *scratch, struct host_error *error) {
+    int file = make_file(scratch->directory);
+    if (file < 0) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: no scratch file can be made here (%s); give "
+                         "another folder as --scratch DIR",
+                         scratch->directory, strerror(errno));
+    }
+    (void)close(file);
+    return 0;
+}
+
+int host_scratch_begin(struct host_scratch *scratch, const char *directory,
+                       uint64_t resident_max, unsigned threads,
+                       struct host_error *error) {
+    prepare(scratch, directory, resident_max, threads);
     scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     if (scratch->statm < 0) {
         return host_fail(error, HOST_BROKEN,
@@ -74,27 +92,38 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                          "limit of memory out",
                          strerror(errno));
     }
-    if (is_over(scratch)) {
+    if (is_over(scratch))
+        fail_over(scratch, error);
+    else
+        probe(scratch, error);
+    if (error->code != 0)
         (void)close(scratch->statm);
-        return fail_over(scratch, error);
+    return error->code;
+}
+
+int host_scratch_begin_small(struct host_scratch *scratch,
+                             const char *directory, uint64_t resident_max,
+                             struct host_error *error) {
+    prepare(scratch, directory, resident_max, 1);
+    scratch->array_min = PAGE;
+    scratch->pagemap = open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC);
+    if (scratch->pagemap < 0) {
+        return host_fail(error, HOST_BROKEN,
+                         "/proc/self/pagemap: %s; mount /proc",
+                         strerror(errno));
     }
-    int file = make_file(directory);
-    if (file < 0) {
-        host_fail(error, HOST_INPUT,
-                  "%s: no scratch file can be made here (%s); give another "
-                  "folder as --scratch DIR",
-                  directory, strerror(errno));
-        (void)close(scratch->statm);
-        return error->code;
-    }
-    (void)close(file);
-    return 0;
+    if (probe(scratch, error) != 0)
+        (void)close(scratch->pagemap);
+    return error->code;
 }
 
 void host_scratch_end(struct host_scratch *scratch) {
     while (scratch->arrays > 0)
         (void)close(scratch->array[--scratch->arrays].file);
-    (void)close(scratch->statm);
+    if (scratch->statm >= 0)
+        (void)close(scratch->statm);
+    if (scratch->pagemap >= 0)
+        (void)close(scratch->pagemap);
     (void)pthread_mutex_destroy(&scratch->lock);
 }
 
@@ -114,16 +143,45 @@ bool host_scratch_in_memory(const struct host_scratch *scratch) {
 
 /* --- trims ---------------------------------------------------------------- */
 
+static void let_leave(const struct host_scratch *s) {
+    for (unsigned i = 0; i < s->arrays; i++)
+        (void)madvise(s->array[i].at, s->array[i].bytes, MADV_DONTNEED);
+}
+
+static uint64_t resident_of(const struct host_scratch *s,
+                            const struct host_scratch_array *a) {
+    enum { ENTRIES = 512 };
+    uint64_t entry[ENTRIES], first = (uintptr_t)a->at / PAGE, bytes = 0;
+    size_t pages = a->bytes / PAGE;
+    for (size_t i = 0; i < pages; i += ENTRIES) {
+        size_t n = pages - i < ENTRIES ? pages - i : ENTRIES;
+        ssize_t got = pread(s->pagemap, entry, n * sizeof entry[0],
+                            (off_t)((first + i) * sizeof entry[0]));
+        for (size_t k = 0; (ssize_t)(k * sizeof entry[0]) < got; k++)
+            bytes += entry[k] >> 63 != 0 ? PAGE : 0;
+    }
+    return bytes;
+}
+
+static void trim_small(struct host_scratch *s) {
+    uint64_t bytes = 0;
+    for (unsigned i = 0; i < s->arrays; i++)
+        bytes += resident_of(s, &s->array[i]);
+    s->resident_seen = bytes > s->resident_seen ? bytes : s->resident_seen;
+    s->trims += bytes > 0;
+    let_leave(s);
+}
+
 /* A thread that finds too much waits for the one that lets pages leave, and
  * touches no more in the meantime. */
 void host_scratch_trim(struct host_scratch *scratch) {
-    if (!is_over(scratch))
+    if (scratch->pagemap < 0 && !is_over(scratch))
         return;
     (void)pthread_mutex_lock(&scratch->lock);
-    for (unsigned i = 0; i < scratch->arrays && (i > 0 || is_over(scratch));
-         i++)
-        (void)madvise(scratch->array[i].at, scratch->array[i].bytes,
-                      MADV_DONTNEED);
+    if (scratch->pagemap >= 0)
+        trim_small(scratch);
+    else if (is_over(scratch)) /* still */
+        let_leave(scratch);
     (void)pthread_mutex_unlock(&scratch->lock);
 }
 

@@ -40,7 +40,10 @@ struct host_scratch {
                               before any becomes a file */
     size_t step;           /* bytes that a thread touches between two looks */
     int statm;             /* tells how much is resident */
-    pthread_mutex_t lock;  /* of all that follows */
+    int pagemap;           /* and of these arrays; -1: is not asked */
+    uint64_t resident_seen,
+        trims;            /* then: the most, and how often pages left */
+    pthread_mutex_t lock; /* of all that follows */
     struct host_scratch_array array[HOST_SCRATCH_ARRAYS];
     unsigned arrays;
     uint64_t bytes, bytes_max; /* of all files, now and at most */
@@ -55,6 +58,12 @@ struct host_scratch {
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                        uint64_t resident_max, unsigned threads,
                        struct host_error *error);
+/* The same for one thread of the simulation, in whose process nodes are, too:
+ * pages of arrays count alone, nearly all arrays are files, and all their pages
+ * leave at every look. */
+int host_scratch_begin_small(struct host_scratch *scratch,
+                             const char *directory, uint64_t resident_max,
+                             struct host_error *error);
 /* Closes the files of arrays that are still there. */
 void host_scratch_end(struct host_scratch *scratch);
 

@@ -237,6 +237,36 @@ static int compare(struct host_sim_run *r, struct host_error *error) {
     return status;
 }
 
+/* --- the host's memory ---------------------------------------------------- */
+
+static int begin_memory(struct host_sim_run *r, struct host_error *error) {
+    const char *folder = getenv("TMPDIR");
+    if (!r->plan->wanted[HOST_SIM_SMALL_HOST])
+        return 0;
+    r->call.threads = 1;
+    r->call.memory_max = UINT64_MAX;
+    if (host_scratch_begin_small(&r->scratch, folder == NULL ? "/tmp" : folder,
+                                 r->plan->host_memory, error) != 0)
+        return error->code;
+    r->call.scratch = &r->scratch;
+    host_call_enter(&r->call);
+    return 0;
+}
+
+static int check_memory(struct host_sim_run *r, struct host_error *error) {
+    struct host_scratch *s = r->call.scratch;
+    if (s == NULL)
+        return 0;
+    host_scratch_trim(s);
+    return s->resident_seen <= s->resident_max
+               ? 0
+               : host_fail(error, HOST_BROKEN,
+                           "host: %lluK of its arrays were resident, where it "
+                           "may have %lluK; replay it",
+                           (unsigned long long)s->resident_seen >> 10,
+                           (unsigned long long)s->resident_max >> 10);
+}
+
 /* A run that gave up as a node lies, and says which. */
 static bool names_liar(const struct host_sim_run *r, int status,
                        const struct host_error *error) {
@@ -273,7 +303,9 @@ int host_sim_run(const struct host_sim_plan *plan,
     r->plan = plan;
     r->outcome = outcome;
     r->random = sim_seed(plan->seed, 2);
-    int status = make_work(r, error);
+    struct host_call *outer = host_call();
+    int status = begin_memory(r, error);
+    status = status != 0 ? status : make_work(r, error);
     if (status == 0 && open_world(r, error) == 0) {
         struct host_machine machine = host_world_machine(&r->world);
         status = serve(r, &machine, error);
@@ -289,11 +321,18 @@ int host_sim_run(const struct host_sim_plan *plan,
                 host_fail(error, HOST_BROKEN, "node: %s; replay it", damage);
         }
         host_world_close(&r->world);
+        status = status != 0 ? status : check_memory(r, error);
+        host_call_enter(outer);
         status = status != 0 || gave_up ? status : compare(r, error);
     }
+    if (r->call.scratch != NULL)
+        host_call_enter(&r->call);
     host_order_free(&r->order);
     host_points_free(&r->points);
     host_tetrahedra_free(&r->tets);
+    host_call_enter(outer);
+    if (r->call.scratch != NULL)
+        host_scratch_end(&r->scratch);
     free(r);
     return status != 0 ? status : error->code;
 }
@@ -362,8 +401,9 @@ int host_sim_arguments(int argc, char **argv, struct host_sim_options *options,
             "Runs a whole cube - host, nodes and links as they are - in one "
             "process in virtual time.  The seed decides on points, cube, wires "
             "and faults: lost and damaged frames, stalls, closed wires, "
-            "partitions, pauses, crashes, idle nodes, small memories, a slow "
-            "host, a node that lies.  Then the faults stop, and the result "
+            "partitions, pauses, crashes, idle nodes, small memories of "
+            "nodes and of the host, a slow host, a node that lies.  Then the "
+            "faults stop, and the result "
             "must be the right one; of a node that lies, the run may also give "
             "up if it names it.  Each seed prints what struck while work was "
             "open; a failure prints the command that replays it.\v"

@@ -135,6 +135,19 @@ static void draw_liar(struct host_sim_plan *p) {
     p->liar.one_in = (uint32_t)host_sim_draw_log(&state, 1, 100);
 }
 
+/* From 640 KiB on: between two looks at what is resident there may be some
+ * places that are read in no order, of 64 KiB each. */
+static void draw_small_host(struct host_sim_plan *p) {
+    uint64_t state = sim_seed(p->seed, 92);
+    if (host_sim_draw(&state, 1, 8) > 1)
+        return;
+    p->wanted[HOST_SIM_SMALL_HOST] = true;
+    p->host_memory = host_sim_draw(&state, 640, 768) << 10;
+    if (p->nodes <= 8 && p->index == INCODE_KD && !p->wanted[HOST_SIM_TINY] &&
+        !p->wanted[HOST_SIM_BARE] && !p->wanted[HOST_SIM_LIAR])
+        p->points = host_sim_draw(&state, 6000, 8000); /* more than that */
+}
+
 /* --- what they do --------------------------------------------------------- */
 
 static bool one_way(struct host_sim_run *r, const struct host_sim_event *e) {
@@ -265,6 +278,13 @@ static uint64_t count_lies(const struct host_sim_run *r,
     return r->liar.told;
 }
 
+/* Trims by which pages of arrays left. */
+static uint64_t count_small_host(const struct host_sim_run *r,
+                                 enum host_sim_fault kind) {
+    (void)kind;
+    return r->scratch.trims;
+}
+
 /* --- the table ------------------------------------------------------------ */
 
 const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
@@ -297,6 +317,8 @@ const struct host_sim_kind host_sim_kinds[HOST_SIM_FAULTS] = {
                             .count = count_slow_node},
     [HOST_SIM_BARE] = {"bare", .draw = draw_bare, .count = count_bare},
     [HOST_SIM_LIAR] = {"lie", .draw = draw_liar, .count = count_lies},
+    [HOST_SIM_SMALL_HOST] = {"small-host", .draw = draw_small_host,
+                             .count = count_small_host},
 };
 
 /* --- when ----------------------------------------------------------------- */

@@ -215,4 +215,8 @@ void host_sim_plan_print(FILE *file, const struct host_sim_plan *plan) {
         fprintf(file, " node %u lies (%s, 1 in %u);", plan->liar.node,
                 host_lies[plan->liar.way], plan->liar.one_in);
     }
+    if (plan->wanted[HOST_SIM_SMALL_HOST]) {
+        fprintf(file, " host memory %lluK;",
+                (unsigned long long)plan->host_memory >> 10);
+    }
 }

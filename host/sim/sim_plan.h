@@ -37,10 +37,12 @@ enum host_sim_fault {
     HOST_SIM_IDLER,        /* a node, but for node 0, answers and never works */
     HOST_SIM_FOREIGN,      /* a node tells others of another host's generation,
                               one far away or at an end of the numbers */
-    HOST_SIM_SLOW_NODE, /* nodes work long between two looks at their links */
-    HOST_SIM_BARE,      /* serial wires, which never close, between boards
-                           that ask who they are whenever they start */
-    HOST_SIM_LIAR,      /* a node alters messages of its own: liar.h */
+    HOST_SIM_SLOW_NODE,  /* nodes work long between two looks at their links */
+    HOST_SIM_BARE,       /* serial wires, which never close, between boards
+                            that ask who they are whenever they start */
+    HOST_SIM_LIAR,       /* a node alters messages of its own: liar.h */
+    HOST_SIM_SMALL_HOST, /* the host's memory, so that arrays are put aside:
+                            host/base/scratch.h */
     HOST_SIM_FAULTS
 };
 
@@ -134,7 +136,9 @@ struct host_sim_plan {
         unsigned node;
         enum host_lie way;
         uint32_t one_in;
-    } liar; /* as in struct host_liar */
+    } liar;               /* as in struct host_liar */
+    uint64_t host_memory; /* bytes of points and tetrahedra that the host may
+                             have resident; 0: all */
     /* One fault alone, at frame `frame` of all that are sent: what becomes of
      * it, or a restart of the node that sends it.  0: none. */
     uint64_t frame;

@@ -2,6 +2,8 @@
 #ifndef HOST_SIM_RUN_H
 #define HOST_SIM_RUN_H
 
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "host/mesh/points.h"
 #include "host/service/service.h"
 #include "second_host.h"
@@ -19,6 +21,8 @@ struct host_sim_run {
     struct host_order order;
     struct host_tetrahedra tets;
     struct host_liar liar;
+    struct host_call call; /* of a small host, with what it puts aside */
+    struct host_scratch scratch;
     uint64_t random;
     /* By the world's clock: no more faults; the next event; a second host. */
     uint64_t calm_us, event_us, second_us;

@@ -64,14 +64,14 @@ refuses sim/no-range 2 'not a range' incode sim --seeds 5
 refuses sim/backwards 2 'not a range' incode sim --seeds 9..5
 
 # found NAME [SEEDS]: the fault planted in that program is found, in 40 seeds or
-# so many, and replayed by the command that the failure prints.
+# these, and replayed by the command that the failure prints.
 found() {
     local program=$BUILD/tests/incode-$1 seed
     if ! [ -x "$program" ]; then
         fail "sim/finds $1" "there is no $program; make planted"
         return
     fi
-    within "$program" sim --seeds "1..${2:-40}" > "$said" 2>&1
+    within "$program" sim --seeds "${2:-1..40}" > "$said" 2>&1
     seed=$(sed -n 's/.* replay: .* --seed \([0-9]*\).*/\1/p' "$said" | head -n 1)
     if [ -z "$seed" ]; then
         fail "sim/finds $1" "not found in $(grep -c '^seed' "$said") seeds"
@@ -86,4 +86,5 @@ found lost-batch
 found answer
 found taken-by-two
 found kept
-found late 200
+found late 1..200
+found untrimmed 92..96

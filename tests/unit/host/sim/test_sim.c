@@ -93,6 +93,20 @@ TEST(each_frame_meets_each_fate) {
     assert_true(2 * changed > runs);
 }
 
+/* A small memory of the host changes where its arrays are, and nothing else. */
+TEST(a_small_host_takes_the_same_course) {
+    struct host_sim_plan plan = small_run();
+    plan.points = 3000;
+    struct host_sim_outcome whole = run(&plan);
+    plan.wanted[HOST_SIM_SMALL_HOST] = true;
+    plan.host_memory = 640 << 10;
+    struct host_sim_outcome part = run(&plan);
+    assert_string_equal(part.digest.text, whole.digest.text);
+    assert_true(part.trace == whole.trace);
+    assert_true(part.struck[HOST_SIM_SMALL_HOST] > 100);
+    assert_true(whole.struck[HOST_SIM_SMALL_HOST] == 0);
+}
+
 TEST(each_node_restarts_at_each_frame) {
     struct host_sim_plan plan = small_run();
     struct host_sim_outcome clean = run(&plan);
