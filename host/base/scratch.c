@@ -15,7 +15,8 @@ enum {
     PAGE = 4096,
     ARRAY_MIN = 1 << 20, /* smaller ones may be many, and cost little */
     SHARE = 64,          /* of the limit, such an array at most */
-    BETWEEN = 32,        /* of the limit, what is touched between two looks */
+    BETWEEN = 32,        /* of the limit, what is touched between two looks, */
+    BETWEEN_SMALL = 24,  /* and in the simulation */
     ZEROS = 1 << 16
 };
 
@@ -106,6 +107,7 @@ int host_scratch_begin_small(struct host_scratch *scratch,
                              struct host_error *error) {
     prepare(scratch, directory, resident_max, 1);
     scratch->array_min = PAGE;
+    scratch->step = (size_t)(resident_max / BETWEEN_SMALL);
     scratch->pagemap = open("/proc/self/pagemap", O_RDONLY | O_CLOEXEC);
     if (scratch->pagemap < 0) {
         return host_fail(error, HOST_BROKEN,
