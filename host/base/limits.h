@@ -10,7 +10,8 @@ enum { HOST_RESIDENT_MIN = 16 << 20 };
 
 struct host_limits {
     uint64_t memory;    /* bytes; 0: half of what is available, where less than
-                           all would fit */
+                           all would fit, or the input's size is not known: then
+                           arrays are put aside from a half of that on */
     const char *folder; /* NULL: $TMPDIR, else that of the output, else /tmp */
 };
 
@@ -18,9 +19,10 @@ struct host_limits {
     {"host-memory",                                                            \
      0,                                                                        \
      "SIZE",                                                                   \
-     "Memory that the host may use, as 2G; the rest of points and tetrahedra " \
-     "is put aside on disk. 16M or more. Default: half of what is available, " \
-     "where a file is so large that it may not suffice",                       \
+     "Memory that this process may use, as 2G, whatever nodes have; the rest " \
+     "of points and tetrahedra is put aside on disk. 16M or more. Default: "   \
+     "half of what is available, where a file is so large that it may not "    \
+     "suffice, or a pipe brings so much",                                      \
      HOST_AT(type, memory),                                                    \
      .least = HOST_RESIDENT_MIN,                                               \
      .bytes = "give 16M or more, as in 2G"},                                   \
@@ -34,6 +36,8 @@ struct host_limits {
 
 /* From now on all that this thread does is a call (parallel.h) of `threads`
  * threads (0: one a processor) within these limits: there is one at a time.
+ * With a limit, a page of what is put aside that its disk does not give any
+ * more (SIGBUS) ends the program with a message, as SIGTERM does.
  * input: the file that is read first, by whose size is judged whether all fits;
  * output: the first.  Both may be NULL or "-".  0, or HOST_INPUT: nothing can
  * be put aside there. */
