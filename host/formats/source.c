@@ -129,6 +129,23 @@ int host_source_unpacks(const struct host_source *source, uint64_t packed,
                : 0;
 }
 
+bool host_source_inflate(const uint8_t *from, size_t packed, uint8_t *to,
+                         size_t bytes) {
+    z_stream z = {.next_in = (z_const Bytef *)from, .next_out = to};
+    int status = inflateInit(&z);
+    while (status == Z_OK) {
+        const uint8_t *end = from + packed, *room = to + bytes;
+        size_t in = (size_t)(end - z.next_in);
+        size_t out = (size_t)(room - z.next_out);
+        z.avail_in = (uInt)(in < PIECE ? in : PIECE);
+        z.avail_out = (uInt)(out < PIECE ? out : PIECE);
+        host_call_trim(z.avail_in + z.avail_out);
+        status = inflate(&z, Z_NO_FLUSH);
+    }
+    (void)inflateEnd(&z);
+    return status == Z_STREAM_END && z.next_out == to + bytes;
+}
+
 /* --- pieces --------------------------------------------------------------- */
 
 static bool fault(struct host_feed *feed, const char *path, const char *what) {

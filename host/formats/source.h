@@ -82,6 +82,11 @@ int host_source_wrap(struct host_source *source, const char *path,
 int host_source_unpacks(const struct host_source *source, uint64_t packed,
                         uint64_t bytes, struct host_error *error);
 
+/* Whether bytes that are deflated become exactly `bytes`; of any size, as it
+ * trims (parallel.h). */
+bool host_source_inflate(const uint8_t *from, size_t packed, uint8_t *to,
+                         size_t bytes);
+
 void host_source_close(struct host_source *source);
 
 /* "PATH: what" with HOST_INPUT. */

@@ -8,7 +8,8 @@
  * the bytes of the file go out in their order.
  *
  * Memory: when read, 24 bytes a point, and 8 a corner and 9 a cell if cells are
- * wanted, at once; when written, none that grows. */
+ * wanted, at once, so that a file is refused for which a limit of the host's
+ * memory leaves no room; when written, none that grows. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,6 +19,8 @@
 
 #include "format.h"
 #include "hdf5.h"
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "read.h"
 
 #define DAMAGED "the file is damaged, get it again"
@@ -339,6 +342,25 @@ static int copy_numbers(const struct task *task, const struct host_hdf5 *h,
     return error->code;
 }
 
+/* The library holds what it unpacks in memory, and so is what it leaves. */
+static int check_limit(const struct task *task, uint64_t bytes,
+                       struct host_error *error) {
+    enum { SHARE = 4 };
+    const struct host_call *call = host_call();
+    uint64_t most = call == NULL || call->scratch == NULL
+                        ? UINT64_MAX
+                        : call->scratch->resident_max / SHARE;
+    return bytes <= most
+               ? 0
+               : host_fail(
+                     error, HOST_INPUT,
+                     "%s: VTKHDF of %.1f MB unpacked, which is read as a "
+                     "whole, and the host may use %.1f MB for it; convert "
+                     "it to .npy or .vtu on a machine with more, or give "
+                     "a larger --host-memory",
+                     task->path, (double)bytes * 1e-6, (double)most * 1e-6);
+}
+
 static int read_arrays(void *context, const struct host_hdf5 *h,
                        struct host_error *error) {
     const struct task *task = context;
@@ -360,6 +382,7 @@ static int read_arrays(void *context, const struct host_hdf5 *h,
             return error->code;
         bytes += task->report->count[i] * bytes_of(i);
     }
+    check_limit(task, bytes + task->source->bytes, error);
     host_source_unpacks(task->source, task->source->bytes, bytes, error);
     for (enum array i = 0; i < ARRAYS && error->code == 0; i++)
         if (n[i].size[0] > 0)

@@ -131,16 +131,13 @@ static int inflate_blocks(struct bytes *out, const struct packed *p,
     size_t at = head->bytes;
     for (uint64_t b = 0; b < blocks; b++) {
         uint64_t packed = header_word(head, 3 + (size_t)b, p->coding);
-        uLongf n = (uLongf)(b + 1 == blocks && last != 0 ? last : size);
-        uLongf expected = n;
+        uint64_t n = b + 1 == blocks && last != 0 ? last : size;
         if (packed > in->bytes - at || n > out->capacity - out->bytes ||
-            uncompress(out->owned + out->bytes, &n, in->data + at,
-                       (uLong)packed) != Z_OK ||
-            n != expected)
+            !host_source_inflate(in->data + at, (size_t)packed,
+                                 out->owned + out->bytes, (size_t)n))
             return damaged(p, error);
-        host_call_trim((size_t)(n + packed));
         at += (size_t)packed;
-        out->bytes += n;
+        out->bytes += (size_t)n;
     }
     return 0;
 }
