@@ -25,7 +25,8 @@ enum {
 
 /* What all runs of a call share. */
 struct common {
-    struct host_direct_sums *sums; /* or NULL */
+    struct host_direct_sums *sums;         /* or NULL */
+    const struct host_direct_store *store; /* or NULL */
     struct host_error *error;
     /* What the triangulators of threads work in; NULL: nothing yet. */
     void *arena[HOST_THREADS_MAX];
@@ -39,7 +40,9 @@ struct direct {
     struct host_tetrahedra *tets; /* [threads] */
     struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
     uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    bool is_first;                /* its bricks count, for who watches */
+    unsigned level;               /* 0: its bricks count, for who watches */
+    const struct host_direct_store *store; /* or NULL */
+    uint64_t key;                          /* then: of the order */
     unsigned threads;
     struct incode_setup setup;
     size_t arena;              /* bytes for each thread, if there are so many */
@@ -74,7 +77,9 @@ enum {
     HOPELESS_LEAST = 1 << 14, /* and at least so many */
     SIFT_LEAST = 1 << 15,     /* tetrahedra, likewise */
     POLL_LEFT = 1 << 11,      /* tetrahedra between two trims */
-    REGIONS_MAX = 1 << 12
+    REGIONS_MAX = 1 << 12,
+    KEPT_LEAST = 1 << 18 /* points of a seam's region that is kept: half a
+                            second of work */
 };
 
 /* The most bytes of an arena that is of use. */
@@ -96,11 +101,14 @@ uint32_t host_direct_regions(unsigned threads, uint64_t points) {
     return regions;
 }
 
-static void fail(struct direct *run, enum host_direct outcome,
+/* True: this failure is the run's first. */
+static bool fail(struct direct *run, enum host_direct outcome,
                  const char *why) {
     int before = HOST_DIRECT_DONE;
-    if (atomic_compare_exchange_strong(&run->outcome, &before, outcome))
-        atomic_store(&run->why, why);
+    if (!atomic_compare_exchange_strong(&run->outcome, &before, outcome))
+        return false;
+    atomic_store(&run->why, why);
+    return true;
 }
 
 /* --- what a triangulator asks for ----------------------------------------- */
@@ -157,24 +165,29 @@ static void leave(void *context, const uint32_t v[4]) {
     host_tetrahedra_keep(w->left, 1);
 }
 
+static void count_bricks(struct worker *w, uint32_t count) {
+    struct host_direct_sums *sums = w->run->common->sums;
+    if (w->run->level > 0)
+        return;
+    if (w->call != NULL)
+        atomic_fetch_add_explicit(&w->call->bricks, count,
+                                  memory_order_relaxed);
+    if (sums != NULL) {
+        uint32_t done = count + atomic_fetch_add_explicit(&sums->bricks, count,
+                                                          memory_order_relaxed);
+        if (w->is_caller && sums->committed != NULL)
+            sums->committed(done);
+    }
+}
+
 static void commit(void *context, uint32_t brick) {
     struct worker *w = context;
-    struct host_direct_sums *sums = w->run->common->sums;
     (void)brick;
     /* As where coordinates are too small for the bounds of spheres. */
     uint64_t final = w->tets->count - w->tets_before;
     uint64_t left = w->left->count - w->left_before;
     w->is_hopeless = left > HOPELESS_LEAST && left / HOPELESS > final;
-    if (!w->run->is_first)
-        return;
-    if (w->call != NULL)
-        atomic_fetch_add_explicit(&w->call->bricks, 1, memory_order_relaxed);
-    if (sums != NULL) {
-        uint32_t done = 1 + atomic_fetch_add_explicit(&sums->bricks, 1,
-                                                      memory_order_relaxed);
-        if (w->is_caller && sums->committed != NULL)
-            sums->committed(done);
-    }
+    count_bricks(w, 1);
 }
 
 static bool spill(void *context, const struct incode_face *faces,
@@ -266,6 +279,35 @@ static void do_region(struct worker *w, uint32_t number) {
     }
 }
 
+/* The same, or what an earlier run has kept of it. */
+static void take_region(struct worker *w, uint32_t number) {
+    struct direct *run = w->run;
+    const struct host_direct_store *store = run->store;
+    const struct host_region *r = &run->order->region[number];
+    size_t first = (size_t)r->first * INCODE_BRICK_POINTS;
+    struct host_direct_region region = {.key = run->key,
+                                        .level = run->level,
+                                        .number = number,
+                                        .regions = run->order->regions,
+                                        .tets = w->tets,
+                                        .left = w->left,
+                                        .tets_before = w->tets->count,
+                                        .left_before = w->left->count};
+    if (run->mark != NULL) {
+        region.mark = run->mark + first;
+        region.marks = (size_t)r->last * INCODE_BRICK_POINTS - first;
+    }
+    if (store != NULL && store->load(store->context, &region)) {
+        count_bricks(w, r->last - r->first);
+        return;
+    }
+    do_region(w, number);
+    if (store != NULL && run->outcome == HOST_DIRECT_DONE &&
+        store->keep(store->context, &region, &w->error) != 0 &&
+        fail(run, HOST_DIRECT_UNKEPT, NULL))
+        *run->common->error = w->error;
+}
+
 /* --- threads -------------------------------------------------------------- */
 
 static double used_s(clockid_t clock) {
@@ -348,7 +390,7 @@ static void work(void *context, unsigned part) {
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
            (region = atomic_fetch_add(&run->regions, 1)) < run->order->regions)
-        do_region(&w, region);
+        take_region(&w, region);
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
         add_statistics(&p->statistics, w.t);
@@ -538,9 +580,19 @@ static uint32_t seam_regions(uint64_t points, uint64_t all) {
     return host_direct_regions(regions, points);
 }
 
+/* Those of an earlier run, if it has kept some. */
+static uint32_t seam_regions_kept(const struct direct *run, uint64_t points) {
+    const struct host_direct_store *store = run->common->store;
+    uint32_t kept =
+        store == NULL ? 0 : store->regions(store->context, run->level + 1);
+    return kept != 0 ? kept : seam_regions(points, run->order->points);
+}
+
+/* key: of the order's points. */
 static enum host_direct run_order(struct common *common,
-                                  const struct host_order *order, bool is_first,
-                                  bool alone, struct host_tetrahedra *tets);
+                                  const struct host_order *order,
+                                  unsigned level, uint64_t key, bool alone,
+                                  struct host_tetrahedra *tets);
 
 static enum host_direct triangulate_seam(struct seam *s) {
     struct common *common = s->run->common;
@@ -548,10 +600,11 @@ static enum host_direct triangulate_seam(struct seam *s) {
     enum host_direct outcome = HOST_DIRECT_MEMORY;
     uint64_t all = s->run->order->points;
     if (host_order_make(&order, "points", s->xyz[0], s->points, HOST_ADAPTIVE,
-                        seam_regions(s->points, all), false,
+                        seam_regions_kept(s->run, s->points), false,
                         common->error) == 0)
-        outcome =
-            run_order(common, &order, false, s->points <= all / 2, &s->tets);
+        outcome = run_order(common, &order, s->run->level + 1,
+                            host_key(s->id, s->points, s->run->key),
+                            s->points <= all / 2, &s->tets);
     else if (host_call_cancelled())
         outcome = HOST_DIRECT_CANCELLED;
     else if (order.fault != HOST_ORDER_SOUND) {
@@ -601,11 +654,12 @@ static enum host_direct tell(const struct direct *run) {
 }
 
 static enum host_direct run_order(struct common *common,
-                                  const struct host_order *order, bool is_first,
-                                  bool alone, struct host_tetrahedra *tets) {
+                                  const struct host_order *order,
+                                  unsigned level, uint64_t key, bool alone,
+                                  struct host_tetrahedra *tets) {
     struct host_tetrahedra list[HOST_THREADS_MAX] = {{0}};
     struct host_tetrahedra left[HOST_THREADS_MAX] = {{0}};
-    struct host_direct_sums *sums = is_first ? common->sums : NULL;
+    struct host_direct_sums *sums = level == 0 ? common->sums : NULL;
     unsigned threads = host_threads();
     threads = threads < order->regions ? threads : order->regions;
     size_t marks = (size_t)order->bricks * INCODE_BRICK_POINTS;
@@ -614,7 +668,7 @@ static enum host_direct run_order(struct common *common,
         .order = order,
         .tets = list,
         .left = left,
-        .is_first = is_first,
+        .level = level,
         .threads = threads,
         .setup = {.bricks = order->bricks,
                   .index = INCODE_KD,
@@ -632,6 +686,10 @@ static enum host_direct run_order(struct common *common,
         if (run.mark == NULL)
             fail(&run, HOST_DIRECT_MEMORY, NULL);
     }
+    if (level == 0 || order->points / order->regions >= KEPT_LEAST)
+        run.store = common->store;
+    if (common->store != NULL)
+        run.key = host_order_key(order, key);
     if (sums != NULL)
         sums->threads = threads;
     host_fork_all(threads, work, &run);
@@ -661,8 +719,10 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error) {
-    struct common common = {.sums = sums, .error = error};
-    enum host_direct outcome = run_order(&common, order, true, true, tets);
+    struct common common = {.sums = sums,
+                            .store = sums == NULL ? NULL : sums->store,
+                            .error = error};
+    enum host_direct outcome = run_order(&common, order, 0, 0, true, tets);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;

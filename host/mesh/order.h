@@ -69,6 +69,11 @@ int host_order_make(struct host_order *order, const char *where,
                     enum host_partition partition, uint32_t regions, bool grid,
                     struct host_error *error);
 
+/* A number by which two orders of the same input differ, if they do; `before`:
+ * that of what the input was made from, or 0.  host_key: the same of words. */
+uint64_t host_order_key(const struct host_order *order, uint64_t before);
+uint64_t host_key(const uint32_t *word, uint64_t count, uint64_t before);
+
 /* Makes one region of all. */
 void host_order_join(struct host_order *order);
 
