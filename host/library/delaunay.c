@@ -5,78 +5,19 @@
 
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
-#include "host/mesh/spill.h"
-
-enum {
-    PAGES_QUEUE = 1024,
-    SPILL_TAKEN = 128,     /* faces given back at a time */
-    AROUND = 1 << 16,      /* bytes that one place far from others touches */
-    EXPECTED = 7,          /* tetrahedra a point */
-    EMITTED_ROOM = 1 << 12 /* tetrahedra that the triangulator may give at once
-                            */
-};
-
-/* What is known of a vertex of a region that is triangulated alone. */
-enum {
-    AT_FINAL = 1, /* it is a tetrahedron's that is final */
-    AT_SEAM = 2   /* or of one that is not, or of the hull where others' points
-                     lie beyond */
-};
-
-/* What all runs of a call share. */
-struct common {
-    struct host_direct_sums *sums;         /* or NULL */
-    const struct host_direct_store *store; /* or NULL */
-    struct host_error *error;
-    /* What the triangulators of threads work in; NULL: nothing yet. */
-    void *arena[HOST_THREADS_MAX];
-    size_t bytes[HOST_THREADS_MAX];
-};
-
-/* The threads of one run. */
-struct direct {
-    struct common *common;
-    const struct host_order *order;
-    struct host_tetrahedra *tets; /* [threads] */
-    struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
-    uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    unsigned level;               /* 0: its bricks count, for who watches */
-    const struct host_direct_store *store; /* or NULL */
-    uint64_t key;                          /* then: of the order */
-    unsigned threads;
-    struct incode_setup setup;
-    size_t arena;              /* bytes for each thread, if there are so many */
-    _Atomic uint32_t regions;  /* that were taken */
-    _Atomic int outcome;       /* enum host_direct: the worst so far */
-    _Atomic(const char *) why; /* of HOST_DIRECT_BROKEN */
-};
-
-struct worker {
-    struct direct *run;
-    struct host_call *call; /* or NULL */
-    bool is_caller;         /* it is the calling thread's */
-    struct host_tetrahedra *tets, *left;
-    uint64_t tets_before, left_before; /* rows of other regions */
-    bool is_hopeless; /* hardly anything of this one is final */
-    struct incode_triangulator *t;
-    struct host_spill spill;
-    struct host_error error;
-    uint32_t pages[PAGES_QUEUE], page_count; /* requested */
-    uint32_t wanted; /* brick whose spilled faces are wanted, or INCODE_NONE */
-};
+#include "region.h"
 
 /* What is not yet final of a volume of so many points fits a triangulation by
  * points (INCODE_COMPLEX_POINTS_MAX); more would go on by faces, which takes
  * several times as long. */
 enum {
     REGION_POINTS = 1 << 20,
-    REGION_BYTES = 64,        /* of an arena a point of a region */
-    SEAM_LEAST = 1 << 13,     /* points of a seam that are worth two threads */
-    SEAM_WHOLE = 60000,       /* of which a triangulation has room for all */
-    HOPELESS = 2,             /* times as many tetrahedra are not final, */
-    HOPELESS_LEAST = 1 << 14, /* and at least so many */
-    SIFT_LEAST = 1 << 15,     /* tetrahedra, likewise */
-    POLL_LEFT = 1 << 11,      /* tetrahedra between two trims */
+    EXPECTED = 7,         /* tetrahedra a point */
+    REGION_BYTES = 64,    /* of an arena a point of a region */
+    SEAM_LEAST = 1 << 13, /* points of a seam that are worth two threads */
+    SEAM_WHOLE = 60000,   /* of which a triangulation has room for all */
+    SIFT_LEAST = 1 << 15, /* tetrahedra, likewise */
+    POLL_LEFT = 1 << 11,  /* tetrahedra between two trims */
     REGIONS_MAX = 1 << 12,
     KEPT_LEAST = 1 << 18 /* points of a seam's region that is kept: half a
                             second of work */
@@ -101,213 +42,6 @@ uint32_t host_direct_regions(unsigned threads, uint64_t points) {
     return regions;
 }
 
-/* True: this failure is the run's first. */
-static bool fail(struct direct *run, enum host_direct outcome,
-                 const char *why) {
-    int before = HOST_DIRECT_DONE;
-    if (!atomic_compare_exchange_strong(&run->outcome, &before, outcome))
-        return false;
-    atomic_store(&run->why, why);
-    return true;
-}
-
-/* --- what a triangulator asks for ----------------------------------------- */
-
-static bool request(void *context, uint32_t page) {
-    struct worker *w = context;
-    if (w->page_count == PAGES_QUEUE)
-        return false;
-    w->pages[w->page_count++] = page;
-    return true;
-}
-
-static size_t emit_room(void *context) {
-    (void)context;
-    return EMITTED_ROOM;
-}
-
-static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count) {
-    struct worker *w = context;
-    uint32_t(*v)[4] = host_tetrahedra_room(w->tets, count, &w->error);
-    if (v == NULL) {
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-        return;
-    }
-    uint8_t *mark = w->run->mark;
-    for (size_t i = 0; i < count; i++) {
-        v[i][0] = vertex;
-        memcpy(v[i] + 1, apexes[i], sizeof apexes[i]);
-        for (int k = 0; k < 4 && mark != NULL; k++)
-            mark[v[i][k]] |= AT_FINAL;
-    }
-    host_tetrahedra_keep(w->tets, count);
-    host_call_trim(count * sizeof *v);
-}
-
-static void leave(void *context, const uint32_t v[4]) {
-    struct worker *w = context;
-    bool finite = true;
-    for (int k = 0; k < 4; k++) {
-        finite = finite && v[k] != INCODE_NONE;
-        if (v[k] != INCODE_NONE)
-            w->run->mark[v[k]] |= AT_SEAM;
-    }
-    if (!finite)
-        return;
-    uint32_t(*left)[4] = host_tetrahedra_room(w->left, 1, &w->error);
-    if (left == NULL) {
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-        return;
-    }
-    memcpy(left[0], v, sizeof left[0]);
-    host_call_trim(sizeof left[0]);
-    host_tetrahedra_keep(w->left, 1);
-}
-
-static void count_bricks(struct worker *w, uint32_t count) {
-    struct host_direct_sums *sums = w->run->common->sums;
-    if (w->run->level > 0)
-        return;
-    if (w->call != NULL)
-        atomic_fetch_add_explicit(&w->call->bricks, count,
-                                  memory_order_relaxed);
-    if (sums != NULL) {
-        uint32_t done = count + atomic_fetch_add_explicit(&sums->bricks, count,
-                                                          memory_order_relaxed);
-        if (w->is_caller && sums->committed != NULL)
-            sums->committed(done);
-    }
-}
-
-static void commit(void *context, uint32_t brick) {
-    struct worker *w = context;
-    (void)brick;
-    /* As where coordinates are too small for the bounds of spheres. */
-    uint64_t final = w->tets->count - w->tets_before;
-    uint64_t left = w->left->count - w->left_before;
-    w->is_hopeless = left > HOPELESS_LEAST && left / HOPELESS > final;
-    count_bricks(w, 1);
-}
-
-static bool spill(void *context, const struct incode_face *faces,
-                  size_t count) {
-    struct worker *w = context;
-    if (host_spill_put(&w->spill, 0, faces, (uint32_t)count, &w->error) != 0)
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-    return true;
-}
-
-static bool unspill(void *context, uint32_t brick) {
-    struct worker *w = context;
-    w->wanted = brick;
-    return true;
-}
-
-/* --- what it gets --------------------------------------------------------- */
-
-static bool deliver_faces(struct worker *w) {
-    uint32_t brick = w->wanted, count;
-    struct host_spill_list list = host_spill_detach(&w->spill, 0, brick);
-    struct incode_face faces[SPILL_TAKEN];
-    w->wanted = INCODE_NONE;
-    do {
-        if (host_spill_take(&w->spill, &list, faces, SPILL_TAKEN, &count,
-                            &w->error) != 0 ||
-            incode_triangulator_unspill(w->t, brick, faces, count,
-                                        list.faces == 0) != 0)
-            return false;
-    } while (list.faces > 0);
-    return true;
-}
-
-static bool deliver_pages(struct worker *w) {
-    uint8_t page[INCODE_PAGE_BYTES];
-    for (uint32_t i = 0; i < w->page_count; i++) {
-        size_t bytes = host_page(w->run->order, w->pages[i], page);
-        host_call_trim(AROUND);
-        if (incode_triangulator_page(w->t, w->pages[i], page, bytes) != 0)
-            return false;
-    }
-    w->page_count = 0;
-    return true;
-}
-
-static bool deliver(struct worker *w) {
-    if (w->page_count == 0 && w->wanted == INCODE_NONE)
-        return false;
-    return (w->wanted == INCODE_NONE || deliver_faces(w)) && deliver_pages(w);
-}
-
-/* A region that cannot be triangulated alone: all of it is seam. */
-static void give_up_region(struct worker *w, const struct host_region *r) {
-    const struct host_order *order = w->run->order;
-    host_tetrahedra_cut(w->tets, w->tets_before);
-    host_tetrahedra_cut(w->left, w->left_before);
-    (void)deliver(w); /* what the triangulator will not ask for again */
-    for (uint32_t brick = r->first; brick < r->last; brick++)
-        memset(w->run->mark + (size_t)brick * INCODE_BRICK_POINTS, AT_SEAM,
-               order->fill[brick]);
-}
-
-static void do_region(struct worker *w, uint32_t number) {
-    const struct host_region *r = &w->run->order->region[number];
-    w->tets_before = w->tets->count;
-    w->left_before = w->left->count;
-    w->is_hopeless = false;
-    struct incode_job job = {.first = r->first, .last = r->last};
-    memcpy(job.lo, r->lo, sizeof job.lo);
-    memcpy(job.hi, r->hi, sizeof job.hi);
-    if (r->first == r->last)
-        return;
-    incode_triangulator_start(w->t, &job);
-    while (atomic_load_explicit(&w->run->outcome, memory_order_relaxed) ==
-           HOST_DIRECT_DONE) {
-        enum incode_step step = incode_triangulator_step(w->t);
-        if (step == INCODE_FINISHED)
-            return;
-        if (step == INCODE_FULL || w->is_hopeless) {
-            give_up_region(w, r);
-            return;
-        }
-        if (step == INCODE_BROKEN)
-            fail(w->run, HOST_DIRECT_BROKEN, incode_triangulator_fault(w->t));
-        else if (step == INCODE_WAITING && !deliver(w))
-            fail(w->run, HOST_DIRECT_BROKEN, "it waits for nothing");
-        if (host_call_cancelled())
-            fail(w->run, HOST_DIRECT_CANCELLED, NULL);
-    }
-}
-
-/* The same, or what an earlier run has kept of it. */
-static void take_region(struct worker *w, uint32_t number) {
-    struct direct *run = w->run;
-    const struct host_direct_store *store = run->store;
-    const struct host_region *r = &run->order->region[number];
-    size_t first = (size_t)r->first * INCODE_BRICK_POINTS;
-    struct host_direct_region region = {.key = run->key,
-                                        .level = run->level,
-                                        .number = number,
-                                        .regions = run->order->regions,
-                                        .tets = w->tets,
-                                        .left = w->left,
-                                        .tets_before = w->tets->count,
-                                        .left_before = w->left->count};
-    if (run->mark != NULL) {
-        region.mark = run->mark + first;
-        region.marks = (size_t)r->last * INCODE_BRICK_POINTS - first;
-    }
-    if (store != NULL && store->load(store->context, &region)) {
-        count_bricks(w, r->last - r->first);
-        return;
-    }
-    do_region(w, number);
-    if (store != NULL && run->outcome == HOST_DIRECT_DONE &&
-        store->keep(store->context, &region, &w->error) != 0 &&
-        fail(run, HOST_DIRECT_UNKEPT, NULL))
-        *run->common->error = w->error;
-}
-
 /* --- threads -------------------------------------------------------------- */
 
 static double used_s(clockid_t clock) {
@@ -319,7 +53,7 @@ static double used_s(clockid_t clock) {
 /* An arena of as many bytes as there are, down to the least that works: false
  * if there are fewer. */
 static bool map_arena(const struct direct *run, unsigned part) {
-    struct common *c = run->common;
+    struct direct_call *c = run->common;
     size_t least = (incode_arena_min(&run->setup) + 63) / 64 * 64;
     size_t bytes = run->arena > least ? run->arena : least;
     if (c->arena[part] != NULL && c->bytes[part] >= least)
@@ -352,34 +86,26 @@ static void add_statistics(struct incode_statistics *to,
 
 static void work(void *context, unsigned part) {
     struct direct *run = context;
-    struct worker w = {.run = run,
-                       .call = host_call(),
-                       .is_caller = part + 1 == run->threads,
-                       .tets = &run->tets[part],
-                       .left = &run->left[part],
-                       .wanted = INCODE_NONE};
-    const struct incode_outside outside = {
-        .pages = {&w, request},
-        .front = {.context = &w,
-                  .emit_room = emit_room,
-                  .emit = emit,
-                  .left = run->mark != NULL ? leave : NULL,
-                  .commit = commit,
-                  .spill = spill,
-                  .unspill = unspill}};
+    struct direct_worker w = {.run = run,
+                              .call = host_call(),
+                              .is_caller = part + 1 == run->threads,
+                              .tets = &run->tets[part],
+                              .left = &run->left[part],
+                              .wanted = INCODE_NONE};
+    const struct incode_outside outside = direct_outside(&w);
     double cpu = used_s(CLOCK_THREAD_CPUTIME_ID);
     double wall = used_s(CLOCK_MONOTONIC);
     const char *why = NULL;
     /* As many spilled faces as memory has room for, and no file. */
     if (!map_arena(run, part) ||
         host_spill_init(&w.spill, UINT32_MAX, &w.error) != 0) {
-        fail(run, HOST_DIRECT_MEMORY, NULL);
+        direct_fail(run, HOST_DIRECT_MEMORY, NULL);
     } else {
         w.t = incode_triangulator_init(run->common->arena[part],
                                        run->common->bytes[part], &run->setup,
                                        &outside, &why);
         if (w.t == NULL)
-            fail(run, HOST_DIRECT_BROKEN, why);
+            direct_fail(run, HOST_DIRECT_BROKEN, why);
     }
     /* Room for as many as there will be, about, which costs nothing before it
      * is touched. */
@@ -390,7 +116,7 @@ static void work(void *context, unsigned part) {
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
            (region = atomic_fetch_add(&run->regions, 1)) < run->order->regions)
-        take_region(&w, region);
+        direct_region(&w, region);
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
         add_statistics(&p->statistics, w.t);
@@ -589,13 +315,13 @@ static uint32_t seam_regions_kept(const struct direct *run, uint64_t points) {
 }
 
 /* key: of the order's points. */
-static enum host_direct run_order(struct common *common,
+static enum host_direct run_order(struct direct_call *common,
                                   const struct host_order *order,
                                   unsigned level, uint64_t key, bool alone,
                                   struct host_tetrahedra *tets);
 
 static enum host_direct triangulate_seam(struct seam *s) {
-    struct common *common = s->run->common;
+    struct direct_call *common = s->run->common;
     struct host_order order;
     enum host_direct outcome = HOST_DIRECT_MEMORY;
     uint64_t all = s->run->order->points;
@@ -653,7 +379,7 @@ static enum host_direct tell(const struct direct *run) {
     return outcome;
 }
 
-static enum host_direct run_order(struct common *common,
+static enum host_direct run_order(struct direct_call *common,
                                   const struct host_order *order,
                                   unsigned level, uint64_t key, bool alone,
                                   struct host_tetrahedra *tets) {
@@ -684,7 +410,7 @@ static enum host_direct run_order(struct common *common,
         run.setup.build = INCODE_BUILD_POINTS;
         run.mark = host_map(marks);
         if (run.mark == NULL)
-            fail(&run, HOST_DIRECT_MEMORY, NULL);
+            direct_fail(&run, HOST_DIRECT_MEMORY, NULL);
     }
     if (level == 0 || order->points / order->regions >= KEPT_LEAST)
         run.store = common->store;
@@ -719,9 +445,9 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error) {
-    struct common common = {.sums = sums,
-                            .store = sums == NULL ? NULL : sums->store,
-                            .error = error};
+    struct direct_call common = {.sums = sums,
+                                 .store = sums == NULL ? NULL : sums->store,
+                                 .error = error};
     enum host_direct outcome = run_order(&common, order, 0, 0, true, tets);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);

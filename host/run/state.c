@@ -28,8 +28,8 @@ enum {
     VALUE = 72,
     KEPT_A_THREAD = 4,        /* regions, */
     KEPT_POINTS_MIN = 100000, /* of so many points or more */
-    ORDER = 1,                /* kinds of records; 2: host/service/kept.c, */
-    REGION = 16               /* and more: of a seam, by level */
+    REGION = 16               /* kind of records; and more: of a seam, by level
+                               */
 };
 
 /* The lines of `state`. */
@@ -351,102 +351,29 @@ int host_state_begin(struct host_run_options *options,
 
 /* --- the order ------------------------------------------------------------ */
 
-/* The arrays of an order whose sizes are known: `order` is used for those
- * alone, or the arrays as well. */
-static unsigned parts_of(const struct host_order *order,
-                         struct host_bytes part[8]) {
-    uint64_t bricks = order->bricks;
-    uint64_t cells =
-        (uint64_t)order->cells[0] * order->cells[1] * order->cells[2];
-    unsigned n = 0;
-    part[n++] = (struct host_bytes){order, sizeof *order};
-    part[n++] =
-        (struct host_bytes){order->brick, bricks * sizeof *order->brick};
-    part[n++] = (struct host_bytes){order->fill, bricks};
-    part[n++] = (struct host_bytes){order->row, bricks * INCODE_BRICK_POINTS *
-                                                    sizeof *order->row};
-    part[n++] = (struct host_bytes){
-        order->boxes,
-        (order->tree.base[order->tree.levels] - bricks) * sizeof *order->boxes};
-    part[n++] = (struct host_bytes){order->region,
-                                    order->regions * sizeof *order->region};
-    if (cells == 0)
-        return n;
-    part[n++] = (struct host_bytes){order->first_of_cell,
-                                    (cells + 1) * sizeof *order->first_of_cell};
-    part[n++] = (struct host_bytes){order->by_cell,
-                                    order->points * sizeof *order->by_cell};
-    return n;
-}
-
 /* On a thread of its own. */
 static void write_order(void *context) {
     struct host_state *s = context;
     struct host_journal file = {0};
-    struct host_journal_head head = {.kind = ORDER, .key = s->key};
-    struct host_bytes part[8];
-    unsigned parts = parts_of(s->order, part);
     if (host_journal_open(&file, s->folder, "order.new", s->path[ORDER_FILE],
                           &s->order_error) != 0)
         return;
     host_journal_clear(&file);
-    if (host_journal_append(&file, &head, part, parts, &s->order_error) == 0 &&
+    if (host_order_append(s->order, &file, s->key, &s->order_error) == 0 &&
         host_journal_sync(&file, &s->order_error) == 0)
         give_name(s, "order.new", ORDER_FILE, &s->order_error);
     host_journal_close(&file);
 }
 
-/* Reads the order's numbers, makes room for its arrays, and reads them. */
-static bool read_order(struct host_journal_reader *reader,
-                       struct host_order *order, uint64_t bytes) {
-    struct host_bytes part[8];
-    if (!host_journal_take(reader, order, sizeof *order))
-        return false;
-    order->brick = NULL, order->fill = NULL, order->row = NULL;
-    order->boxes = NULL, order->region = NULL;
-    order->first_of_cell = NULL, order->by_cell = NULL;
-    incode_tree_init(&order->tree, order->bricks,
-                     order->cells[0] * order->cells[1] * order->cells[2]);
-    order->regions_made = order->regions;
-    unsigned parts = parts_of(order, part);
-    uint64_t sum = 0;
-    for (unsigned i = 0; i < parts; i++)
-        sum += part[i].bytes;
-    if (sum != bytes) {
-        *order = (struct host_order){0};
-        return false;
-    }
-    void *array[8] = {NULL};
-    bool is_read = true;
-    for (unsigned i = 1; i < parts; i++) {
-        array[i] = host_map(part[i].bytes);
-        is_read = is_read && array[i] != NULL &&
-                  host_journal_take(reader, array[i], part[i].bytes);
-    }
-    order->brick = array[1], order->fill = array[2], order->row = array[3];
-    order->boxes = array[4], order->region = array[5];
-    order->first_of_cell = array[6], order->by_cell = array[7];
-    return is_read;
-}
-
 /* The earlier run's order; false: it is not whole. */
 static bool load_order(struct host_state *s, struct host_order *order) {
     struct host_journal file = {0};
-    struct host_journal_reader reader;
     struct host_error error = {0};
-    bool is_sound = false;
     if (!exists(s, ORDER_FILE) ||
         host_journal_open(&file, s->folder, names[ORDER_FILE],
                           s->path[ORDER_FILE], &error) != 0)
         return false;
-    if (file.records == 1 && file.record[0].head.kind == ORDER &&
-        file.record[0].head.key == number_of(&s->values, KEY)) {
-        host_journal_read(&reader, &file, &file.record[0]);
-        is_sound = read_order(&reader, order, file.record[0].head.bytes) &&
-                   host_journal_sound(&reader);
-        if (!is_sound)
-            host_order_free(order);
-    }
+    bool is_sound = host_order_take(order, &file, number_of(&s->values, KEY));
     host_journal_close(&file);
     if (!is_sound && !s->is_quiet)
         host_note("%s: is damaged, so the points are ordered again",
@@ -633,10 +560,10 @@ int host_state_start(struct host_state *state, const struct host_order *order,
         return error->code;
     s->store =
         (struct host_direct_store){regions_kept, load_region, keep_region, s};
-    s->kept =
-        (struct host_kept){.journal = &s->spool,
-                           .key = s->key,
-                           .directory = s->is_quiet ? NULL : s->directory};
+    s->kept = (struct host_kept){
+        .journal = &s->spool,
+        .key = s->key,
+        .directory = s->is_quiet || s->is_new ? NULL : s->directory};
     note_spool(s, strcmp(s->values.of[WAY], "threads") == 0);
     (void)snprintf(advice, sizeof advice,
                    "incode: the same command goes on from what is in %s\n",

@@ -173,7 +173,7 @@ int host_kept_load(struct host_kept *kept, struct host_ledger *ledger,
     if (ledger->committed == 0)
         begin_generation(&r, k->generation);
     k->resumed = ledger->committed;
-    if (k->journal->records > 0 && k->directory != NULL)
+    if (k->directory != NULL)
         host_note("%s: resuming: %.0f %% of the bricks are there", k->directory,
                   100.0 * k->resumed / ledger->bricks);
     return 0;

@@ -27,7 +27,7 @@ struct host_kept {
     /* Given by the caller, who clears the rest. */
     struct host_journal *journal;
     uint64_t key;          /* of the order */
-    const char *directory; /* for the note that says what is there; or NULL */
+    const char *directory; /* for a note of what is there; NULL: none */
     /* Results. */
     uint32_t resumed; /* bricks */
     unsigned unsound; /* records that are damaged */
