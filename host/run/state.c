@@ -186,6 +186,13 @@ static int not_a_state(const struct host_state *s, struct host_error *error) {
                                                      : SPOOL_FILE]);
 }
 
+/* Whether so many bytes begin as a copy does. */
+static bool is_ours(const char copy[COPY], ssize_t bytes) {
+    ssize_t mark = (ssize_t)strlen(fields[FORMAT].name);
+    return bytes >= 0 && memcmp(copy, fields[FORMAT].name,
+                                (size_t)(bytes < mark ? bytes : mark)) == 0;
+}
+
 /* The earlier run's values; is_new where there are none. */
 static int read_values(struct host_state *s, struct values *v,
                        struct host_error *error) {
@@ -206,9 +213,7 @@ static int read_values(struct host_state *s, struct values *v,
     s->is_new = !scan_values(v, both[0]) && !scan_values(v, both[1]);
     if (!s->is_new)
         return 0;
-    size_t mark = strlen(fields[FORMAT].name);
-    if (n > (ssize_t)mark && memcmp(both[0], fields[FORMAT].name, mark) != 0 &&
-        memcmp(both[1], fields[FORMAT].name, mark) != 0)
+    if (!is_ours(both[0], n) && !is_ours(both[1], n - COPY))
         return not_a_state(s, error);
     if (!s->is_quiet)
         host_note("%s: is damaged, so the run begins anew",
@@ -225,11 +230,12 @@ static int compare_values(const struct host_state *s,
         const char *now = s->values.of[i], *was = before->of[i];
         if (fields[i].what == NULL || now[0] == '\0' || strcmp(now, was) == 0)
             continue;
-        return host_fail(error, fields[i].code,
-                         "%s: is of another run (%s %s there, %s now); give "
-                         "that run's points and options again, or another "
-                         "folder",
-                         s->path[STATE_FILE], fields[i].what, was, now);
+        return host_fail(
+            error, fields[i].code,
+            "%s: is of another run (%s %.16s there, %.16s now); give "
+            "that run's points and options again, or another "
+            "folder",
+            s->path[STATE_FILE], fields[i].what, was, now);
     }
     return 0;
 }
