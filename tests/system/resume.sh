@@ -73,7 +73,7 @@ damage() {
     else
         place=$((place < size ? place : size - 1))
         byte=$(od -An -tu1 -j $place -N 1 "$1")
-        printf "\\x$(printf %x $((byte ^ 8)))" |
+        printf %b "\\x$(printf %x $((byte ^ 8)))" |
             dd of="$1" bs=1 seek=$place conv=notrunc status=none
     fi
 }
@@ -116,7 +116,8 @@ check 'resume/refused: nothing has changed' "$(ls -l "$kept")" \
 # A process that has the folder, and waits for the reader of its output.
 mkfifo "$scratch/pipe"
 exec {pipe}<> "$scratch/pipe"
-"$INCODE" run "$scratch/small.npy" -q -o - --resume "$kept" >&$pipe 2> /dev/null &
+"$INCODE" run "$scratch/small.npy" -q -o - --resume "$kept" \
+    > "$scratch/pipe" 2> /dev/null &
 waits() { grep -q pipe "/proc/$1/wchan" || ! kill -0 "$1"; } 2> /dev/null
 await waits $!
 exits 'resume/a second process' 3 incode run "$scratch/small.npy" -q \

@@ -86,7 +86,8 @@ static void write_file(const char *path, const char *bytes, size_t n) {
 
 /* Replaces a line of the file `state`, in both copies. */
 static void put_line(const char *line) {
-    char bytes[2 * COPY], copy[COPY] = "", *name = strndup(line, 7);
+    char bytes[2 * COPY], copy[COPY] = "",
+                          *name = strndup(line, strcspn(line, " ") + 1);
     assert_int_equal(read_file(file[0], bytes, sizeof bytes), sizeof bytes);
     char *from = strstr(bytes, name), *crc = strstr(bytes, "\ncrc ");
     free(name);
@@ -343,5 +344,33 @@ TEST_WITH(test_a_damaged_order, set_up, tear_down) {
         run(false);
         assert_order(&order);
         host_order_free(&order);
+    }
+}
+
+/* Records count for the order alone that they were made for. */
+TEST_WITH(test_an_order_that_changes, set_up, tear_down) {
+    struct stat about;
+    (void)fixture;
+    for (int i = 0; i < 2; i++) {
+        struct host_journal journal;
+        struct host_journal_head head = {.kind = 99};
+        set_options();
+        run(false);
+        host_order_free(&order);
+        int fd = open(folder, O_RDONLY);
+        assert_int_equal(
+            host_journal_open(&journal, fd, "spool", "spool", &error), 0);
+        assert_int_equal(host_journal_append(&journal, &head, NULL, 0, &error),
+                         0);
+        host_journal_close(&journal);
+        assert_int_equal(close(fd), 0);
+        if (i == 1)
+            put_line("key 0123456789abcdef");
+        set_options();
+        run(false);
+        assert_order(&order);
+        host_order_free(&order);
+        assert_int_equal(stat(file[2], &about), 0);
+        assert_int_equal(about.st_size > 0, i == 0);
     }
 }
