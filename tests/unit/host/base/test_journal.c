@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "host/base/create.h"
@@ -179,13 +180,17 @@ TEST_WITH(test_a_full_disk, make_folder, remove_folder) {
     struct host_journal j;
     struct host_error error = {0};
     struct rlimit before, little;
+    struct stat about;
     write_all(*fixture);
     open_journal(*fixture, &j);
+    uint64_t size = j.end;
     (void)signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
     little = (struct rlimit){j.end + 300, before.rlim_max};
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &little), 0);
     assert_int_equal(append(&j, 0, &error), HOST_INPUT);
+    assert_int_equal(fstat(j.file, &about), 0);
+    assert_int_equal(about.st_size, size); /* what it took is given back */
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
     assert_non_null(strstr(error.text, "spool: cannot be written"));
     assert_non_null(strstr(error.text, "make room"));

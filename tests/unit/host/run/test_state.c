@@ -203,6 +203,31 @@ TEST_WITH(test_another_version, set_up, tear_down) {
     assert_refused(HOST_INPUT, "(the format 9 there, 1 now)");
 }
 
+/* One copy is enough; a run of which no copy is sound begins anew. */
+TEST_WITH(test_a_damaged_state, set_up, tear_down) {
+    char bytes[2 * COPY];
+    (void)fixture;
+    set_options();
+    run(false);
+    host_order_free(&order);
+    size_t n = read_file(file[0], bytes, sizeof bytes);
+    char *nodes = strstr(bytes, "nodes 4");
+    assert_non_null(nodes);
+    for (int copies = 1; copies <= 3; copies++) {
+        char damaged[2 * COPY];
+        memcpy(damaged, bytes, sizeof damaged);
+        for (int i = 0; i < 2; i++)
+            if ((copies >> i & 1) != 0)
+                damaged[nodes + 6 - bytes + i * COPY] = '8';
+        write_file(file[0], damaged, n);
+        set_options();
+        options.nodes = 0;
+        assert_int_equal(begin(), 0);
+        assert_int_equal(options.nodes, copies == 3 ? 0 : REGIONS);
+        host_state_end(options.state, false);
+    }
+}
+
 TEST_WITH(test_other_files, set_up, tear_down) {
     static const char *const texts[] = {"notes\n", "incode\n-state"};
     (void)fixture;
