@@ -40,6 +40,7 @@ enum { ENDINGS = sizeof endings / sizeof endings[0] };
 
 /* Of outputs: one was asked for; something went to one that is no file. */
 static volatile sig_atomic_t asked, in_place;
+static const char *volatile advice;
 
 /* In a handler of signals: what has happened, and what is left. */
 static void tell(int number) {
@@ -53,6 +54,8 @@ static void tell(int number) {
     strcat(text, "\n");
     host_progress_erase();
     (void)!write(STDERR_FILENO, text, strlen(text));
+    if (advice != NULL)
+        (void)!write(STDERR_FILENO, advice, strlen(advice));
 }
 
 /* With its default action back, the signal ends the program on return. */
@@ -282,6 +285,10 @@ int host_output_probe(const char *path, struct host_error *error) {
         (void)host_output_close(&out, 1, &dropped);
     }
     return error->code;
+}
+
+void host_output_advice(const char *line) {
+    advice = line;
 }
 
 void host_output_expect(void) {

@@ -50,6 +50,10 @@ int host_output_probe(const char *path, struct host_error *error);
  * this one says that there is none. */
 void host_output_expect(void);
 
+/* A line for the user if a signal ends the program, with its newline; NULL:
+ * none.  It outlives the command. */
+void host_output_advice(const char *line);
+
 /* None of these fails at once: host_output_close tells. */
 void host_output_bytes(struct host_output *out, const void *bytes, size_t n);
 void host_output_unsigned(struct host_output *out, uint64_t value);

@@ -5,76 +5,22 @@
 
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
-#include "host/mesh/spill.h"
-
-enum {
-    PAGES_QUEUE = 1024,
-    SPILL_TAKEN = 128,     /* faces given back at a time */
-    AROUND = 1 << 16,      /* bytes that one place far from others touches */
-    EXPECTED = 7,          /* tetrahedra a point */
-    EMITTED_ROOM = 1 << 12 /* tetrahedra that the triangulator may give at once
-                            */
-};
-
-/* What is known of a vertex of a region that is triangulated alone. */
-enum {
-    AT_FINAL = 1, /* it is a tetrahedron's that is final */
-    AT_SEAM = 2   /* or of one that is not, or of the hull where others' points
-                     lie beyond */
-};
-
-/* What all runs of a call share. */
-struct common {
-    struct host_direct_sums *sums; /* or NULL */
-    struct host_error *error;
-    /* What the triangulators of threads work in; NULL: nothing yet. */
-    void *arena[HOST_THREADS_MAX];
-    size_t bytes[HOST_THREADS_MAX];
-};
-
-/* The threads of one run. */
-struct direct {
-    struct common *common;
-    const struct host_order *order;
-    struct host_tetrahedra *tets; /* [threads] */
-    struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
-    uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    bool is_first;                /* its bricks count, for who watches */
-    unsigned threads;
-    struct incode_setup setup;
-    size_t arena;              /* bytes for each thread, if there are so many */
-    _Atomic uint32_t regions;  /* that were taken */
-    _Atomic int outcome;       /* enum host_direct: the worst so far */
-    _Atomic(const char *) why; /* of HOST_DIRECT_BROKEN */
-};
-
-struct worker {
-    struct direct *run;
-    struct host_call *call; /* or NULL */
-    bool is_caller;         /* it is the calling thread's */
-    struct host_tetrahedra *tets, *left;
-    uint64_t tets_before, left_before; /* rows of other regions */
-    bool is_hopeless; /* hardly anything of this one is final */
-    struct incode_triangulator *t;
-    struct host_spill spill;
-    struct host_error error;
-    uint32_t pages[PAGES_QUEUE], page_count; /* requested */
-    uint32_t wanted; /* brick whose spilled faces are wanted, or INCODE_NONE */
-};
+#include "region.h"
 
 /* What is not yet final of a volume of so many points fits a triangulation by
  * points (INCODE_COMPLEX_POINTS_MAX); more would go on by faces, which takes
  * several times as long. */
 enum {
     REGION_POINTS = 1 << 20,
-    REGION_BYTES = 64,        /* of an arena a point of a region */
-    SEAM_LEAST = 1 << 13,     /* points of a seam that are worth two threads */
-    SEAM_WHOLE = 60000,       /* of which a triangulation has room for all */
-    HOPELESS = 2,             /* times as many tetrahedra are not final, */
-    HOPELESS_LEAST = 1 << 14, /* and at least so many */
-    SIFT_LEAST = 1 << 15,     /* tetrahedra, likewise */
-    POLL_LEFT = 1 << 11,      /* tetrahedra between two trims */
-    REGIONS_MAX = 1 << 12
+    EXPECTED = 7,         /* tetrahedra a point */
+    REGION_BYTES = 64,    /* of an arena a point of a region */
+    SEAM_LEAST = 1 << 13, /* points of a seam that are worth two threads */
+    SEAM_WHOLE = 60000,   /* of which a triangulation has room for all */
+    SIFT_LEAST = 1 << 15, /* tetrahedra, likewise */
+    POLL_LEFT = 1 << 11,  /* tetrahedra between two trims */
+    REGIONS_MAX = 1 << 12,
+    KEPT_LEAST = 1 << 18 /* points of a seam's region that is kept: half a
+                            second of work */
 };
 
 /* The most bytes of an arena that is of use. */
@@ -96,176 +42,6 @@ uint32_t host_direct_regions(unsigned threads, uint64_t points) {
     return regions;
 }
 
-static void fail(struct direct *run, enum host_direct outcome,
-                 const char *why) {
-    int before = HOST_DIRECT_DONE;
-    if (atomic_compare_exchange_strong(&run->outcome, &before, outcome))
-        atomic_store(&run->why, why);
-}
-
-/* --- what a triangulator asks for ----------------------------------------- */
-
-static bool request(void *context, uint32_t page) {
-    struct worker *w = context;
-    if (w->page_count == PAGES_QUEUE)
-        return false;
-    w->pages[w->page_count++] = page;
-    return true;
-}
-
-static size_t emit_room(void *context) {
-    (void)context;
-    return EMITTED_ROOM;
-}
-
-static void emit(void *context, uint32_t vertex, const uint32_t (*apexes)[3],
-                 size_t count) {
-    struct worker *w = context;
-    uint32_t(*v)[4] = host_tetrahedra_room(w->tets, count, &w->error);
-    if (v == NULL) {
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-        return;
-    }
-    uint8_t *mark = w->run->mark;
-    for (size_t i = 0; i < count; i++) {
-        v[i][0] = vertex;
-        memcpy(v[i] + 1, apexes[i], sizeof apexes[i]);
-        for (int k = 0; k < 4 && mark != NULL; k++)
-            mark[v[i][k]] |= AT_FINAL;
-    }
-    host_tetrahedra_keep(w->tets, count);
-    host_call_trim(count * sizeof *v);
-}
-
-static void leave(void *context, const uint32_t v[4]) {
-    struct worker *w = context;
-    bool finite = true;
-    for (int k = 0; k < 4; k++) {
-        finite = finite && v[k] != INCODE_NONE;
-        if (v[k] != INCODE_NONE)
-            w->run->mark[v[k]] |= AT_SEAM;
-    }
-    if (!finite)
-        return;
-    uint32_t(*left)[4] = host_tetrahedra_room(w->left, 1, &w->error);
-    if (left == NULL) {
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-        return;
-    }
-    memcpy(left[0], v, sizeof left[0]);
-    host_call_trim(sizeof left[0]);
-    host_tetrahedra_keep(w->left, 1);
-}
-
-static void commit(void *context, uint32_t brick) {
-    struct worker *w = context;
-    struct host_direct_sums *sums = w->run->common->sums;
-    (void)brick;
-    /* As where coordinates are too small for the bounds of spheres. */
-    uint64_t final = w->tets->count - w->tets_before;
-    uint64_t left = w->left->count - w->left_before;
-    w->is_hopeless = left > HOPELESS_LEAST && left / HOPELESS > final;
-    if (!w->run->is_first)
-        return;
-    if (w->call != NULL)
-        atomic_fetch_add_explicit(&w->call->bricks, 1, memory_order_relaxed);
-    if (sums != NULL) {
-        uint32_t done = 1 + atomic_fetch_add_explicit(&sums->bricks, 1,
-                                                      memory_order_relaxed);
-        if (w->is_caller && sums->committed != NULL)
-            sums->committed(done);
-    }
-}
-
-static bool spill(void *context, const struct incode_face *faces,
-                  size_t count) {
-    struct worker *w = context;
-    if (host_spill_put(&w->spill, 0, faces, (uint32_t)count, &w->error) != 0)
-        fail(w->run, HOST_DIRECT_MEMORY, NULL);
-    return true;
-}
-
-static bool unspill(void *context, uint32_t brick) {
-    struct worker *w = context;
-    w->wanted = brick;
-    return true;
-}
-
-/* --- what it gets --------------------------------------------------------- */
-
-static bool deliver_faces(struct worker *w) {
-    uint32_t brick = w->wanted, count;
-    struct host_spill_list list = host_spill_detach(&w->spill, 0, brick);
-    struct incode_face faces[SPILL_TAKEN];
-    w->wanted = INCODE_NONE;
-    do {
-        if (host_spill_take(&w->spill, &list, faces, SPILL_TAKEN, &count,
-                            &w->error) != 0 ||
-            incode_triangulator_unspill(w->t, brick, faces, count,
-                                        list.faces == 0) != 0)
-            return false;
-    } while (list.faces > 0);
-    return true;
-}
-
-static bool deliver_pages(struct worker *w) {
-    uint8_t page[INCODE_PAGE_BYTES];
-    for (uint32_t i = 0; i < w->page_count; i++) {
-        size_t bytes = host_page(w->run->order, w->pages[i], page);
-        host_call_trim(AROUND);
-        if (incode_triangulator_page(w->t, w->pages[i], page, bytes) != 0)
-            return false;
-    }
-    w->page_count = 0;
-    return true;
-}
-
-static bool deliver(struct worker *w) {
-    if (w->page_count == 0 && w->wanted == INCODE_NONE)
-        return false;
-    return (w->wanted == INCODE_NONE || deliver_faces(w)) && deliver_pages(w);
-}
-
-/* A region that cannot be triangulated alone: all of it is seam. */
-static void give_up_region(struct worker *w, const struct host_region *r) {
-    const struct host_order *order = w->run->order;
-    host_tetrahedra_cut(w->tets, w->tets_before);
-    host_tetrahedra_cut(w->left, w->left_before);
-    (void)deliver(w); /* what the triangulator will not ask for again */
-    for (uint32_t brick = r->first; brick < r->last; brick++)
-        memset(w->run->mark + (size_t)brick * INCODE_BRICK_POINTS, AT_SEAM,
-               order->fill[brick]);
-}
-
-static void do_region(struct worker *w, uint32_t number) {
-    const struct host_region *r = &w->run->order->region[number];
-    w->tets_before = w->tets->count;
-    w->left_before = w->left->count;
-    w->is_hopeless = false;
-    struct incode_job job = {.first = r->first, .last = r->last};
-    memcpy(job.lo, r->lo, sizeof job.lo);
-    memcpy(job.hi, r->hi, sizeof job.hi);
-    if (r->first == r->last)
-        return;
-    incode_triangulator_start(w->t, &job);
-    while (atomic_load_explicit(&w->run->outcome, memory_order_relaxed) ==
-           HOST_DIRECT_DONE) {
-        enum incode_step step = incode_triangulator_step(w->t);
-        if (step == INCODE_FINISHED)
-            return;
-        if (step == INCODE_FULL || w->is_hopeless) {
-            give_up_region(w, r);
-            return;
-        }
-        if (step == INCODE_BROKEN)
-            fail(w->run, HOST_DIRECT_BROKEN, incode_triangulator_fault(w->t));
-        else if (step == INCODE_WAITING && !deliver(w))
-            fail(w->run, HOST_DIRECT_BROKEN, "it waits for nothing");
-        if (host_call_cancelled())
-            fail(w->run, HOST_DIRECT_CANCELLED, NULL);
-    }
-}
-
 /* --- threads -------------------------------------------------------------- */
 
 static double used_s(clockid_t clock) {
@@ -277,7 +53,7 @@ static double used_s(clockid_t clock) {
 /* An arena of as many bytes as there are, down to the least that works: false
  * if there are fewer. */
 static bool map_arena(const struct direct *run, unsigned part) {
-    struct common *c = run->common;
+    struct direct_call *c = run->common;
     size_t least = (incode_arena_min(&run->setup) + 63) / 64 * 64;
     size_t bytes = run->arena > least ? run->arena : least;
     if (c->arena[part] != NULL && c->bytes[part] >= least)
@@ -310,34 +86,26 @@ static void add_statistics(struct incode_statistics *to,
 
 static void work(void *context, unsigned part) {
     struct direct *run = context;
-    struct worker w = {.run = run,
-                       .call = host_call(),
-                       .is_caller = part + 1 == run->threads,
-                       .tets = &run->tets[part],
-                       .left = &run->left[part],
-                       .wanted = INCODE_NONE};
-    const struct incode_outside outside = {
-        .pages = {&w, request},
-        .front = {.context = &w,
-                  .emit_room = emit_room,
-                  .emit = emit,
-                  .left = run->mark != NULL ? leave : NULL,
-                  .commit = commit,
-                  .spill = spill,
-                  .unspill = unspill}};
+    struct direct_worker w = {.run = run,
+                              .call = host_call(),
+                              .is_caller = part + 1 == run->threads,
+                              .tets = &run->tets[part],
+                              .left = &run->left[part],
+                              .wanted = INCODE_NONE};
+    const struct incode_outside outside = direct_outside(&w);
     double cpu = used_s(CLOCK_THREAD_CPUTIME_ID);
     double wall = used_s(CLOCK_MONOTONIC);
     const char *why = NULL;
     /* As many spilled faces as memory has room for, and no file. */
     if (!map_arena(run, part) ||
         host_spill_init(&w.spill, UINT32_MAX, &w.error) != 0) {
-        fail(run, HOST_DIRECT_MEMORY, NULL);
+        direct_fail(run, HOST_DIRECT_MEMORY, NULL);
     } else {
         w.t = incode_triangulator_init(run->common->arena[part],
                                        run->common->bytes[part], &run->setup,
                                        &outside, &why);
         if (w.t == NULL)
-            fail(run, HOST_DIRECT_BROKEN, why);
+            direct_fail(run, HOST_DIRECT_BROKEN, why);
     }
     /* Room for as many as there will be, about, which costs nothing before it
      * is touched. */
@@ -348,7 +116,7 @@ static void work(void *context, unsigned part) {
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
            (region = atomic_fetch_add(&run->regions, 1)) < run->order->regions)
-        do_region(&w, region);
+        direct_region(&w, region);
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
         add_statistics(&p->statistics, w.t);
@@ -538,20 +306,31 @@ static uint32_t seam_regions(uint64_t points, uint64_t all) {
     return host_direct_regions(regions, points);
 }
 
-static enum host_direct run_order(struct common *common,
-                                  const struct host_order *order, bool is_first,
-                                  bool alone, struct host_tetrahedra *tets);
+/* Those of an earlier run, if it has kept some. */
+static uint32_t seam_regions_kept(const struct direct *run, uint64_t points) {
+    const struct host_direct_store *store = run->common->store;
+    uint32_t kept =
+        store == NULL ? 0 : store->regions(store->context, run->level + 1);
+    return kept != 0 ? kept : seam_regions(points, run->order->points);
+}
+
+/* key: of the order's points. */
+static enum host_direct run_order(struct direct_call *common,
+                                  const struct host_order *order,
+                                  unsigned level, uint64_t key, bool alone,
+                                  struct host_tetrahedra *tets);
 
 static enum host_direct triangulate_seam(struct seam *s) {
-    struct common *common = s->run->common;
+    struct direct_call *common = s->run->common;
     struct host_order order;
     enum host_direct outcome = HOST_DIRECT_MEMORY;
     uint64_t all = s->run->order->points;
     if (host_order_make(&order, "points", s->xyz[0], s->points, HOST_ADAPTIVE,
-                        seam_regions(s->points, all), false,
+                        seam_regions_kept(s->run, s->points), false,
                         common->error) == 0)
-        outcome =
-            run_order(common, &order, false, s->points <= all / 2, &s->tets);
+        outcome = run_order(common, &order, s->run->level + 1,
+                            host_key(s->id, s->points, s->run->key),
+                            s->points <= all / 2, &s->tets);
     else if (host_call_cancelled())
         outcome = HOST_DIRECT_CANCELLED;
     else if (order.fault != HOST_ORDER_SOUND) {
@@ -600,12 +379,13 @@ static enum host_direct tell(const struct direct *run) {
     return outcome;
 }
 
-static enum host_direct run_order(struct common *common,
-                                  const struct host_order *order, bool is_first,
-                                  bool alone, struct host_tetrahedra *tets) {
+static enum host_direct run_order(struct direct_call *common,
+                                  const struct host_order *order,
+                                  unsigned level, uint64_t key, bool alone,
+                                  struct host_tetrahedra *tets) {
     struct host_tetrahedra list[HOST_THREADS_MAX] = {{0}};
     struct host_tetrahedra left[HOST_THREADS_MAX] = {{0}};
-    struct host_direct_sums *sums = is_first ? common->sums : NULL;
+    struct host_direct_sums *sums = level == 0 ? common->sums : NULL;
     unsigned threads = host_threads();
     threads = threads < order->regions ? threads : order->regions;
     size_t marks = (size_t)order->bricks * INCODE_BRICK_POINTS;
@@ -614,7 +394,7 @@ static enum host_direct run_order(struct common *common,
         .order = order,
         .tets = list,
         .left = left,
-        .is_first = is_first,
+        .level = level,
         .threads = threads,
         .setup = {.bricks = order->bricks,
                   .index = INCODE_KD,
@@ -630,8 +410,12 @@ static enum host_direct run_order(struct common *common,
         run.setup.build = INCODE_BUILD_POINTS;
         run.mark = host_map(marks);
         if (run.mark == NULL)
-            fail(&run, HOST_DIRECT_MEMORY, NULL);
+            direct_fail(&run, HOST_DIRECT_MEMORY, NULL);
     }
+    if (level == 0 || order->points / order->regions >= KEPT_LEAST)
+        run.store = common->store;
+    if (common->store != NULL)
+        run.key = host_order_key(order, key);
     if (sums != NULL)
         sums->threads = threads;
     host_fork_all(threads, work, &run);
@@ -661,8 +445,10 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error) {
-    struct common common = {.sums = sums, .error = error};
-    enum host_direct outcome = run_order(&common, order, true, true, tets);
+    struct direct_call common = {.sums = sums,
+                                 .store = sums == NULL ? NULL : sums->store,
+                                 .error = error};
+    enum host_direct outcome = run_order(&common, order, 0, 0, true, tets);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;

@@ -18,7 +18,8 @@ enum host_direct {
     HOST_DIRECT_DONE,
     HOST_DIRECT_CANCELLED,
     HOST_DIRECT_MEMORY,
-    HOST_DIRECT_BROKEN /* an invariant failed */
+    HOST_DIRECT_UNKEPT, /* by struct host_direct_store */
+    HOST_DIRECT_BROKEN  /* an invariant failed */
 };
 
 /* What one thread has done. */
@@ -29,7 +30,36 @@ struct host_direct_part {
     size_t arena; /* bytes */
 };
 
+/* A region that was triangulated alone. */
+struct host_direct_region {
+    uint64_t key; /* of its order (order.h) */
+    unsigned
+        level; /* 0: of the points; 1: of their seam; 2: of the seam's ... */
+    uint32_t number, regions;
+    /* Lists to which its tetrahedra of vertex numbers are appended, and the
+     * rows of other regions in them: those that are final, and the rest. */
+    struct host_tetrahedra *tets, *left;
+    uint64_t tets_before, left_before;
+    uint8_t *mark; /* [marks] of its vertices, or 0 */
+    uint64_t marks;
+};
+
+/* Keeps regions, so that another run of the same points has them.  Called from
+ * any thread. */
+struct host_direct_store {
+    /* Into how many regions an earlier run has cut that level; 0: unknown. */
+    uint32_t (*regions)(void *context, unsigned level);
+    /* Appends what an earlier run has kept; false: it has not, and the lists
+     * are as before. */
+    bool (*load)(void *context, struct host_direct_region *region);
+    /* 0, or error->code: the run ends. */
+    int (*keep)(void *context, const struct host_direct_region *region,
+                struct host_error *error);
+    void *context;
+};
+
 struct host_direct_sums {
+    const struct host_direct_store *store; /* or NULL */
     /* NULL, or called on the calling thread with the number of bricks that are
      * done. */
     void (*committed)(uint32_t bricks);

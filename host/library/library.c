@@ -248,6 +248,7 @@ static enum incode_status triangulate(struct work *w) {
     case HOST_DIRECT_MEMORY:
         return INCODE_NO_MEMORY;
     case HOST_DIRECT_BROKEN:
+    case HOST_DIRECT_UNKEPT: /* there is no store */
         return INCODE_INTERNAL;
     }
     w->call.host.phases = 2;

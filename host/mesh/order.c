@@ -474,6 +474,26 @@ int host_order_make(struct host_order *order, const char *where,
     return error->code;
 }
 
+uint64_t host_key(const uint32_t *word, uint64_t count, uint64_t before) {
+    enum { POLL = 1 << 14 };
+    uint64_t h = before ^ count;
+    for (uint64_t i = 0; i < count; i++) {
+        h = (h ^ word[i]) * UINT64_C(0x9e3779b97f4a7c15);
+        h ^= h >> 29;
+        if (i % POLL == 0)
+            host_call_trim(POLL * sizeof *word);
+    }
+    return h;
+}
+
+uint64_t host_order_key(const struct host_order *order, uint64_t before) {
+    uint64_t key = host_key(
+        order->row, (uint64_t)order->bricks * INCODE_BRICK_POINTS, before);
+    for (uint32_t r = 0; r < order->regions; r++)
+        key = host_key(&order->region[r].last, 1, key);
+    return key;
+}
+
 void host_order_join(struct host_order *order) {
     struct host_region *all = &order->region[0];
     *all = (struct host_region){.last = order->bricks, .points = order->points};

@@ -69,6 +69,20 @@ int host_order_make(struct host_order *order, const char *where,
                     enum host_partition partition, uint32_t regions, bool grid,
                     struct host_error *error);
 
+/* A number by which two orders of the same input differ, if they do; `before`:
+ * that of what the input was made from, or 0.  host_key: the same of words. */
+uint64_t host_order_key(const struct host_order *order, uint64_t before);
+uint64_t host_key(const uint32_t *word, uint64_t count, uint64_t before);
+
+/* Appends the order to a journal (host/base/journal.h).  Takes it from one that
+ * has it alone, with that key; false: it is not there, or damaged. */
+struct host_journal;
+int host_order_append(const struct host_order *order,
+                      struct host_journal *journal, uint64_t key,
+                      struct host_error *error);
+bool host_order_take(struct host_order *order,
+                     const struct host_journal *journal, uint64_t key);
+
 /* Makes one region of all. */
 void host_order_join(struct host_order *order);
 

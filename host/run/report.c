@@ -321,6 +321,8 @@ static json_t *run_object(const struct host_run_result *r) {
     put(o, "host_peak_bytes", r->host_peak_bytes);
     put(o, "host_memory_bytes", r->host_memory);
     put(o, "scratch_bytes", r->scratch_bytes);
+    put(o, "bricks", r->bricks);
+    put(o, "resumed_bricks", r->resumed_bricks);
     put(o, "pages", r->pages);
     put_real(o, "tetrahedra_per_second",
              r->time_triangulation_s > 0.0

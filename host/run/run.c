@@ -19,6 +19,7 @@
 #include "node/node.h"
 #include "choose.h"
 #include "report.h"
+#include "state.h"
 #include "host/library/delaunay.h"
 #include "host/verify/check.h"
 
@@ -164,11 +165,10 @@ static int order_points(const struct host_run_options *options,
     unsigned regions = options->strategy == NULL
                            ? result->nodes
                            : result->strategy->regions(result->nodes);
-    memset(order, 0, sizeof *order);
     host_progress_phase("ordering", NULL);
-    int status = host_order_make(
-        order, options->input == NULL ? "points" : options->input, points->xyz,
-        points->count,
+    int status = host_state_order(
+        options->state, order,
+        options->input == NULL ? "points" : options->input, points,
         host_strategy_partition(result->strategy, options->partition), regions,
         options->index == INCODE_GRID, error);
     if (status == 0) {
@@ -177,10 +177,13 @@ static int order_points(const struct host_run_options *options,
         result->duplicates = order->duplicates;
         result->negative_zeros = order->negative_zeros;
         result->pages = order->tree.pages;
+        result->bricks = order->bricks;
         (void)host_choose_ordered(options, order, result);
         status = host_memory_check(options, result->strategy, result->nodes,
                                    order->bricks, order->cells, error);
     }
+    if (status == 0)
+        status = host_state_start(options->state, order, result, error);
     result->time_order_s = seconds_since(stretch.start_us);
     end_stretch(&stretch, result);
     return status;
@@ -230,6 +233,7 @@ static int on_nodes(const struct host_run_options *options,
     service.memory_of = options->cube;
     service.patience_us = options->patience_s * UINT64_C(1000000);
     service.verifying = options->verifying;
+    service.kept = host_state_kept(options->state);
     service.foreign = options->begin != NULL; /* a cube file, or ranks */
     int status = host_service_start(&service, error);
     result->time_start_up_s += seconds_since(start);
@@ -327,6 +331,7 @@ int host_triangulate(const struct host_run_options *options,
     int status = order_points(options, points, &order, result, error);
     if (status == 0)
         status = start_nodes(options, &order, tets, result, error);
+    status = host_state_order_kept(options->state, error);
     host_order_free(&order);
     return status;
 }
@@ -516,9 +521,23 @@ static int look_at_points(const struct host_run_options *options,
  * and the points in order. */
 enum { ASIDE_BYTES = 320 };
 
+/* The run itself, with the state of --resume. */
+static int run_kept(struct host_run_options *options,
+                    const struct host_points *points,
+                    struct host_run_result *result,
+                    struct host_run_result *alone, struct host_error *error) {
+    if (options->resume != NULL &&
+        host_state_begin(options, points, error) != 0)
+        return error->code;
+    int status = run_on(options, points, result, alone, error);
+    host_state_report(options->state, result);
+    return status;
+}
+
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
+    struct host_run_options kept = *options; /* what is open in them, too */
     struct host_points points = {0};
     uint64_t start = host_now_us();
     memset(result, 0, sizeof *result);
@@ -541,10 +560,14 @@ int host_run(const struct host_run_options *options,
     if (status == 0)
         status = look_at_points(options, &points, error);
     if (status == 0)
-        status = host_limits_check(points.count * ASIDE_BYTES, !options->quiet,
-                                   error);
+        status = host_limits_check(
+            points.count *
+                (uint64_t)(ASIDE_BYTES + (options->resume != NULL
+                                              ? HOST_STATE_POINT_BYTES
+                                              : 0)),
+            !options->quiet, error);
     if (status == 0)
-        status = run_on(options, &points, result, &alone, error);
+        status = run_kept(&kept, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
     result->scratch_bytes = host_limits_leave();
@@ -554,7 +577,9 @@ int host_run(const struct host_run_options *options,
         status = host_stats_write(options->stats, result, error);
     if (status == 0 && !options->quiet)
         report(options, result, options->table ? &alone : NULL, error);
-    return host_output_commit(error);
+    status = host_output_commit(error);
+    host_state_end(kept.state, status == 0);
+    return status;
 }
 
 /* The library's way: threads of this process instead of nodes. */
@@ -635,9 +660,11 @@ static int triangulate(const struct host_run_options *options,
     static struct host_direct_sums sums;
     uint64_t start = host_now_us();
     host_progress_phase("ordering", NULL);
-    int status = host_order_make(
-        order, options->input, points->xyz, points->count, HOST_ADAPTIVE,
-        host_direct_regions(host_threads(), points->count), false, error);
+    int status = host_state_order(
+        options->state, order, options->input, points, HOST_ADAPTIVE,
+        host_state_regions(options->state, points->count), false, error);
+    if (status == 0)
+        status = host_state_start(options->state, order, r, error);
     r->time_order_s = 1e-6 * (double)(host_now_us() - start);
     if (status != 0)
         return status;
@@ -646,11 +673,12 @@ static int triangulate(const struct host_run_options *options,
     r->duplicates = order->duplicates;
     r->negative_zeros = order->negative_zeros;
     r->pages = order->tree.pages;
-    bricks = order->bricks;
+    r->bricks = bricks = order->bricks;
     host_progress_phase("triangulating", NULL);
     memset(&sums, 0, sizeof sums);
     sums.committed = show_progress;
     sums.by_vertex = is_checked_in_order(options);
+    sums.store = host_state_store(options->state);
     if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
         return error->code;
     take_sums(&sums, r);
@@ -678,6 +706,7 @@ static int host_triangulate_direct(const struct host_run_options *options,
     (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     double before_s = (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
     int status = triangulate(options, points, tets, &order, result, error);
+    status = host_state_order_kept(options->state, error);
     host_order_free(&order);
     result->time_triangulation_s =
         1e-6 * (double)(host_now_us() - start) - result->time_verify_s;

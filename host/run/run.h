@@ -44,9 +44,11 @@ struct host_run_options {
     uint64_t wire_bytes_s;
     struct host_limits limits; /* of the host's memory */
     uint64_t memory;
-    uint64_t patience_s; /* for a node that does not answer */
-    const char *cube;    /* a file that describes real nodes, or NULL */
-    const char *stats;   /* a file for the statistics, or NULL */
+    uint64_t patience_s;      /* for a node that does not answer */
+    const char *cube;         /* a file that describes real nodes, or NULL */
+    const char *stats;        /* a file for the statistics, or NULL */
+    const char *resume;       /* a folder for the run's state, or NULL */
+    struct host_state *state; /* what is in it (state.h); NULL: none */
     enum host_verifying verifying;
     bool quiet, table, map;
     bool explain;            /* print why `auto` chose the strategy */
@@ -84,9 +86,10 @@ struct host_run_result {
      * is the clock's of. */
     double host_cpu_s, host_triangulation_cpu_s;
     uint64_t host_peak_bytes;
-    uint64_t host_memory;   /* what the host may use */
-    uint64_t scratch_bytes; /* put aside, at most at a time */
-    uint64_t pages;         /* that there are to be asked for */
+    uint64_t host_memory;            /* what the host may use */
+    uint64_t scratch_bytes;          /* put aside, at most at a time */
+    uint32_t bricks, resumed_bricks; /* of the order; done by an earlier run */
+    uint64_t pages;                  /* that there are to be asked for */
     uint64_t make_tetra_calls, built, exact_orient3d, exact_in_sphere;
     uint64_t retransmitted, faces_spilled;
     uint64_t bytes_sent, bytes_received; /* on the host's wire */

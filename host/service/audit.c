@@ -311,7 +311,7 @@ static void analyse(struct host_service *s, struct host_audit *a) {
     struct missing *missing = malloc(sizeof *missing);
     a->bricks = s->ledger.bricks;
     a->redo = host_map(a->bricks);
-    a->guilty = calloc(s->machine->nodes, 1);
+    a->guilty = calloc(s->machine->nodes + 1u, 1); /* host_kept_by */
     if (a->redo == NULL || a->guilty == NULL || missing == NULL) {
         host_fail_memory(&a->error, "the search for the faulty node");
     } else if (host_judge_make(&q.judge, &sites, &a->error) == 0) {
@@ -429,6 +429,10 @@ static int begin_again(struct host_service *s, struct host_error *error) {
             host_audit_exclude(s, i, what);
         }
     }
+    if (a->guilty[s->machine->nodes] != 0) {
+        host_notice_line(s, "the check of the result failed at work of an "
+                            "earlier run; that work is done again");
+    }
     if (a->why[0] == '\0') {
         char line[HOST_AUDIT_WHY_BYTES];
         snprintf(line, sizeof line,
@@ -443,8 +447,11 @@ static int begin_again(struct host_service *s, struct host_error *error) {
     host_progress_phase("triangulating", "Mtet");
     for (uint32_t b = 0; b < s->ledger.bricks; b++) {
         host_call_trim(BRICK_TOUCHES);
-        if (a->redo[b] != 0)
-            host_ledger_reopen(&s->ledger, b);
+        if (a->redo[b] == 0)
+            continue;
+        host_ledger_reopen(&s->ledger, b);
+        if (host_kept_brick(s->kept, &s->ledger, b, error) != 0)
+            return error->code;
     }
     host_audit_alone(s);
     a->lost_work = true;

@@ -419,7 +419,10 @@ int host_generation_begin(struct host_service *service, uint64_t now_us,
     s->late = false;
     if (s->started) {
         s->audit.lost_work = true;
+        if (host_kept_lose(s->kept, s->tets, error) != 0)
+            return error->code;
         s->strategy->lose(&s->work);
+        host_kept_lost(s->kept, &s->ledger, s->tets);
         host_spill_clear(&s->spill);
         host_sending_begin(s);
     }

@@ -101,6 +101,14 @@ int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
     return 0;
 }
 
+void host_ledger_restore(struct host_ledger *ledger, uint32_t brick,
+                         uint32_t by) {
+    assert(brick < ledger->bricks && !host_ledger_committed(ledger, brick));
+    ledger->open[brick] = 0;
+    ledger->by[brick] = (uint16_t)(by | HOST_LEDGER_ALONE);
+    ledger->committed++;
+}
+
 int host_ledger_finish(struct host_ledger *ledger, uint32_t node) {
     struct host_job *job = &ledger->job[node];
     if (job->epoch == 0 || job->committed != job->last - job->first)

@@ -93,6 +93,10 @@ bool host_ledger_current(const struct host_ledger *ledger, uint32_t node,
 /* 0, or -1 where the brick is not the node's or is committed already. */
 int host_ledger_commit(struct host_ledger *ledger, uint32_t node,
                        uint32_t brick);
+/* A brick that is not committed was so in an earlier run of the host; by: a
+ * number that stands for all its nodes. */
+void host_ledger_restore(struct host_ledger *ledger, uint32_t brick,
+                         uint32_t by);
 static inline bool host_ledger_committed(const struct host_ledger *ledger,
                                          uint32_t brick) {
     return ledger->open[brick] == 0;

@@ -305,6 +305,8 @@ int host_results_take(struct host_service *service,
         if (host_ledger_found(&s->ledger, finder, count, error) != 0)
             return error->code;
         host_tetrahedra_keep(s->tets, count);
+        host_kept_rows(s->kept, &s->ledger, s->order,
+                       (const uint32_t(*)[4])rows, count);
         job->rows += count;
         s->node[message->source].unreported += count;
         if (event == NODE_RESULT_COMMIT &&
@@ -313,6 +315,9 @@ int host_results_take(struct host_service *service,
                      reader.brick);
             return host_results_refuse(s, message->source, why, error);
         }
+        if (event == NODE_RESULT_COMMIT &&
+            host_kept_brick(s->kept, &s->ledger, reader.brick, error) != 0)
+            return error->code;
     } while (event != NODE_RESULT_END);
     return job->rows <= job->rows_max
                ? 0

@@ -59,7 +59,8 @@ int host_service_round(struct host_service *service, struct host_error *error) {
     if (cube_wiring(s->cube)->generation != s->generation &&
         host_generation_begin(s, now, error) != 0)
         return error->code;
-    if (read_all(s, &moved, error) != 0)
+    if (read_all(s, &moved, error) != 0 ||
+        host_kept_write(s->kept, s->tets, now, error) != 0)
         return error->code;
     bool pages = s->started && host_sending_pages_wait(s);
     uint64_t begun = pages ? now_of(s) : 0;
@@ -180,6 +181,13 @@ int host_service_run(struct host_service *service, struct host_error *error) {
         prepare_work(s, error) != 0)
         return error->code;
     prepare(s);
+    if (host_kept_load(s->kept, &s->ledger, s->order, s->tets, error) != 0)
+        return error->code;
+    if (s->ledger.committed > 0) { /* in an earlier run: as after a loss */
+        s->audit.lost_work = true;
+        s->strategy->lose(&s->work);
+    }
+    host_kept_lost(s->kept, &s->ledger, s->tets);
     host_sending_begin(s);
     while (!s->over && !(s->reporting && all_reported(s))) {
         if (host_service_round(s, error) != 0)
@@ -244,6 +252,7 @@ void host_service_end(struct host_service *service) {
     s->machine->stop(s->machine->context);
     host_audit_free(&s->audit);
     host_ledger_free(&s->ledger);
+    host_kept_free(s->kept);
     host_spill_free(&s->spill);
     free(s->node);
     free(s->report);

@@ -18,6 +18,7 @@
 #include "audit.h"
 #include "host/service/strategies/strategy.h"
 #include "in_use.h"
+#include "kept.h"
 #include "ledger.h"
 #include "machine.h"
 #include "node/message.h"
@@ -115,6 +116,8 @@ struct host_service {
     unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
+    struct host_kept
+        *kept;    /* what goes to a journal, and comes from it; NULL */
     bool foreign; /* the nodes are of a cube file, or ranks */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
