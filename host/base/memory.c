@@ -60,12 +60,12 @@ static struct host_scratch *aside(void) {
     return call == NULL ? NULL : call->scratch;
 }
 
-static void *map(size_t bytes) {
+static void *map(size_t bytes, bool resident) {
     struct host_scratch *scratch = aside();
     void *array = reserve(bytes);
     if (array == NULL)
         return NULL;
-    if (scratch == NULL || bytes < scratch->array_min) {
+    if (scratch == NULL || resident || bytes < scratch->array_min) {
         (void)madvise(array, space_of(bytes), MADV_HUGEPAGE);
     } else if (!host_scratch_map(scratch, array, bytes)) {
         (void)munmap(array, space_of(bytes));
@@ -74,21 +74,39 @@ static void *map(size_t bytes) {
     return array;
 }
 
-void *host_map(size_t bytes) {
+static void *map_charged(size_t bytes, bool resident) {
     bytes = bytes == 0 ? 1 : bytes;
     if (!charge(bytes))
         return NULL;
-    void *array = map(bytes);
+    void *array = map(bytes, resident);
     if (array == NULL)
         refund(bytes);
     return array;
+}
+
+void *host_map(size_t bytes) {
+    return map_charged(bytes, false);
+}
+
+void *host_map_resident(size_t bytes) {
+    return map_charged(bytes, true);
+}
+
+void host_fetch(void *to, const void *from, size_t bytes) {
+    if (aside() == NULL || !host_scratch_read(aside(), to, from, bytes))
+        memcpy(to, from, bytes);
+}
+
+void host_store(void *to, const void *from, size_t bytes) {
+    if (aside() == NULL || !host_scratch_write(aside(), to, from, bytes))
+        memcpy(to, from, bytes);
 }
 
 /* The same of an array that is put aside, or will be. */
 static void *move_aside(struct host_scratch *scratch, void *old, size_t from,
                         size_t bytes) {
     bool has = host_scratch_has(scratch, old);
-    void *space = has ? reserve(bytes) : map(bytes);
+    void *space = has ? reserve(bytes) : map(bytes, false);
     if (space == NULL)
         return NULL;
     if (!has) {

@@ -283,7 +283,7 @@ static bool map_arena(const struct direct *run, unsigned part) {
     if (c->arena[part] != NULL && c->bytes[part] >= least)
         return true;
     host_unmap(c->arena[part], c->bytes[part]);
-    while ((c->arena[part] = host_map(bytes)) == NULL && bytes > least)
+    while ((c->arena[part] = host_map_resident(bytes)) == NULL && bytes > least)
         bytes = bytes / 2 > least ? bytes / 2 / 64 * 64 : least;
     c->bytes[part] = bytes;
     return c->arena[part] != NULL;
