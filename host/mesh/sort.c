@@ -260,6 +260,7 @@ static void sort_rows(void *argument) {
 
 struct canon {
     struct host_tetrahedra *tets;
+    bool as_is;
     unsigned parts;
     bool disordered[HOST_THREADS_MAX];
 };
@@ -273,7 +274,8 @@ static void canonical_part(void *context, unsigned part) {
         uint64_t end = last - i > POLL_ROWS ? i + POLL_ROWS : last;
         host_call_trim((size_t)(end - i) * sizeof *c->tets->v);
         for (; i < end; i++) {
-            canonical(c->tets->v[i]);
+            if (!c->as_is)
+                canonical(c->tets->v[i]);
             disordered = disordered ||
                          (i > first && less(c->tets->v[i], c->tets->v[i - 1]));
         }
@@ -299,6 +301,7 @@ struct count {
 
 struct spread {
     struct host_tetrahedra *tets;
+    bool as_is; /* rows of other things */
     row_t *to;
     unsigned threads;
     size_t room;         /* rows that a thread has in memory */
@@ -323,12 +326,12 @@ static uint64_t part_first(const struct spread *s, unsigned part) {
                               : s->tets->count / s->threads * part;
 }
 
-/* The next rows of [i, last) in their canonical form. */
+/* The next rows of [i, last), of tetrahedra in their canonical form. */
 static size_t fetch_rows(const struct spread *s, row_t *to, uint64_t i,
                          uint64_t last) {
     size_t n = last - i > BLOCK_ROWS ? BLOCK_ROWS : (size_t)(last - i);
     host_fetch(to, s->tets->v[i], n * sizeof *to);
-    for (size_t k = 0; k < n; k++)
+    for (size_t k = 0; k < n && !s->as_is; k++)
         canonical(to[k]);
     return n;
 }
@@ -462,7 +465,7 @@ static bool sort_by(struct spread *s) {
 
 /* False: they stand in their order, or there is no room; nothing has changed.
  */
-static bool sort_aside(struct host_tetrahedra *tets) {
+static bool sort_aside(struct host_tetrahedra *tets, bool as_is) {
     unsigned threads = host_threads();
     size_t counts = threads * sizeof(struct count);
     struct spread *s = host_map_resident(sizeof *s);
@@ -470,6 +473,7 @@ static bool sort_aside(struct host_tetrahedra *tets) {
     bool done = false;
     if (s != NULL && count != NULL) {
         s->tets = tets;
+        s->as_is = as_is;
         s->threads = threads;
         s->count = count;
         s->room = host_call_share() / sizeof(row_t);
@@ -482,9 +486,10 @@ static bool sort_aside(struct host_tetrahedra *tets) {
     return done;
 }
 
-void host_tetrahedra_sort(struct host_tetrahedra *tets) {
-    struct canon c = {tets, host_threads(), {false}};
-    if (tets->count > host_call_share() / sizeof *tets->v && sort_aside(tets))
+static void sort_all(struct host_tetrahedra *tets, bool as_is) {
+    struct canon c = {tets, as_is, host_threads(), {false}};
+    if (tets->count > host_call_share() / sizeof *tets->v &&
+        sort_aside(tets, as_is))
         return;
     host_fork_all(c.parts, canonical_part, &c);
     bool disordered = false;
@@ -498,4 +503,12 @@ void host_tetrahedra_sort(struct host_tetrahedra *tets) {
         struct sort s = {tets->v, (size_t)tets->count, c.parts};
         sort_rows(&s);
     }
+}
+
+void host_tetrahedra_sort(struct host_tetrahedra *tets) {
+    sort_all(tets, false);
+}
+
+void host_rows_sort(struct host_tetrahedra *rows) {
+    sort_all(rows, true);
 }
