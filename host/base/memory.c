@@ -67,13 +67,13 @@ static bool goes_aside(const struct host_scratch *scratch, size_t bytes) {
            atomic_load(&host_call()->memory) > scratch->memory_first;
 }
 
-static void *map(size_t bytes) {
+static void *map(size_t bytes, bool resident) {
     struct host_scratch *scratch = aside();
     void *array = reserve(bytes);
     if (array == NULL)
         return NULL;
-    bool large = scratch == NULL || bytes >= scratch->array_min;
-    if (!goes_aside(scratch, bytes)) {
+    bool large = scratch == NULL || resident || bytes >= scratch->array_min;
+    if (resident || !goes_aside(scratch, bytes)) {
         (void)madvise(array, space_of(bytes),
                       large ? MADV_HUGEPAGE : MADV_NOHUGEPAGE);
     } else if (!host_scratch_map(scratch, array, bytes)) {
@@ -83,14 +83,32 @@ static void *map(size_t bytes) {
     return array;
 }
 
-void *host_map(size_t bytes) {
+static void *map_charged(size_t bytes, bool resident) {
     bytes = bytes == 0 ? 1 : bytes;
     if (!charge(bytes))
         return NULL;
-    void *array = map(bytes);
+    void *array = map(bytes, resident);
     if (array == NULL)
         refund(bytes);
     return array;
+}
+
+void *host_map(size_t bytes) {
+    return map_charged(bytes, false);
+}
+
+void *host_map_resident(size_t bytes) {
+    return map_charged(bytes, true);
+}
+
+void host_fetch(void *to, const void *from, size_t bytes) {
+    if (aside() == NULL || !host_scratch_read(aside(), to, from, bytes))
+        memcpy(to, from, bytes);
+}
+
+void host_store(void *to, const void *from, size_t bytes) {
+    if (aside() == NULL || !host_scratch_write(aside(), to, from, bytes))
+        memcpy(to, from, bytes);
 }
 
 /* Copies what was in memory to where it is put aside, and gives it back on the
@@ -109,7 +127,7 @@ static void copy_aside(char *to, char *from, size_t bytes) {
 static void *move_aside(struct host_scratch *scratch, void *old,
                         size_t old_bytes, size_t bytes) {
     bool has = host_scratch_has(scratch, old);
-    void *space = has ? reserve(bytes) : map(bytes);
+    void *space = has ? reserve(bytes) : map(bytes, false);
     if (space == NULL)
         return NULL;
     if (!has) {

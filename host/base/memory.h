@@ -13,6 +13,15 @@
  * (parallel.h); 0 bytes are taken as 1. */
 void *host_map(size_t bytes);
 
+/* The same of an array that is never put aside: a thread's part of the limit
+ * (host_call_share) at most. */
+void *host_map_resident(size_t bytes);
+
+/* Copies a part of an array, or into one.  If the array is put aside, none of
+ * its pages becomes resident. */
+void host_fetch(void *to, const void *from, size_t bytes);
+void host_store(void *to, const void *from, size_t bytes);
+
 /* Like realloc: on NULL the old array still stands. */
 void *host_remap(void *old, size_t old_bytes, size_t bytes);
 

@@ -209,6 +209,53 @@ static struct host_scratch_array *find(struct host_scratch *s,
     return NULL;
 }
 
+/* The file of the array that `at` lies in, and where; -1: there is none. */
+static int file_at(struct host_scratch *s, const void *at, size_t bytes,
+                   off_t *where) {
+    int file = -1;
+    uintptr_t p = (uintptr_t)at;
+    (void)pthread_mutex_lock(&s->lock);
+    for (unsigned i = 0; i < s->arrays && file < 0; i++) {
+        uintptr_t first = (uintptr_t)s->array[i].at;
+        if (p < first || p - first > s->array[i].bytes ||
+            bytes > s->array[i].bytes - (p - first))
+            continue;
+        file = s->array[i].file;
+        *where = (off_t)(p - first);
+    }
+    (void)pthread_mutex_unlock(&s->lock);
+    return file;
+}
+
+bool host_scratch_read(struct host_scratch *scratch, void *to, const void *from,
+                       size_t bytes) {
+    off_t where = 0;
+    int file = file_at(scratch, from, bytes, &where);
+    char *byte = to;
+    for (size_t done = 0; file >= 0 && done < bytes;) {
+        ssize_t n = pread(file, byte + done, bytes - done, where + (off_t)done);
+        if (n == 0 || (n < 0 && errno != EINTR))
+            return false;
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return file >= 0;
+}
+
+bool host_scratch_write(struct host_scratch *scratch, void *to,
+                        const void *from, size_t bytes) {
+    off_t where = 0;
+    int file = file_at(scratch, to, bytes, &where);
+    const char *byte = from;
+    for (size_t done = 0; file >= 0 && done < bytes;) {
+        ssize_t n =
+            pwrite(file, byte + done, bytes - done, where + (off_t)done);
+        if (n < 0 && errno != EINTR)
+            return false;
+        done += n > 0 ? (size_t)n : 0;
+    }
+    return file >= 0;
+}
+
 bool host_scratch_has(struct host_scratch *scratch, const void *array) {
     (void)pthread_mutex_lock(&scratch->lock);
     bool has = find(scratch, array) != NULL;

@@ -84,6 +84,12 @@ void host_scratch_ended(struct host_scratch *scratch, size_t touched);
  * where the array comes to stand. */
 
 bool host_scratch_has(struct host_scratch *scratch, const void *array);
+/* Copies a part of an array through its file: its pages stay away.  False:
+ * there is no such array, or the disk failed. */
+bool host_scratch_read(struct host_scratch *scratch, void *to, const void *from,
+                       size_t bytes);
+bool host_scratch_write(struct host_scratch *scratch, void *to,
+                        const void *from, size_t bytes);
 bool host_scratch_map(struct host_scratch *scratch, void *space, size_t bytes);
 /* The array stands at `space`, too, from then on.  False: it is as it was. */
 bool host_scratch_move(struct host_scratch *scratch, const void *array,

@@ -4,6 +4,7 @@
 
 #include "format.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/mesh/adjacency.h"
 #include "rows.h"
 #include "scan.h"
@@ -68,12 +69,14 @@ static void write_node_beside(struct host_output *out,
 
 /* Neighbours opposite the corners, from the groups of lowest vertices.  The
  * one opposite a tetrahedron's own lowest vertex is of a later group, so a
- * first sweep over all groups notes it. */
+ * first sweep over all groups notes it: where tetrahedra are put aside, in a
+ * list that is sorted. */
 struct neighbours {
     struct host_adjacency adjacency;
     struct host_group group;
-    uint32_t *opposite_lowest;
-    uint32_t (*opposite)[4]; /* of the tetrahedra of the group at hand */
+    uint32_t *opposite_lowest;    /* [tetrahedra]; or NULL, and */
+    struct host_tetrahedra pairs; /* of each its number, that one, 0, 0 */
+    uint32_t (*opposite)[4];      /* of the tetrahedra of the group at hand */
     size_t capacity;
     uint64_t hull_facets;
 };
@@ -87,6 +90,25 @@ static uint32_t twin(const struct host_group *group, size_t i) {
     return UINT32_MAX;
 }
 
+static void note(struct neighbours *n, uint32_t tet, uint32_t other) {
+    if (n->opposite_lowest != NULL) {
+        n->opposite_lowest[tet] = other;
+        return;
+    }
+    uint32_t *pair = n->pairs.v[n->pairs.count];
+    pair[0] = tet;
+    pair[1] = other;
+    host_tetrahedra_keep(&n->pairs, 1);
+    host_call_trim(sizeof n->pairs.v[0]);
+}
+
+static uint32_t noted(const struct neighbours *n, uint32_t tet) {
+    if (n->opposite_lowest != NULL)
+        return n->opposite_lowest[tet];
+    host_call_trim(sizeof n->pairs.v[0]);
+    return n->pairs.v[tet][1];
+}
+
 static int first_sweep(struct neighbours *n, struct host_error *error) {
     for (uint32_t p = 0; p < n->adjacency.vertices; p++) {
         if (host_adjacency_group(&n->adjacency, p, &n->group, error) != 0)
@@ -96,9 +118,10 @@ static int first_sweep(struct neighbours *n, struct host_error *error) {
             uint32_t other = twin(&n->group, i);
             n->hull_facets += other == UINT32_MAX;
             if (f->corner == 0)
-                n->opposite_lowest[f->tet] = other;
+                note(n, f->tet, other);
         }
     }
+    host_rows_sort(&n->pairs);
     return 0;
 }
 
@@ -121,7 +144,7 @@ static int second_group(struct neighbours *n, uint32_t p,
             n->opposite[f->tet - first][f->corner] = twin(&n->group, i);
     }
     for (size_t i = 0; i < count; i++)
-        n->opposite[i][0] = n->opposite_lowest[first + i];
+        n->opposite[i][0] = noted(n, first + (uint32_t)i);
     return 0;
 }
 
@@ -157,12 +180,17 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
                           struct host_error *error) {
     struct neighbours n = {.capacity = 0};
     size_t bytes = (size_t)tets->count * sizeof(uint32_t);
-    n.opposite_lowest = host_map(bytes);
-    if (n.opposite_lowest == NULL) {
-        host_fail_memory(error, "the neighbours of the tetrahedra");
-    } else if (host_adjacency_make(&n.adjacency, tets, (uint32_t)points->count,
-                                   error) == 0 &&
-               first_sweep(&n, error) == 0) {
+    if (host_adjacency_make(&n.adjacency, tets, (uint32_t)points->count,
+                            error) != 0)
+        return error->code;
+    if (n.adjacency.seconds.v != NULL) {
+        (void)host_tetrahedra_room(&n.pairs, tets->count, error);
+    } else {
+        n.opposite_lowest = host_map(bytes);
+        if (n.opposite_lowest == NULL)
+            host_fail_memory(error, "the neighbours of the tetrahedra");
+    }
+    if (error->code == 0 && first_sweep(&n, error) == 0) {
         uint64_t facets = 0;
         host_put_line(neigh, "", tets->count, " 4\n");
         host_put_line(face, "", n.hull_facets, " 1\n");
@@ -176,6 +204,7 @@ static int write_topology(struct host_output *neigh, struct host_output *face,
     host_group_free(&n.group);
     free(n.opposite);
     host_unmap(n.opposite_lowest, bytes);
+    host_tetrahedra_free(&n.pairs);
     return error->code;
 }
 

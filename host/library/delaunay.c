@@ -59,7 +59,7 @@ static bool map_arena(const struct direct *run, unsigned part) {
     if (c->arena[part] != NULL && c->bytes[part] >= least)
         return true;
     host_unmap(c->arena[part], c->bytes[part]);
-    while ((c->arena[part] = host_map(bytes)) == NULL && bytes > least)
+    while ((c->arena[part] = host_map_resident(bytes)) == NULL && bytes > least)
         bytes = bytes / 2 > least ? bytes / 2 / 64 * 64 : least;
     c->bytes[part] = bytes;
     return c->arena[part] != NULL;
@@ -152,11 +152,13 @@ static size_t arena_bytes(const struct host_order *order) {
 struct seam {
     const struct direct *run;
     uint64_t points;
-    double (*xyz)[3];     /* [points] */
-    uint32_t *id;         /* [points] vertex numbers, */
-    uint16_t *side;       /* twice the region, 1 more: AT_FINAL */
-    uint32_t (*table)[4]; /* [slots] what regions have at such vertices */
-    uint64_t slots;       /* a power of two */
+    double (*xyz)[3]; /* [points] */
+    uint32_t *id;     /* [points] vertex numbers, ascending, */
+    uint16_t *side;   /* twice the region, 1 more: AT_FINAL */
+    /* What regions have at such vertices, each ascending, in order; where those
+     * stand whose lowest vertex a point is: neighbours in space stand close. */
+    struct host_tetrahedra left;
+    uint64_t *first;             /* [points + 1] */
     struct host_tetrahedra tets; /* of the seam's points */
     unsigned parts;
     _Atomic bool failed;
@@ -191,13 +193,6 @@ static void gather_seam(struct seam *s) {
         }
 }
 
-static uint64_t slot_of(const struct seam *s, const uint32_t v[4]) {
-    uint64_t h = (uint64_t)v[0] << 32 | v[1], g = (uint64_t)v[2] << 32 | v[3];
-    h = (h ^ g * UINT64_C(0x9e3779b97f4a7c15)) * UINT64_C(0xff51afd7ed558ccd);
-    h = (h ^ h >> 32) * UINT64_C(0xc4ceb9fe1a85ec53);
-    return (h ^ h >> 29) & (s->slots - 1);
-}
-
 static void sort_four(uint32_t v[4]) {
     for (int i = 1; i < 4; i++)
         for (int k = i; k > 0 && v[k] < v[k - 1]; k--) {
@@ -207,70 +202,92 @@ static void sort_four(uint32_t v[4]) {
         }
 }
 
-/* Where the tetrahedron is, or would be: v[3] = INCODE_NONE. */
-static uint32_t *find_left(const struct seam *s, uint32_t v[4]) {
-    sort_four(v);
-    uint64_t i = slot_of(s, v);
-    host_call_trim(AROUND);
-    while (s->table[i][3] != INCODE_NONE &&
-           memcmp(s->table[i], v, sizeof s->table[i]) != 0)
-        i = (i + 1) & (s->slots - 1);
-    return s->table[i];
+/* Those at final tetrahedra's vertices alone. */
+static void keep_left(const struct direct *run, struct host_tetrahedra *left) {
+    const uint8_t *mark = run->mark;
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < left->count; i++) {
+        const uint32_t *v = left->v[i];
+        if (i % POLL_LEFT == 0)
+            host_call_trim(POLL_LEFT * 2 * sizeof left->v[i]);
+        if ((mark[v[0]] & mark[v[1]] & mark[v[2]] & mark[v[3]] & AT_FINAL) == 0)
+            continue;
+        memmove(left->v[kept], v, sizeof left->v[0]);
+        sort_four(left->v[kept++]);
+    }
+    host_tetrahedra_cut(left, kept);
 }
 
-/* Those at final tetrahedra's vertices alone. */
-static bool keep_left(struct seam *s) {
-    const uint8_t *mark = s->run->mark;
-    uint64_t count = 0;
-    for (unsigned t = 0; t < s->run->threads; t++) {
-        struct host_tetrahedra *left = &s->run->left[t];
-        uint64_t kept = 0;
-        for (uint64_t i = 0; i < left->count; i++) {
-            const uint32_t *v = left->v[i];
-            if (i % POLL_LEFT == 0)
-                host_call_trim(POLL_LEFT * 2 * sizeof left->v[i]);
-            if ((mark[v[0]] & mark[v[1]] & mark[v[2]] & mark[v[3]] &
-                 AT_FINAL) != 0)
-                memmove(left->v[kept++], v, sizeof left->v[0]);
-        }
-        host_tetrahedra_cut(left, kept);
-        count += kept;
-    }
-    for (s->slots = 1; s->slots < 2 * count + 2;)
-        s->slots *= 2;
-    s->table = host_map(s->slots * sizeof *s->table);
-    if (s->table == NULL)
+static bool sort_left(struct seam *s) {
+    const struct direct *run = s->run;
+    for (unsigned t = 0; t < run->threads; t++)
+        keep_left(run, &run->left[t]);
+    if (host_tetrahedra_join(run->left, run->threads, NULL,
+                             run->common->error) != 0)
         return false;
-    for (uint64_t i = 0; i < s->slots; i += POLL_LEFT) {
-        uint64_t n = s->slots - i < POLL_LEFT ? s->slots - i : POLL_LEFT;
-        memset(s->table + i, 0xff, n * sizeof *s->table);
-        host_call_trim(n * sizeof *s->table);
+    s->left = run->left[0];
+    run->left[0] = (struct host_tetrahedra){0};
+    host_tetrahedra_sort(&s->left);
+    uint64_t at = 0;
+    for (uint64_t n = 0; n < s->points && !host_call_cancelled(); n++) {
+        uint64_t before = at;
+        s->first[n] = at;
+        while (at < s->left.count && s->left.v[at][0] == s->id[n])
+            at++;
+        host_call_trim(sizeof s->id[n] + sizeof s->first[n] +
+                       (size_t)(at - before) * sizeof s->left.v[0]);
     }
-    for (unsigned t = 0; t < s->run->threads; t++)
-        for (uint64_t i = 0; i < s->run->left[t].count; i++) {
-            uint32_t v[4];
-            memcpy(v, s->run->left[t].v[i], sizeof v);
-            uint32_t *slot = find_left(s, v);
-            memcpy(slot, v, sizeof v);
-        }
+    s->first[s->points] = at;
     return true;
 }
 
+static bool is_before(const uint32_t a[4], const uint32_t b[4]) {
+    int k = 1;
+    while (k < 3 && a[k] == b[k])
+        k++;
+    return a[k] < b[k];
+}
+
+/* A place where a thread has looked, to within what one fault maps. */
+struct place {
+    uint64_t block;
+};
+
+static bool is_left(const struct seam *s, const uint32_t t[4],
+                    struct place *near) {
+    uint32_t n[4] = {t[0], t[1], t[2], t[3]};
+    sort_four(n);
+    const uint32_t v[4] = {s->id[n[0]], s->id[n[1]], s->id[n[2]], s->id[n[3]]};
+    uint64_t low = s->first[n[0]], high = s->first[n[0] + 1];
+    uint64_t block = low / (AROUND / sizeof s->left.v[0]);
+    if (block != near->block)
+        host_call_trim(2 * (size_t)AROUND);
+    near->block = block;
+    while (low < high) {
+        uint64_t middle = low + (high - low) / 2;
+        if (is_before(s->left.v[middle], v))
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low < s->first[n[0] + 1] && !is_before(v, s->left.v[low]);
+}
+
 /* Whether a tetrahedron of the seam's points is one of all points. */
-static bool is_right(const struct seam *s, const uint32_t t[4]) {
+static bool is_right(const struct seam *s, const uint32_t t[4],
+                     struct place *near) {
     unsigned a = s->side[t[0]], b = s->side[t[1]], c = s->side[t[2]],
              d = s->side[t[3]];
-    if ((a | 1U) != (b | 1U) || (a | 1U) != (c | 1U) || (a | 1U) != (d | 1U) ||
-        (a & b & c & d & 1) == 0)
-        return true;
-    uint32_t v[4] = {s->id[t[0]], s->id[t[1]], s->id[t[2]], s->id[t[3]]};
-    return find_left(s, v)[3] != INCODE_NONE;
+    return (a | 1U) != (b | 1U) || (a | 1U) != (c | 1U) ||
+           (a | 1U) != (d | 1U) || (a & b & c & d & 1) == 0 ||
+           is_left(s, t, near);
 }
 
 static void sift(void *context, unsigned part) {
     struct seam *s = context;
     enum { POLL = 1 << 12, TOUCHED = 80 /* bytes a row */ };
     struct host_error error;
+    struct place near = {UINT64_MAX};
     uint64_t each = s->tets.count / s->parts, i = each * part;
     uint64_t last = part + 1 == s->parts ? s->tets.count : i + each;
     struct host_tetrahedra *to = &s->run->tets[part];
@@ -283,7 +300,7 @@ static void sift(void *context, unsigned part) {
         }
         host_call_trim((size_t)(end - i) * TOUCHED);
         for (; i < end; i++) {
-            if (!is_right(s, s->tets.v[i]))
+            if (!is_right(s, s->tets.v[i], &near))
                 continue;
             for (int k = 0; k < 4; k++)
                 v[0][k] = s->id[s->tets.v[i][k]];
@@ -347,8 +364,12 @@ static enum host_direct close_seams(const struct direct *run) {
     s.xyz = host_map(s.points * sizeof *s.xyz);
     s.id = host_map(s.points * sizeof *s.id);
     s.side = host_map(s.points * sizeof *s.side);
-    if (s.xyz != NULL && s.id != NULL && s.side != NULL && keep_left(&s)) {
+    s.first = host_map((s.points + 1) * sizeof *s.first);
+    if (s.xyz != NULL && s.id != NULL && s.side != NULL && s.first != NULL) {
         gather_seam(&s);
+        outcome = sort_left(&s) ? HOST_DIRECT_DONE : HOST_DIRECT_MEMORY;
+    }
+    if (outcome == HOST_DIRECT_DONE) {
         outcome = triangulate_seam(&s);
         s.parts = s.tets.count < SIFT_LEAST ? 1 : run->threads;
         if (outcome == HOST_DIRECT_DONE)
@@ -359,7 +380,8 @@ static enum host_direct close_seams(const struct direct *run) {
     host_unmap(s.xyz, s.points * sizeof *s.xyz);
     host_unmap(s.id, s.points * sizeof *s.id);
     host_unmap(s.side, s.points * sizeof *s.side);
-    host_unmap(s.table, s.slots * sizeof *s.table);
+    host_unmap(s.first, (s.points + 1) * sizeof *s.first);
+    host_tetrahedra_free(&s.left);
     host_tetrahedra_free(&s.tets);
     return outcome;
 }

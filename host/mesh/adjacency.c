@@ -27,17 +27,16 @@ static uint32_t higher(uint32_t a, uint32_t b) {
     return a < b ? b : a;
 }
 
-/* first[p] .. first[p + 1]: where the tetrahedra with vertex p at `rank` stand
- * in `order` (NULL: only count). */
-static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
-                     uint32_t *order) {
-    const struct host_tetrahedra *tets = a->tets;
+/* first[p] .. first[p + 1]: where the rows with vertex p at `rank` stand in
+ * `order` (NULL: only count). */
+static void index_by(const struct host_tetrahedra *tets, int rank,
+                     uint32_t vertices, uint32_t *first, uint32_t *order) {
     for (uint64_t i = 0; i < tets->count; i++) {
         if (is_to_end(i))
             return;
         first[tets->v[i][rank] + 1]++;
     }
-    for (uint32_t p = 0; p < a->vertices; p++)
+    for (uint32_t p = 0; p < vertices; p++)
         first[p + 1] += first[p];
     if (order == NULL)
         return;
@@ -46,8 +45,47 @@ static void index_by(const struct host_adjacency *a, int rank, uint32_t *first,
             return;
         order[first[tets->v[i][rank]]++] = (uint32_t)i;
     }
-    memmove(first + 1, first, (size_t)a->vertices * sizeof *first);
+    memmove(first + 1, first, (size_t)vertices * sizeof *first);
     first[0] = 0;
+}
+
+static int sort_seconds(struct host_adjacency *a, struct host_error *error) {
+    uint32_t(*row)[4] =
+        host_tetrahedra_room(&a->seconds, a->tets->count, error);
+    if (row == NULL)
+        return error->code;
+    for (uint64_t i = 0; i < a->tets->count && !is_to_end(i); i++) {
+        const uint32_t *v = a->tets->v[i];
+        row[i][0] = v[1];
+        row[i][1] = lower(v[2], v[3]);
+        row[i][2] = higher(v[2], v[3]);
+        row[i][3] = (uint32_t)i;
+    }
+    host_tetrahedra_keep(&a->seconds, a->tets->count);
+    host_rows_sort(&a->seconds);
+    return 0;
+}
+
+static int index_all(struct host_adjacency *a, struct host_error *error) {
+    size_t first = ((size_t)a->vertices + 1) * sizeof(uint32_t);
+    size_t order = (size_t)a->tets->count * sizeof(uint32_t);
+    bool is_aside = a->tets->count > host_call_share() / sizeof *a->tets->v;
+    a->first_by_lowest = host_map(first);
+    a->first_by_second = host_map(first);
+    a->by_second = is_aside ? NULL : host_map(order);
+    if (a->first_by_lowest == NULL || a->first_by_second == NULL ||
+        (a->by_second == NULL && !is_aside))
+        return host_fail_memory(error, "the neighbours of the tetrahedra");
+    if (is_aside && sort_seconds(a, error) != 0)
+        return error->code;
+    index_by(a->tets, 0, a->vertices, a->first_by_lowest, NULL);
+    if (is_aside)
+        index_by(&a->seconds, 0, a->vertices, a->first_by_second, NULL);
+    else
+        index_by(a->tets, 1, a->vertices, a->first_by_second, a->by_second);
+    return host_call_cancelled()
+               ? host_fail(error, HOST_BROKEN, "host: cancelled")
+               : 0;
 }
 
 int host_adjacency_make(struct host_adjacency *a,
@@ -61,23 +99,9 @@ int host_adjacency_make(struct host_adjacency *a,
             "cannot be numbered for a file of them; do without these, or take "
             "fewer points");
     }
-    size_t first = ((size_t)vertices + 1) * sizeof(uint32_t);
-    size_t order = (size_t)tets->count * sizeof(uint32_t);
-    a->first_by_lowest = host_map(first);
-    a->first_by_second = host_map(first);
-    a->by_second = host_map(order);
-    if (a->first_by_lowest == NULL || a->first_by_second == NULL ||
-        a->by_second == NULL) {
+    if (index_all(a, error) != 0)
         host_adjacency_free(a);
-        return host_fail_memory(error, "the neighbours of the tetrahedra");
-    }
-    index_by(a, 0, a->first_by_lowest, NULL);
-    index_by(a, 1, a->first_by_second, a->by_second);
-    if (host_call_cancelled()) {
-        host_adjacency_free(a);
-        return host_fail(error, HOST_BROKEN, "host: cancelled");
-    }
-    return 0;
+    return error->code;
 }
 
 void host_adjacency_free(struct host_adjacency *a) {
@@ -87,6 +111,7 @@ void host_adjacency_free(struct host_adjacency *a) {
     host_unmap(a->first_by_lowest, first);
     host_unmap(a->first_by_second, first);
     host_unmap(a->by_second, order);
+    host_tetrahedra_free(&a->seconds);
     *a = (struct host_adjacency){0};
 }
 
@@ -153,11 +178,15 @@ int host_adjacency_group(const struct host_adjacency *a, uint32_t p,
         add(group, v[1], v[3], i, 2);
         add(group, v[1], v[2], i, 3);
     }
+    for (; j < last && a->by_second == NULL; j++) {
+        const uint32_t *row = a->seconds.v[j];
+        add(group, row[1], row[2], row[3], 0);
+    }
     for (; j < last; j++) {
         const uint32_t *v = a->tets->v[a->by_second[j]];
-        host_call_trim(AROUND);
         add(group, v[2], v[3], a->by_second[j], 0);
     }
+    host_call_trim(group->count * sizeof *a->tets->v);
     sort_group(group);
     return 0;
 }

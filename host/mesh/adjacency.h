@@ -1,8 +1,9 @@
 /* Which tetrahedra share a facet, vertex by vertex: the facets whose lowest
  * vertex is p, sorted, so that twins stand side by side.
  *
- * Memory: 4 bytes a tetrahedron and 8 a vertex.  Work: two passes; a group of g
- * facets O(g log g). */
+ * Memory: 4 bytes a tetrahedron and 8 a vertex; 16 a tetrahedron where arrays
+ * are put aside (host/base/scratch.h), so that groups in the order of their
+ * vertices read in order.  Work: two passes; a group of g facets O(g log g). */
 #ifndef HOST_ADJACENCY_H
 #define HOST_ADJACENCY_H
 
@@ -13,7 +14,9 @@ struct host_adjacency {
     uint32_t vertices;
     uint32_t *first_by_lowest; /* [vertices + 1] rows are sorted by it */
     uint32_t *first_by_second; /* [vertices + 1] into by_second */
-    uint32_t *by_second;       /* [count] tetrahedra by second vertex */
+    uint32_t *by_second;       /* [count] tetrahedra by second vertex; or */
+    /* their second vertices, the lower and the higher of the others, numbers */
+    struct host_tetrahedra seconds;
 };
 
 /* A facet of the group of its lowest vertex p. */

@@ -52,31 +52,47 @@ struct mapping {
     uint64_t count;
     const uint32_t *map;
     unsigned parts;
+    bool is_aside;
 };
 
+static void map_some(uint32_t (*to)[4], const uint32_t (*from)[4],
+                     uint64_t count, const uint32_t *map) {
+    if (map == NULL)
+        memmove(to, from, (size_t)count * sizeof *to);
+    for (uint64_t i = 0; map != NULL && i < count; i++)
+        for (int k = 0; k < 4; k++)
+            to[i][k] = map[from[i][k]];
+}
+
 static void map_part(void *context, unsigned part) {
-    enum { POLL = 1 << 12, TOUCHED = 40 /* bytes a row */ };
+    enum { POLL = 1 << 11 };
     const struct mapping *m = context;
     uint64_t each = m->count / m->parts, i = each * part;
     uint64_t last = part + 1 == m->parts ? m->count : i + each;
     while (i < last && !host_call_cancelled()) {
-        uint64_t end = last - i > POLL ? i + POLL : last;
-        host_call_trim((size_t)POLL * TOUCHED);
-        if (m->map == NULL) {
-            memmove(m->to[i], m->from[i], (size_t)(end - i) * sizeof *m->to);
-            i = end;
+        uint64_t n = last - i > POLL ? POLL : last - i;
+        if (m->is_aside) {
+            uint32_t row[POLL][4];
+            host_fetch(row, m->from[i], (size_t)n * sizeof *row);
+            map_some(row, (const uint32_t(*)[4])row, n, m->map);
+            host_store(m->to[i], row, (size_t)n * sizeof *row);
+            host_call_trim((size_t)n * sizeof *m->map);
+        } else {
+            map_some(m->to + i, m->from + i, n, m->map);
         }
-        for (; i < end; i++)
-            for (int k = 0; k < 4; k++)
-                m->to[i][k] = m->map[m->from[i][k]];
+        i += n;
     }
 }
 
 static void map_rows(uint32_t (*to)[4], const uint32_t (*from)[4],
                      uint64_t count, const uint32_t *map) {
     enum { FORK_ROWS = 1 << 14 }; /* fewer are not worth a thread */
-    struct mapping m = {to, from, count, map,
-                        count < FORK_ROWS ? 1 : host_threads()};
+    struct mapping m = {to,
+                        from,
+                        count,
+                        map,
+                        count < FORK_ROWS ? 1 : host_threads(),
+                        count > host_call_share() / sizeof *to};
     host_fork_all(m.parts, map_part, &m);
 }
 
@@ -100,294 +116,4 @@ int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
         host_tetrahedra_free(&tets[i]);
     }
     return 0;
-}
-
-/* The canonical order: rows sorted in place by their ascending vertices, most
- * significant digit first (American flag sort: McIlroy, Bostic and McIlroy,
- * Computing Systems 6:5-27, 1993), small groups by insertion. */
-
-enum {
-    DIGIT_BITS = 10,
-    BUCKETS = 1 << DIGIT_BITS,
-    ASIDE_BITS = 4, /* where not all rows are in memory */
-    INSERTION_MAX = 40,
-    FORK_ROWS = 1 << 16,
-    SAMPLE = 63,
-    AHEAD = 8,           /* rows */
-    POLL_ROWS = 1 << 12, /* between two polls of whether it is cancelled */
-    AROUND = 1 << 16     /* bytes that one row far from others touches */
-};
-
-typedef uint32_t row_t[4];
-
-static void canonical(row_t r) {
-    /* Ascending, by comparisons whose outcome no branch has to foresee; where
-     * they are an odd number of exchanges, one more at the end. */
-    uint32_t a = r[0], b = r[1], c = r[2], d = r[3];
-    uint32_t ab = a < b ? a : b, ba = a < b ? b : a;
-    uint32_t cd = c < d ? c : d, dc = c < d ? d : c;
-    uint32_t least = ab < cd ? ab : cd, low = ab < cd ? cd : ab;
-    uint32_t most = ba < dc ? dc : ba, high = ba < dc ? ba : dc;
-    uint32_t second = low < high ? low : high, third = low < high ? high : low;
-    bool odd = (a > b) ^ (c > d) ^ (ab > cd) ^ (ba > dc) ^ (high > low);
-    r[0] = least, r[1] = second;
-    r[2] = odd ? most : third, r[3] = odd ? third : most;
-}
-
-/* Word w of the sorting key of a canonical row. */
-static uint32_t word(const row_t r, int w) {
-    switch (w) {
-    case 2:
-        return r[2] < r[3] ? r[2] : r[3];
-    case 3:
-        return r[2] < r[3] ? r[3] : r[2];
-    default:
-        return r[w];
-    }
-}
-
-static bool less(const row_t p, const row_t q) {
-    uint64_t a = (uint64_t)p[0] << 32 | p[1], b = (uint64_t)q[0] << 32 | q[1];
-    if (a != b)
-        return a < b;
-    a = (uint64_t)word(p, 2) << 32 | word(p, 3);
-    b = (uint64_t)word(q, 2) << 32 | word(q, 3);
-    return a != b ? a < b : p[2] < q[2];
-}
-
-static void insertion_sort(row_t *v, size_t n) {
-    for (size_t i = 1; i < n; i++) {
-        row_t t;
-        memcpy(t, v[i], sizeof t);
-        size_t j = i;
-        for (; j > 0 && less(t, v[j - 1]); j--)
-            memcpy(v[j], v[j - 1], sizeof t);
-        memcpy(v[j], t, sizeof t);
-    }
-}
-
-/* The same of at most INSERTION_MAX rows with one first word: mostly the second
- * and the third tell them apart. */
-static void sort_star(row_t *v, size_t n) {
-    uint64_t key[INSERTION_MAX];
-    for (size_t i = 0; i < n; i++) {
-        row_t t;
-        memcpy(t, v[i], sizeof t);
-        uint64_t k = (uint64_t)t[1] << 32 | word(t, 2);
-        size_t j = i;
-        for (; j > 0 &&
-               (k < key[j - 1] || (k == key[j - 1] && less(t, v[j - 1])));
-             j--) {
-            key[j] = key[j - 1];
-            memcpy(v[j], v[j - 1], sizeof t);
-        }
-        key[j] = k;
-        memcpy(v[j], t, sizeof t);
-    }
-}
-
-/* Bits of a word: those from `shift` on, as many as `mask` has. */
-struct digit {
-    int word, shift;
-    uint32_t mask;
-};
-
-/* The digit below, of `bits` bits or what is left of the word; false: none. */
-static bool go_down(struct digit *d, int bits) {
-    if (d->shift == 0) {
-        d->word++;
-        d->shift = 32;
-        bits = 8;
-    }
-    bits = bits < d->shift ? bits : d->shift;
-    d->shift -= bits;
-    d->mask = (1u << bits) - 1;
-    return d->word < 4;
-}
-
-/* Moves rows to where their digits belong; end[b]: of those with digit b.
- * Inlined, so that it is made for the first word, which nearly all are of. */
-static inline __attribute__((always_inline)) void
-exchange_by(row_t *v, size_t n, int w, struct digit d, size_t end[BUCKETS]) {
-    size_t next[BUCKETS], sum = 0, buckets = (size_t)d.mask + 1;
-    memset(end, 0, buckets * sizeof *end);
-    for (size_t i = 0; i < n && !host_call_cancelled();) {
-        size_t to = n - i > POLL_ROWS ? i + POLL_ROWS : n;
-        host_call_trim((to - i) * sizeof *v);
-        for (; i < to; i++)
-            end[word(v[i], w) >> d.shift & d.mask]++;
-    }
-    if (host_call_cancelled()) /* counts that are not whole lead astray */
-        return;
-    for (size_t b = 0; b < buckets; b++) {
-        next[b] = sum;
-        sum += end[b];
-        end[b] = sum;
-    }
-    size_t moved = 0;
-    for (size_t b = 0; b < buckets && !host_call_cancelled(); b++) {
-        while (next[b] < end[b]) {
-            if (moved >= POLL_ROWS) {
-                host_call_trim(moved * sizeof *v);
-                moved = 0;
-            }
-            moved++;
-            row_t t;
-            memcpy(t, v[next[b]], sizeof t);
-            size_t to = word(t, w) >> d.shift & d.mask;
-            while (to != b) {
-                row_t u;
-                memcpy(u, v[next[to]], sizeof u);
-                memcpy(v[next[to]++], t, sizeof t);
-                moved++;
-                /* So many streams are more than the processor foresees. */
-                __builtin_prefetch(&v[next[to] + AHEAD], 1);
-                memcpy(t, u, sizeof t);
-                to = word(t, w) >> d.shift & d.mask;
-            }
-            memcpy(v[next[b]++], t, sizeof t);
-        }
-    }
-}
-
-static void exchange(row_t *v, size_t n, struct digit d, size_t end[BUCKETS]) {
-    if (d.word == 0)
-        exchange_by(v, n, 0, d, end);
-    else
-        exchange_by(v, n, d.word, d, end);
-}
-
-/* Bits for so many rows.  Every bucket has a place of its own where rows are
- * read and written. */
-static int bits_for(size_t n, int bits) {
-    return n > host_call_share() / sizeof(row_t) && bits > ASIDE_BITS
-               ? ASIDE_BITS
-               : bits;
-}
-
-/* Sorts by a digit and goes on below it.  Depth: at most 16, or where arrays
- * are put aside 32. */
-static void flag_sort(row_t *v, size_t n, struct digit digit, int bits) {
-    size_t end[BUCKETS], first = 0, buckets = (size_t)digit.mask + 1;
-    exchange(v, n, digit, end);
-    if (host_call_cancelled())
-        return;
-    for (size_t b = 0; b < buckets; first = end[b++]) {
-        size_t m = end[b] - first;
-        struct digit below = digit;
-        if (!go_down(&below, bits_for(m, bits)))
-            return;
-        if (m > INSERTION_MAX)
-            flag_sort(v + first, m, below, bits);
-        else if (below.word > 0)
-            sort_star(v + first, m);
-        else
-            insertion_sort(v + first, m);
-    }
-}
-
-struct sort {
-    row_t *v;
-    size_t n;
-    unsigned threads;
-};
-
-/* A first word with about half of the rows below it. */
-static uint32_t middle(row_t *v, size_t n) {
-    uint32_t key[SAMPLE] = {0};
-    for (size_t i = 0; i < SAMPLE; i++) {
-        uint32_t k = v[n / SAMPLE * i][0];
-        host_call_trim(AROUND);
-        size_t j = i;
-        for (; j > 0 && k < key[j - 1]; j--)
-            key[j] = key[j - 1];
-        key[j] = k;
-    }
-    return key[SAMPLE / 2];
-}
-
-static void sort_rows(void *argument) {
-    struct sort *s = argument;
-    if (s->threads > 1 && s->n >= FORK_ROWS) {
-        uint32_t pivot = middle(s->v, s->n);
-        size_t below = 0;
-        for (size_t i = 0; i < s->n && !host_call_cancelled();) {
-            size_t end = s->n - i > POLL_ROWS ? i + POLL_ROWS : s->n;
-            host_call_trim(2 * (end - i) * sizeof *s->v);
-            for (; i < end; i++) {
-                row_t t;
-                memcpy(t, s->v[i], sizeof t);
-                memcpy(s->v[i], s->v[below], sizeof t);
-                memcpy(s->v[below], t, sizeof t);
-                below += t[0] < pivot;
-            }
-        }
-        if (host_call_cancelled())
-            return;
-        struct sort lower = {s->v, below, s->threads / 2};
-        struct sort upper = {s->v + below, s->n - below,
-                             s->threads - s->threads / 2};
-        struct host_fork fork;
-        host_fork_start(&fork, sort_rows, &lower);
-        sort_rows(&upper);
-        host_fork_join(&fork);
-        return;
-    }
-    if (s->n <= INSERTION_MAX) {
-        insertion_sort(s->v, s->n);
-        return;
-    }
-    uint32_t top = 1;
-    for (size_t i = 0; i < s->n;) {
-        size_t end = s->n - i > POLL_ROWS ? i + POLL_ROWS : s->n;
-        host_call_trim((end - i) * sizeof *s->v);
-        for (; i < end; i++)
-            top |= s->v[i][0];
-    }
-    /* The first word in as few digits as there may be, of equal size. */
-    int used = 32 - __builtin_clz(top);
-    int digits = (used + DIGIT_BITS - 1) / DIGIT_BITS;
-    int bits = (used + digits - 1) / digits;
-    struct digit digit = {0, used, 0};
-    (void)go_down(&digit, bits_for(s->n, bits));
-    flag_sort(s->v, s->n, digit, bits);
-}
-
-struct canon {
-    struct host_tetrahedra *tets;
-    unsigned parts;
-    bool disordered[HOST_THREADS_MAX];
-};
-
-static void canonical_part(void *context, unsigned part) {
-    struct canon *c = context;
-    uint64_t each = c->tets->count / c->parts, first = each * part;
-    uint64_t last = part + 1 == c->parts ? c->tets->count : first + each;
-    bool disordered = false;
-    for (uint64_t i = first; i < last && !host_call_cancelled();) {
-        uint64_t end = last - i > POLL_ROWS ? i + POLL_ROWS : last;
-        host_call_trim((size_t)(end - i) * sizeof *c->tets->v);
-        for (; i < end; i++) {
-            canonical(c->tets->v[i]);
-            disordered = disordered ||
-                         (i > first && less(c->tets->v[i], c->tets->v[i - 1]));
-        }
-    }
-    c->disordered[part] = disordered;
-}
-
-void host_tetrahedra_sort(struct host_tetrahedra *tets) {
-    struct canon c = {tets, host_threads(), {false}};
-    host_fork_all(c.parts, canonical_part, &c);
-    bool disordered = false;
-    uint64_t each = tets->count / c.parts;
-    for (unsigned p = 0; p < c.parts; p++) {
-        disordered = disordered || c.disordered[p] ||
-                     (p > 0 && each > 0 &&
-                      less(tets->v[each * p], tets->v[each * p - 1]));
-    }
-    if (disordered) {
-        struct sort s = {tets->v, (size_t)tets->count, c.parts};
-        sort_rows(&s);
-    }
 }

@@ -2,7 +2,8 @@
  * digest.
  *
  * Memory: 16 bytes a tetrahedron, grown without a second copy, sorted in
- * place.  Work: appending is amortised O(1); sorting about 40 ns a row. */
+ * place, or where it is put aside (host/base/scratch.h) with a second copy.
+ * Work: appending is amortised O(1); sorting about 40 ns a row. */
 #ifndef HOST_TETRAHEDRA_H
 #define HOST_TETRAHEDRA_H
 
@@ -49,6 +50,9 @@ void host_tetrahedra_trim(struct host_tetrahedra *tets);
  * even permutation whose second is smallest) and the rows into the order of
  * the digest (by vertices sorted ascending).  Two threads, in place. */
 void host_tetrahedra_sort(struct host_tetrahedra *tets);
+
+/* Brings rows of other things into the order of their first words. */
+void host_rows_sort(struct host_tetrahedra *rows);
 
 /* SHA-256 of the sorted rows, each ascending, as little-endian words. */
 void host_digest(const struct host_tetrahedra *tets,

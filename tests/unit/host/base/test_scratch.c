@@ -113,6 +113,35 @@ TEST_WITH(test_short_threads_are_counted_together, enter, leave) {
     host_unmap(word, WORDS * sizeof *word);
 }
 
+/* No page becomes resident, and both ways see the same. */
+TEST_WITH(test_parts_go_through_the_file, enter, leave) {
+    static uint64_t block[BLOCK];
+    uint64_t *word = host_map(WORDS * sizeof *word);
+    assert_non_null(word);
+    uint64_t before = resident();
+    for (size_t at = 0; at < WORDS; at += BLOCK) {
+        for (size_t i = 0; i < BLOCK; i++)
+            block[i] = (at + i) * 5;
+        host_store(word + at, block, sizeof block);
+    }
+    for (size_t at = 0; at < WORDS; at += BLOCK) {
+        host_fetch(block, word + at, sizeof block);
+        assert_int_equal(block[7], (at + 7) * 5);
+    }
+    assert_true(resident() < before + MIB);
+    assert_int_equal(word[WORDS - 1], (uint64_t)(WORDS - 1) * 5);
+    word[12345] = 1;
+    host_fetch(block, word + 12345, sizeof *block);
+    assert_int_equal(block[0], 1);
+    host_unmap(word, WORDS * sizeof *word);
+    uint64_t *near = host_map_resident(MIB);
+    assert_int_equal(scratch.arrays, 0);
+    block[0] = 3;
+    host_store(near, block, sizeof *block);
+    assert_int_equal(near[0], 3);
+    host_unmap(near, MIB);
+}
+
 TEST_WITH(test_an_array_grows_and_shrinks_with_what_it_holds, enter, leave) {
     size_t bytes = 4096, before = 0;
     unsigned char *array = NULL;

@@ -1,6 +1,9 @@
 /* The list of tetrahedra: canonical order against a plain sort, the digest
  * against a known one. */
 
+#include "host/base/memory.h"
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "host/mesh/adjacency.h"
 #include "tests/unit/reference.h"
 #include "tests/unit/test.h"
@@ -65,7 +68,7 @@ static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd) {
         key_of(tets.v[i], key[i]);
     }
     qsort(key, n, sizeof *key, compare_keys);
-    for (int again = 0; again < 2; again++) {
+    for (int again = 0; again < 3; again++) {
         host_tetrahedra_sort(&tets);
         for (uint64_t i = 0; i < n; i++) {
             uint32_t mine[5];
@@ -77,6 +80,10 @@ static void check_sort(uint64_t n, uint32_t vertices, uint32_t crowd) {
             if ((i == 0 || memcmp(key[i], key[i - 1], 16) != 0) &&
                 (i + 1 == n || memcmp(key[i], key[i + 1], 16) != 0))
                 assert_int_equal(mine[4], key[i][4]);
+        }
+        for (uint64_t i = 0; again == 1 && i < n; i++) {
+            uint32_t *v = tets.v[i], first = v[0]; /* in order, but not so */
+            v[0] = v[1], v[1] = v[2], v[2] = first;
         }
     }
     host_tetrahedra_free(&tets);
@@ -91,6 +98,27 @@ TEST(order_is_canonical) {
     check_sort(100000, 300, 2);
     check_sort(200000, 70000, 2);
     check_sort(300000, 20000000, 5);
+}
+
+/* The same with rows in files: a thread has room for 65,536 in memory.  The
+ * last two have more than that with one first vertex. */
+TEST(order_is_canonical_where_rows_are_aside) {
+    struct host_scratch scratch;
+    struct host_error error = {0};
+    struct host_call call = {
+        .threads = 2, .memory_max = UINT64_MAX, .scratch = &scratch};
+    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 16 << 20, 2, &error),
+                     0);
+    host_call_enter(&call);
+    check_sort(100000, 70000, 70000);
+    check_sort(200000, 20000000, 5000);
+    check_sort(200000, 4000000000u, 1000000);
+    check_sort(300000, 70000, 2);
+    check_sort(300000, 4000000000u, 2);
+    assert_int_equal(scratch.arrays, 0);
+    assert_int_equal(call.memory, 0);
+    host_call_enter(NULL);
+    host_scratch_end(&scratch);
 }
 
 TEST(every_permutation_keeps_its_sign) {
