@@ -32,7 +32,7 @@ static int make_file(const char *directory) {
 }
 
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads,
+                       uint64_t resident_max, unsigned threads, bool own,
                        struct host_error *error) {
     uint64_t share = resident_max / SHARE;
     memset(scratch, 0, sizeof *scratch);
@@ -41,8 +41,9 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
     scratch->array_min = share < ARRAY_MIN ? (size_t)share : ARRAY_MIN;
     scratch->step = (size_t)(resident_max / BETWEEN / threads);
     (void)pthread_mutex_init(&scratch->lock, NULL);
-    scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
-    if (scratch->statm < 0) {
+    scratch->own = own;
+    scratch->statm = own ? -1 : open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (!own && scratch->statm < 0) {
         return host_fail(error, HOST_BROKEN,
                          "/proc/self/statm: %s; mount /proc, or leave the "
                          "limit of memory out",
@@ -50,11 +51,13 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
     }
     int file = make_file(directory);
     if (file < 0) {
+        scratch->failure = errno;
         host_fail(error, HOST_INPUT,
                   "%s: no scratch file can be made here (%s); give another "
                   "folder as --scratch DIR",
                   directory, strerror(errno));
-        (void)close(scratch->statm);
+        if (!own)
+            (void)close(scratch->statm);
         return error->code;
     }
     (void)close(file);
@@ -64,7 +67,8 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
 void host_scratch_end(struct host_scratch *scratch) {
     while (scratch->arrays > 0)
         (void)close(scratch->array[--scratch->arrays].file);
-    (void)close(scratch->statm);
+    if (!scratch->own)
+        (void)close(scratch->statm);
     (void)pthread_mutex_destroy(&scratch->lock);
 }
 
@@ -87,20 +91,28 @@ static uint64_t resident(const struct host_scratch *s) {
     return strtoull(end, NULL, 10) * PAGE;
 }
 
+/* Arenas of triangulators, a quarter of the limit, are touched all the time. */
 static bool is_over(const struct host_scratch *s) {
-    return resident(s) > s->resident_max / 4 * 3;
+    return s->own ? s->since > s->resident_max / 2
+                  : resident(s) > s->resident_max / 4 * 3;
 }
 
 /* A thread that finds too much waits for the one that lets pages leave, and
  * touches no more in the meantime. */
-void host_scratch_trim(struct host_scratch *scratch) {
+void host_scratch_trim(struct host_scratch *scratch, size_t touched) {
+    if (scratch->own)
+        (void)atomic_fetch_add(&scratch->since, touched);
     if (!is_over(scratch))
         return;
     (void)pthread_mutex_lock(&scratch->lock);
-    for (unsigned i = 0; i < scratch->arrays && (i > 0 || is_over(scratch));
-         i++)
+    bool all_fit =
+        scratch->own && scratch->bytes < scratch->resident_max / 4 * 3;
+    bool leave = is_over(scratch);
+    for (unsigned i = 0; i < scratch->arrays && leave && !all_fit; i++)
         (void)madvise(scratch->array[i].at, scratch->array[i].bytes,
                       MADV_DONTNEED);
+    if (leave)
+        scratch->since = 0;
     (void)pthread_mutex_unlock(&scratch->lock);
 }
 
@@ -109,7 +121,7 @@ void host_scratch_ended(struct host_scratch *scratch, size_t touched) {
     if (before + touched < scratch->step)
         return;
     atomic_store(&scratch->touched, 0);
-    host_scratch_trim(scratch);
+    host_scratch_trim(scratch, before + touched);
 }
 
 /* --- arrays --------------------------------------------------------------- */

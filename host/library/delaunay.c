@@ -30,6 +30,7 @@ struct common {
     /* What the triangulators of threads work in; NULL: nothing yet. */
     void *arena[HOST_THREADS_MAX];
     size_t bytes[HOST_THREADS_MAX];
+    pthread_mutex_t pouring; /* held while the sink takes rows */
 };
 
 /* The threads of one run. */
@@ -39,7 +40,8 @@ struct direct {
     struct host_tetrahedra *tets; /* [threads] */
     struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
     uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    bool is_first;                /* its bricks count, for who watches */
+    bool is_first;                /* its bricks count, for who watches, and
+                                     its tetrahedra go to the sink */
     unsigned threads;
     struct incode_setup setup;
     size_t arena;              /* bytes for each thread, if there are so many */
@@ -101,6 +103,33 @@ static void fail(struct direct *run, enum host_direct outcome,
     int before = HOST_DIRECT_DONE;
     if (atomic_compare_exchange_strong(&run->outcome, &before, outcome))
         atomic_store(&run->why, why);
+}
+
+static bool has_sink(const struct direct *run) {
+    const struct host_direct_sums *sums = run->common->sums;
+    return run->is_first && sums != NULL && sums->sink.put != NULL;
+}
+
+/* Gives the rows of a thread's list to the sink, if there is one. */
+static void pour(const struct direct *run, struct host_tetrahedra *tets) {
+    enum { BLOCK = 1 << 12, TOUCHED = 40 /* bytes a row */ };
+    struct host_direct_sums *sums = run->common->sums;
+    if (!has_sink(run))
+        return;
+    const uint32_t *row = sums->by_vertex ? NULL : run->order->row;
+    for (uint64_t i = 0; i < tets->count && !host_call_cancelled();) {
+        uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
+        host_tetrahedra_canonical(tets->v + i, n, row);
+        host_call_trim((size_t)n * TOUCHED);
+        (void)pthread_mutex_lock(&run->common->pouring);
+        if (!host_call_cancelled())
+            sums->sink.put(sums->sink.context,
+                           (const uint32_t(*)[4])tets->v + i, n);
+        (void)pthread_mutex_unlock(&run->common->pouring);
+        i += n;
+    }
+    sums->part[tets - run->tets].poured += tets->count;
+    host_tetrahedra_cut(tets, 0);
 }
 
 /* --- what a triangulator asks for ----------------------------------------- */
@@ -343,12 +372,18 @@ static void work(void *context, unsigned part) {
      * is touched. */
     if (w.call == NULL || w.call->memory_max == UINT64_MAX)
         (void)host_tetrahedra_room(
-            w.tets, (uint64_t)EXPECTED * run->order->points / run->threads,
+            w.tets,
+            (uint64_t)EXPECTED * run->order->points /
+                (has_sink(run) ? run->order->regions : run->threads),
             &w.error);
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
-           (region = atomic_fetch_add(&run->regions, 1)) < run->order->regions)
+           (region = atomic_fetch_add(&run->regions, 1)) <
+               run->order->regions) {
         do_region(&w, region);
+        if (run->outcome == HOST_DIRECT_DONE)
+            pour(run, w.tets);
+    }
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
         add_statistics(&p->statistics, w.t);
@@ -522,6 +557,7 @@ static void sift(void *context, unsigned part) {
             v++;
             host_tetrahedra_keep(to, 1);
         }
+        pour(s->run, to);
     }
 }
 
@@ -639,7 +675,8 @@ static enum host_direct run_order(struct common *common,
     if (outcome == HOST_DIRECT_DONE && run.mark != NULL)
         outcome = close_seams(&run);
     for (unsigned i = 0; i < threads && sums != NULL; i++)
-        sums->part[i].statistics.tetrahedra_kept = list[i].count;
+        sums->part[i].statistics.tetrahedra_kept =
+            list[i].count + sums->part[i].poured;
     if (outcome == HOST_DIRECT_DONE &&
         host_tetrahedra_join(
             list, threads, sums != NULL && sums->by_vertex ? NULL : order->row,
@@ -661,8 +698,10 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error) {
-    struct common common = {.sums = sums, .error = error};
+    struct common common = {
+        .sums = sums, .error = error, .pouring = PTHREAD_MUTEX_INITIALIZER};
     enum host_direct outcome = run_order(&common, order, true, true, tets);
+    (void)pthread_mutex_destroy(&common.pouring);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;
