@@ -21,6 +21,10 @@ enum { HOST_OUTPUTS_MAX = 16 };
 
 struct host_run_result;
 
+/* Of the tetrahedra in the outputs: that of their digest, or as they were made,
+ * which has none. */
+enum host_row_order { HOST_CANONICAL, HOST_AS_MADE };
+
 struct host_run_options {
     const char *input;
     const char *format; /* of the input, for host_format_told; NULL: by name */
@@ -48,6 +52,7 @@ struct host_run_options {
     const char *cube;    /* a file that describes real nodes, or NULL */
     const char *stats;   /* a file for the statistics, or NULL */
     enum host_verifying verifying;
+    enum host_row_order row_order;
     bool quiet, table, map;
     bool explain;            /* print why `auto` chose the strategy */
     bool progress, anywhere; /* on a terminal; also without one */
