@@ -216,6 +216,7 @@ test-full: deps-full
 bench: deps-bench
 	@$(MAKE) --no-print-directory all
 	@$(BUILD)/incode bench peers $(SETS)
+	@$(BUILD)/incode bench scale
 
 # The images of bare boards, what of a node's memory they take, and their checks.
 firmware: deps-test

@@ -33,8 +33,9 @@ void host_call_trim(size_t touched) {
     touched_here += touched;
     if (touched_here < call->scratch->step)
         return;
+    touched = touched_here;
     touched_here = 0;
-    host_scratch_trim(call->scratch);
+    host_scratch_trim(call->scratch, touched);
 }
 
 size_t host_call_share(void) {

@@ -44,8 +44,10 @@ static uint64_t resident(const struct host_scratch *s) {
     return strtoull(end, NULL, 10) * PAGE;
 }
 
+/* Arenas of triangulators, a quarter of the limit, are touched all the time. */
 static bool is_over(const struct host_scratch *s) {
-    return resident(s) > s->resident_max / 4 * 3;
+    return s->own ? s->since > s->resident_max / 2
+                  : resident(s) > s->resident_max / 4 * 3;
 }
 
 static int fail_over(const struct host_scratch *s, struct host_error *error) {
@@ -70,9 +72,10 @@ static void prepare(struct host_scratch *scratch, const char *directory,
     (void)pthread_mutex_init(&scratch->lock, NULL);
 }
 
-static int probe(const struct host_scratch *scratch, struct host_error *error) {
+static int probe(struct host_scratch *scratch, struct host_error *error) {
     int file = make_file(scratch->directory);
     if (file < 0) {
+        scratch->failure = errno;
         return host_fail(error, HOST_INPUT,
                          "%s: no scratch file can be made here (%s); give "
                          "another folder as --scratch DIR",
@@ -83,9 +86,12 @@ static int probe(const struct host_scratch *scratch, struct host_error *error) {
 }
 
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads,
+                       uint64_t resident_max, unsigned threads, bool own,
                        struct host_error *error) {
     prepare(scratch, directory, resident_max, threads);
+    scratch->own = own;
+    if (own)
+        return probe(scratch, error);
     scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     if (scratch->statm < 0) {
         return host_fail(error, HOST_BROKEN,
@@ -176,14 +182,21 @@ static void trim_small(struct host_scratch *s) {
 
 /* A thread that finds too much waits for the one that lets pages leave, and
  * touches no more in the meantime. */
-void host_scratch_trim(struct host_scratch *scratch) {
+void host_scratch_trim(struct host_scratch *scratch, size_t touched) {
+    if (scratch->own)
+        (void)atomic_fetch_add(&scratch->since, touched);
     if (scratch->pagemap < 0 && !is_over(scratch))
         return;
     (void)pthread_mutex_lock(&scratch->lock);
-    if (scratch->pagemap >= 0)
+    bool all_fit =
+        scratch->own && scratch->bytes < scratch->resident_max / 4 * 3;
+    if (scratch->pagemap >= 0) {
         trim_small(scratch);
-    else if (is_over(scratch)) /* still */
-        let_leave(scratch);
+    } else if (is_over(scratch)) { /* still */
+        if (!all_fit)
+            let_leave(scratch);
+        scratch->since = 0;
+    }
     (void)pthread_mutex_unlock(&scratch->lock);
 }
 
@@ -192,7 +205,7 @@ void host_scratch_ended(struct host_scratch *scratch, size_t touched) {
     if (before + touched < scratch->step)
         return;
     atomic_store(&scratch->touched, 0);
-    host_scratch_trim(scratch);
+    host_scratch_trim(scratch, before + touched);
 }
 
 /* --- arrays --------------------------------------------------------------- */

@@ -34,12 +34,13 @@ struct host_scratch_array {
 
 struct host_scratch {
     const char *directory;
-    uint64_t resident_max; /* bytes of this process */
+    uint64_t resident_max; /* bytes of this process, or of the call's own */
+    bool own;
     size_t array_min;      /* bytes of an array that becomes a file */
     uint64_t memory_first; /* bytes of arrays of the call that stay in memory
                               before any becomes a file */
     size_t step;           /* bytes that a thread touches between two looks */
-    int statm;             /* tells how much is resident */
+    int statm;             /* tells how much is resident; -1 with `own` */
     int pagemap;           /* and of these arrays; -1: is not asked */
     uint64_t resident_seen,
         trims;            /* then: the most, and how often pages left */
@@ -50,13 +51,16 @@ struct host_scratch {
     uint64_t wanted;           /* bytes that were not to be had, */
     int failure;               /* and errno; 0: there was no failure */
     _Atomic uint64_t touched;  /* by threads that have ended */
+    _Atomic uint64_t since;    /* with `own`: touched since pages left */
 };
 
-/* directory outlives the scratch.  HOST_INPUT: no file can be made there.
- * HOST_USAGE: this process has too much resident already, whatever is put
- * aside. */
+/* directory outlives the scratch.  own: the limit is of what the call has
+ * resident, in a process with other memory and other calls.  No kernel counts
+ * that, so pages leave after threads have touched half of the limit, the same
+ * pages perhaps.  HOST_INPUT: no file can be made there.  HOST_USAGE: this
+ * process has too much resident already, whatever is put aside. */
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads,
+                       uint64_t resident_max, unsigned threads, bool own,
                        struct host_error *error);
 /* The same for one thread of the simulation, in whose process nodes are, too:
  * pages of arrays count alone, nearly all arrays are files, and all their pages
@@ -74,8 +78,8 @@ uint64_t host_scratch_free(const struct host_scratch *scratch);
 bool host_scratch_in_memory(const struct host_scratch *scratch);
 
 /* Lets all arrays' pages leave where more than three quarters of the limit are
- * resident. */
-void host_scratch_trim(struct host_scratch *scratch);
+ * resident.  A thread has touched so many bytes since it called this. */
+void host_scratch_trim(struct host_scratch *scratch, size_t touched);
 
 /* Adds what a thread that ends has touched since it looked. */
 void host_scratch_ended(struct host_scratch *scratch, size_t touched);

@@ -12,6 +12,7 @@
 #include "bench_peers.h"
 #include "bench_links.h"
 #include "paper.h"
+#include "bench_scale.h"
 #include "bench_scaling.h"
 #include "host/base/options.h"
 #include "host/base/text.h"
@@ -215,6 +216,7 @@ struct arguments {
     const char *what; /* the benchmark */
     struct host_paper_options paper;
     struct host_bench_peers_options peers;
+    struct host_scale_options scale;
     uint64_t given;
 };
 
@@ -280,7 +282,16 @@ static const struct host_option rows[] = {
     {"nodes", 'n', "N", "Up to N nodes. Default: 256; or 64",
      HOST_AT(struct arguments, paper.nodes_max), .most = HOST_NODES_MAX,
      .powers = ""},
-    {.help = "Of paper, scaling and boards:"},
+    {.help = "Of scale:"},
+    {"sizes", 0, "LIST",
+     "Numbers of points, with commas between. Default: 1000000,10000000",
+     HOST_AT(struct arguments, scale.sizes)},
+    {"host-memory", 0, "SIZE", "The limit of every second run. Default: 200M",
+     HOST_AT(struct arguments, scale.memory)},
+    {"scratch", 0, "DIR",
+     "Folder for the files: 300 bytes a point. Default: $TMPDIR, else /tmp",
+     HOST_AT(struct arguments, scale.folder)},
+    {.help = "Of paper, scaling, scale and boards:"},
     {"csv", 0, "FILE", "All rows, as CSV",
      HOST_AT(struct arguments, paper.csv)},
     {"svg", 0, "FILE",
@@ -292,7 +303,8 @@ static const struct host_option rows[] = {
 static const struct host_options options = {
     .rows = rows,
     .argument = take_argument,
-    .arguments = "paper\nlinks\nboards\nscaling\npeers [DIRECTORY|FILE]...",
+    .arguments =
+        "paper\nlinks\nboards\nscaling\nscale\npeers [DIRECTORY|FILE]...",
     .about =
         "Measures this machine: paper prints Tables 1 to 7 and figure 11 of "
         "Cignoni, Laforenza, Perego, Scopigno and Montani (1995) beside the "
@@ -301,7 +313,9 @@ static const struct host_options options = {
         "tetrahedron costs each bare board, emulated, in instructions and "
         "bytes, and where they go; scaling, what a point costs from 1,000 to "
         "10,000,000 points, measured, and from 1 to 64 nodes, in virtual time; "
-        "peers, in the source tree, runs CGAL, TetGen, Qhull and HXT in turn "
+        "scale, the time, memory and scratch disk of a point from file to "
+        "file, without a limit of memory and within one; peers, in the source "
+        "tree, runs CGAL, TetGen, Qhull and HXT in turn "
         "with this program on points that it makes and on those given, and "
         "prints times, ratios and the goals of each class."};
 
@@ -318,15 +332,15 @@ static const char *other_option(const struct arguments *a) {
 
 /* Options and arguments that the benchmark has not. */
 static int check(const struct arguments *a, struct host_error *error) {
-    static const char *const all[] = {"paper", "links", "boards", "scaling",
-                                      "peers"};
+    static const char *const all[] = {"paper",   "links", "boards",
+                                      "scaling", "scale", "peers"};
     bool known = false, peers = strcmp(a->what, "peers") == 0;
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
         known = known || strcmp(a->what, all[i]) == 0;
     if (!known) {
         return host_fail(error, HOST_USAGE,
                          "bench %s: not in this version; allowed: paper, "
-                         "links, boards, scaling, peers",
+                         "links, boards, scaling, scale, peers",
                          a->what);
     }
     const char *other = other_option(a);
@@ -345,14 +359,16 @@ static int check(const struct arguments *a, struct host_error *error) {
 }
 
 int host_bench(int argc, char **argv, struct host_error *error) {
-    struct arguments a = {.peers = {.rounds = 3, .limit_s = 60}};
+    struct arguments a = {
+        .peers = {.rounds = 3, .limit_s = 60},
+        .scale = {.sizes = "1000000,10000000", .memory = "200M"}};
     if (host_options_parse(&options, argc, argv, false, &a, &a.given, error) !=
         0)
         return error->code;
     if (a.what == NULL) {
         return host_fail(error, HOST_USAGE,
                          "%s: too few arguments; give paper, links, boards, "
-                         "scaling or peers, see --help",
+                         "scaling, scale or peers, see --help",
                          argv[0]);
     }
     if (check(&a, error) != 0)
@@ -365,6 +381,11 @@ int host_bench(int argc, char **argv, struct host_error *error) {
     }
     if (strcmp(a.what, "peers") == 0)
         return host_bench_peers(&a.peers, error);
+    if (strcmp(a.what, "scale") == 0) {
+        a.scale.csv = a.paper.csv;
+        a.scale.svg = a.paper.svg;
+        return host_bench_scale(&a.scale, error);
+    }
     if (strcmp(a.what, "scaling") == 0) {
         struct host_scaling_options scaling = {a.paper.quick, a.paper.nodes_max,
                                                a.paper.csv, a.paper.svg};

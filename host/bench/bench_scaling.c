@@ -87,6 +87,9 @@ static void read_said(FILE *out, struct host_trial *t) {
     size_t i;
     t->tetrahedra = whole(said, "tetrahedra");
     t->pages = whole(said, "pages");
+    t->peak_bytes = whole(said, "host_peak_bytes");
+    t->scratch_bytes = whole(said, "scratch_bytes");
+    t->run_s = real(said, "time_total_s") - real(said, "time_verify_s");
     t->host_s = real(said, "host_triangulation_cpu_s");
     t->host_all_s = real(said, "host_cpu_s");
     t->cpu_s = real(said, "cpu_s");

@@ -70,7 +70,9 @@ struct host_trial {
     /* Of the host: what time_triangulation_s covers, and all, files apart. */
     double host_s, host_all_s;
     double wall_s;
-    double whole_s;  /* by the clock, from its start to its end */
+    double whole_s; /* by the clock, from its start to its end */
+    double run_s;   /* as it says, without its check */
+    uint64_t peak_bytes, scratch_bytes;
     char digest[80]; /* empty: it says none */
     char said[400];  /* the last line on standard error */
 };

@@ -46,6 +46,19 @@ typedef int host_tetrahedra_writer(struct host_output *out,
                                    const struct host_tetrahedra *tets,
                                    struct host_error *error);
 
+/* Of a file whose rows may come in blocks: it is the head, the count, the rows
+ * and the tail.  The count is written twice, at first as 0 and at last in the
+ * same place, each time in as many bytes. */
+struct host_row_writer {
+    void (*head)(struct host_output *out, const struct host_points *points);
+    /* width: that of the number, at least. */
+    void (*count)(struct host_output *out, uint64_t count, int width);
+    /* n rows, of which the first has the number `first`. */
+    void (*rows)(struct host_output *out, const uint32_t (*v)[4], uint64_t n,
+                 uint64_t first);
+    void (*tail)(struct host_output *out);
+};
+
 struct host_format {
     const char *name;
     /* With their dots, in lower case; a file may have them in either case, and
@@ -55,7 +68,8 @@ struct host_format {
     host_reader *read_points, *read_tetrahedra;
     host_points_writer *write_points;
     host_tetrahedra_writer *write_tetrahedra;
-    host_output_checker *check_output; /* of tetrahedra */
+    host_output_checker *check_output;  /* of tetrahedra */
+    const struct host_row_writer *rows; /* NULL: they do not come in blocks */
     /* Of the files that belong to an output of tetrahedra, and are written
      * beside it.  If it holds no points, the first has them, and its extension
      * is that of a format that reads points. */

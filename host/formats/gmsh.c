@@ -107,11 +107,8 @@ static int read_msh(const struct host_source *source, struct host_mesh *mesh,
                                   "cut short or no Gmsh mesh");
 }
 
-static int write_msh(struct host_output *out, struct host_output *beside,
-                     const struct host_points *points,
-                     const struct host_tetrahedra *tets,
-                     struct host_error *error) {
-    (void)beside;
+static void put_head(struct host_output *out,
+                     const struct host_points *points) {
     host_output_text(out, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n");
     host_output_unsigned(out, points->count);
     host_output_text(out, "\n");
@@ -122,15 +119,31 @@ static int write_msh(struct host_output *out, struct host_output *beside,
         host_output_text(out, "\n");
     }
     host_output_text(out, "$EndNodes\n$Elements\n");
-    host_output_unsigned(out, tets->count);
-    host_output_text(out, "\n");
-    for (uint64_t i = 0; i < tets->count; i++) {
-        host_output_unsigned(out, i + 1);
+}
+
+static void put_elements(struct host_output *out, const uint32_t (*v)[4],
+                         uint64_t n, uint64_t first) {
+    for (uint64_t i = 0; i < n; i++) {
+        host_output_unsigned(out, first + i + 1);
         host_output_text(out, " 4 2 1 1");
-        host_put_row(out, tets->v[i], 4, 1);
+        host_put_row(out, v[i], 4, 1);
         host_output_text(out, "\n");
     }
+}
+
+static void put_tail(struct host_output *out) {
     host_output_text(out, "$EndElements\n");
+}
+
+static const struct host_row_writer msh_rows = {put_head, host_put_count,
+                                                put_elements, put_tail};
+
+static int write_msh(struct host_output *out, struct host_output *beside,
+                     const struct host_points *points,
+                     const struct host_tetrahedra *tets,
+                     struct host_error *error) {
+    (void)beside;
+    host_put_rows(out, &msh_rows, points, tets);
     return error->code;
 }
 
@@ -140,4 +153,5 @@ const struct host_format host_format_msh = {
     .read_tetrahedra = read_msh,
     .pieces = true,
     .write_tetrahedra = write_msh,
+    .rows = &msh_rows,
 };

@@ -68,11 +68,8 @@ static int read_mesh(const struct host_source *source, struct host_mesh *mesh,
                                   "is cut short or no mesh of them");
 }
 
-static int write_mesh(struct host_output *out, struct host_output *beside,
-                      const struct host_points *points,
-                      const struct host_tetrahedra *tets,
-                      struct host_error *error) {
-    (void)beside;
+static void put_head(struct host_output *out,
+                     const struct host_points *points) {
     host_output_text(out, "MeshVersionFormatted 2\nDimension 3\nVertices\n");
     host_output_unsigned(out, points->count);
     host_output_text(out, "\n");
@@ -81,16 +78,33 @@ static int write_mesh(struct host_output *out, struct host_output *beside,
         host_output_text(out, " 0\n");
     }
     host_output_text(out, "Tetrahedra\n");
-    host_output_unsigned(out, tets->count);
-    host_output_text(out, "\n");
-    for (uint64_t i = 0; i < tets->count; i++) {
+}
+
+static void put_tetrahedra(struct host_output *out, const uint32_t (*v)[4],
+                           uint64_t n, uint64_t first) {
+    (void)first;
+    for (uint64_t i = 0; i < n; i++) {
         for (int k = 0; k < 4; k++) {
-            host_output_unsigned(out, tets->v[i][k] + UINT64_C(1));
+            host_output_unsigned(out, v[i][k] + UINT64_C(1));
             host_output_text(out, " ");
         }
         host_output_text(out, "0\n");
     }
+}
+
+static void put_tail(struct host_output *out) {
     host_output_text(out, "End\n");
+}
+
+static const struct host_row_writer mesh_rows = {put_head, host_put_count,
+                                                 put_tetrahedra, put_tail};
+
+static int write_mesh(struct host_output *out, struct host_output *beside,
+                      const struct host_points *points,
+                      const struct host_tetrahedra *tets,
+                      struct host_error *error) {
+    (void)beside;
+    host_put_rows(out, &mesh_rows, points, tets);
     return error->code;
 }
 
@@ -100,4 +114,5 @@ const struct host_format host_format_mesh = {
     .read_tetrahedra = read_mesh,
     .pieces = true,
     .write_tetrahedra = write_mesh,
+    .rows = &mesh_rows,
 };

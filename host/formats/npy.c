@@ -255,15 +255,38 @@ static void write_points(struct host_output *out,
     host_put_doubles(out, points->xyz, 3 * (size_t)points->count);
 }
 
+static void put_nothing(struct host_output *out) {
+    (void)out;
+}
+
+static void put_no_points(struct host_output *out,
+                          const struct host_points *points) {
+    (void)out;
+    (void)points;
+}
+
+/* It has 128 bytes, whatever the count. */
+static void put_shape(struct host_output *out, uint64_t count, int width) {
+    (void)width;
+    write_header(out, "<u4", count, 4);
+}
+
+static void put_rows(struct host_output *out, const uint32_t (*v)[4],
+                     uint64_t n, uint64_t first) {
+    (void)first;
+    if (n > 0)
+        host_put_words(out, v[0], 4 * (size_t)n);
+}
+
+static const struct host_row_writer npy_rows = {put_no_points, put_shape,
+                                                put_rows, put_nothing};
+
 static int write_tetrahedra(struct host_output *out, struct host_output *beside,
                             const struct host_points *points,
                             const struct host_tetrahedra *tets,
                             struct host_error *error) {
     (void)beside;
-    (void)points;
-    write_header(out, "<u4", tets->count, 4);
-    if (tets->count > 0)
-        host_put_words(out, tets->v[0], 4 * (size_t)tets->count);
+    host_put_rows(out, &npy_rows, points, tets);
     return error->code;
 }
 
@@ -275,5 +298,6 @@ const struct host_format host_format_npy = {
     .pieces = true,
     .write_points = write_points,
     .write_tetrahedra = write_tetrahedra,
+    .rows = &npy_rows,
     .rows_only = true,
 };

@@ -303,7 +303,9 @@ static void put_out(struct host_output *out, const char *bytes, size_t size) {
         ssize_t n = write(out->file, bytes + done, size - done);
         if (n >= 0) {
             done += (size_t)n;
-            host_progress_add((uint64_t)n);
+            out->written += (uint64_t)n;
+            if (!out->silent)
+                host_progress_add((uint64_t)n);
         } else if (errno != EINTR) {
             out->failure = errno;
         }
@@ -333,6 +335,12 @@ void host_output_bytes(struct host_output *out, const void *bytes, size_t n) {
         if (out->used == BUFFER_BYTES)
             flush(out);
     }
+}
+
+void host_output_return(struct host_output *out, uint64_t place) {
+    flush(out);
+    if (out->failure == 0 && lseek(out->file, (off_t)place, SEEK_SET) < 0)
+        out->failure = errno;
 }
 
 void host_output_unsigned(struct host_output *out, uint64_t value) {

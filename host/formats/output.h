@@ -8,6 +8,7 @@
 #ifndef HOST_OUTPUT_H
 #define HOST_OUTPUT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -21,9 +22,11 @@ struct host_output {
     const char *path;       /* as the user gave it */
     struct host_part *part; /* NULL: in place (a device, standard output) */
     int file;
-    int failure; /* errno of the first write that failed */
+    int failure;      /* errno of the first write that failed */
+    uint64_t written; /* bytes, beside those in the buffer */
     size_t used;
     char *buffer;
+    bool silent; /* it is no part of the progress that is shown */
 };
 
 /* Lets a signal that ends the program (interrupt, termination, hang-up) remove
@@ -60,6 +63,13 @@ void host_output_unsigned(struct host_output *out, uint64_t value);
 static inline void host_output_text(struct host_output *out, const char *text) {
     host_output_bytes(out, text, strlen(text)); /* known of most, here */
 }
+
+/* Where the next byte goes, and the way back there to write other bytes in the
+ * place of as many: of a file that is written beside its name (part). */
+static inline uint64_t host_output_place(const struct host_output *out) {
+    return out->written + out->used;
+}
+void host_output_return(struct host_output *out, uint64_t place);
 
 /* Ends the writing of n outputs; where one of them is not whole or error->code
  * is not 0, removes their parts.  Returns error->code. */

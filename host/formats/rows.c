@@ -492,6 +492,22 @@ void host_put_xyz(struct host_output *out, const double *xyz) {
     }
 }
 
+void host_put_count(struct host_output *out, uint64_t count, int width) {
+    char text[40];
+    (void)snprintf(text, sizeof text, "%*llu\n", width,
+                   (unsigned long long)count);
+    host_output_text(out, text);
+}
+
+void host_put_rows(struct host_output *out, const struct host_row_writer *rows,
+                   const struct host_points *points,
+                   const struct host_tetrahedra *tets) {
+    rows->head(out, points);
+    rows->count(out, tets->count, 0);
+    rows->rows(out, (const uint32_t(*)[4])tets->v, tets->count, 0);
+    rows->tail(out);
+}
+
 void host_put_row(struct host_output *out, const uint32_t *v, int n,
                   uint64_t base) {
     for (int k = 0; k < n; k++) {

@@ -31,6 +31,16 @@ void host_put_line(struct host_output *out, const char *before, uint64_t number,
  * these; at most 17 digits. */
 void host_put_xyz(struct host_output *out, const double *xyz);
 
+/* A number of at least so many digits or blanks, and the end of the line: the
+ * count of a host_row_writer. */
+void host_put_count(struct host_output *out, uint64_t count, int width);
+
+/* What a format with `rows` writes of tetrahedra that are all there: a
+ * host_tetrahedra_writer calls it. */
+void host_put_rows(struct host_output *out, const struct host_row_writer *rows,
+                   const struct host_points *points,
+                   const struct host_tetrahedra *tets);
+
 /* n numbers, each plus base and with a blank before it. */
 void host_put_row(struct host_output *out, const uint32_t *v, int n,
                   uint64_t base);

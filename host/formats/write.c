@@ -143,6 +143,43 @@ int host_write(const char *path, const char *input,
     return host_output_close(out, opened, error);
 }
 
+/* --- blocks --------------------------------------------------------------- */
+
+enum { COUNT_WIDTH = 12 }; /* of a number of tetrahedra */
+
+bool host_rows_can(const char *path) {
+    const struct host_format *f = host_format_of(path, HOST_WRITE_TETRAHEDRA);
+    struct stat status;
+    return f != NULL && f->rows != NULL && strcmp(path, "-") != 0 &&
+           (stat(path, &status) != 0 || S_ISREG(status.st_mode));
+}
+
+int host_rows_open(struct host_row_output *rows, const char *path,
+                   const struct host_points *points, struct host_error *error) {
+    *rows = (struct host_row_output){
+        .format = host_format_of(path, HOST_WRITE_TETRAHEDRA)};
+    if (host_output_open(&rows->out, path, error) != 0)
+        return error->code;
+    rows->out.silent = true;
+    rows->format->rows->head(&rows->out, points);
+    rows->place = host_output_place(&rows->out);
+    rows->format->rows->count(&rows->out, 0, COUNT_WIDTH);
+    return 0;
+}
+
+void host_rows_put(struct host_row_output *rows, const uint32_t (*v)[4],
+                   uint64_t count) {
+    rows->format->rows->rows(&rows->out, v, count, rows->count);
+    rows->count += count;
+}
+
+int host_rows_close(struct host_row_output *rows, struct host_error *error) {
+    rows->format->rows->tail(&rows->out);
+    host_output_return(&rows->out, rows->place);
+    rows->format->rows->count(&rows->out, rows->count, COUNT_WIDTH);
+    return host_output_close(&rows->out, 1, error);
+}
+
 /* --- target --------------------------------------------------------------- */
 
 bool host_is_file(const struct stat *file, const char *name) {

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <sys/stat.h>
 
+#include "host/formats/output.h"
 #include "host/mesh/points.h"
 #include "host/mesh/tetrahedra.h"
 #include "host/base/error.h"
@@ -33,6 +34,25 @@ int host_points_write_as(const char *path, const char *format,
 int host_write(const char *path, const char *input,
                const struct host_points *points,
                const struct host_tetrahedra *tets, struct host_error *error);
+
+/* The same in blocks, as tetrahedra are made, in a format of which the count
+ * can be written last. */
+struct host_format;
+
+struct host_row_output {
+    struct host_output out;
+    const struct host_format *format;
+    uint64_t count, place; /* rows; where their count stands */
+};
+
+/* Whether `path` is such an output: it is a file, as yet or by now. */
+bool host_rows_can(const char *path);
+int host_rows_open(struct host_row_output *rows, const char *path,
+                   const struct host_points *points, struct host_error *error);
+/* By one thread at a time. */
+void host_rows_put(struct host_row_output *rows, const uint32_t (*v)[4],
+                   uint64_t count);
+int host_rows_close(struct host_row_output *rows, struct host_error *error);
 
 /* Whether `name`, a file beside an output, is `input` in the same format, so
  * that it has the points already.  input: NULL is none. */

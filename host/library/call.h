@@ -3,7 +3,9 @@
 #ifndef HOST_LIBRARY_CALL_H
 #define HOST_LIBRARY_CALL_H
 
+#include "delaunay.h"
 #include "host/base/parallel.h"
+#include "host/mesh/order.h"
 
 #pragma GCC visibility push(default)
 #include "incode.h"
@@ -33,5 +35,13 @@ bool library_options(const struct incode_options **options,
 enum incode_status library_call(struct library_call *call,
                                 const struct incode_options *options,
                                 uint64_t useful);
+
+/* Orders points for host_direct_run.  What a failure means; the call may be
+ * cancelled as well. */
+enum incode_status library_order(struct host_order *order, const double *xyz,
+                                 uint64_t rows, struct host_error *error);
+
+/* What an outcome of host_direct_run means. */
+enum incode_status library_direct(enum host_direct outcome);
 
 #endif

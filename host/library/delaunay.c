@@ -84,6 +84,33 @@ static void add_statistics(struct incode_statistics *to,
                                 : before.memory_high_water;
 }
 
+static bool has_sink(const struct direct *run) {
+    const struct host_direct_sums *sums = run->common->sums;
+    return run->level == 0 && sums != NULL && sums->sink.put != NULL;
+}
+
+/* Gives the rows of a thread's list to the sink, if there is one. */
+static void pour(const struct direct *run, struct host_tetrahedra *tets) {
+    enum { BLOCK = 1 << 12, TOUCHED = 40 /* bytes a row */ };
+    struct host_direct_sums *sums = run->common->sums;
+    if (!has_sink(run))
+        return;
+    const uint32_t *row = sums->by_vertex ? NULL : run->order->row;
+    for (uint64_t i = 0; i < tets->count && !host_call_cancelled();) {
+        uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
+        host_tetrahedra_canonical(tets->v + i, n, row);
+        host_call_trim((size_t)n * TOUCHED);
+        (void)pthread_mutex_lock(&run->common->pouring);
+        if (!host_call_cancelled())
+            sums->sink.put(sums->sink.context,
+                           (const uint32_t(*)[4])tets->v + i, n);
+        (void)pthread_mutex_unlock(&run->common->pouring);
+        i += n;
+    }
+    sums->part[tets - run->tets].poured += tets->count;
+    host_tetrahedra_cut(tets, 0);
+}
+
 static void work(void *context, unsigned part) {
     struct direct *run = context;
     struct direct_worker w = {.run = run,
@@ -111,12 +138,18 @@ static void work(void *context, unsigned part) {
      * is touched. */
     if (w.call == NULL || w.call->memory_max == UINT64_MAX)
         (void)host_tetrahedra_room(
-            w.tets, (uint64_t)EXPECTED * run->order->points / run->threads,
+            w.tets,
+            (uint64_t)EXPECTED * run->order->points /
+                (has_sink(run) ? run->order->regions : run->threads),
             &w.error);
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
-           (region = atomic_fetch_add(&run->regions, 1)) < run->order->regions)
+           (region = atomic_fetch_add(&run->regions, 1)) <
+               run->order->regions) {
         direct_region(&w, region);
+        if (run->outcome == HOST_DIRECT_DONE)
+            pour(run, w.tets);
+    }
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
         add_statistics(&p->statistics, w.t);
@@ -307,6 +340,7 @@ static void sift(void *context, unsigned part) {
             v++;
             host_tetrahedra_keep(to, 1);
         }
+        pour(s->run, to);
     }
 }
 
@@ -445,7 +479,8 @@ static enum host_direct run_order(struct direct_call *common,
     if (outcome == HOST_DIRECT_DONE && run.mark != NULL)
         outcome = close_seams(&run);
     for (unsigned i = 0; i < threads && sums != NULL; i++)
-        sums->part[i].statistics.tetrahedra_kept = list[i].count;
+        sums->part[i].statistics.tetrahedra_kept =
+            list[i].count + sums->part[i].poured;
     if (outcome == HOST_DIRECT_DONE &&
         host_tetrahedra_join(
             list, threads, sums != NULL && sums->by_vertex ? NULL : order->row,
@@ -469,8 +504,10 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_error *error) {
     struct direct_call common = {.sums = sums,
                                  .store = sums == NULL ? NULL : sums->store,
-                                 .error = error};
+                                 .error = error,
+                                 .pouring = PTHREAD_MUTEX_INITIALIZER};
     enum host_direct outcome = run_order(&common, order, 0, 0, true, tets);
+    (void)pthread_mutex_destroy(&common.pouring);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;

@@ -34,8 +34,8 @@ enum incode_status {
     INCODE_TOO_FEW,      /* fewer than four distinct points */
     INCODE_FLAT,         /* all points on one plane or line */
     INCODE_TOO_MANY,     /* too many points or tetrahedra: see below */
-    INCODE_IO,           /* kept for streams: no function returns it */
-    INCODE_CANCELLED,    /* `progress` returned false */
+    INCODE_IO,           /* incode_stream: the scratch folder's disk failed */
+    INCODE_CANCELLED,    /* `progress` or another callback returned false */
     INCODE_INTERNAL      /* a defect: please report */
 };
 
@@ -146,6 +146,65 @@ incode_adjacency(uint64_t points, const struct incode_tetrahedra *t,
 
 /* Frees the lists and clears `a`.  NULL is accepted. */
 void incode_adjacency_free(struct incode_adjacency *a);
+
+/* Where incode_stream gets points and puts tetrahedra.  The call calls one of
+ * these at a time, from the calling thread or from another thread of the call,
+ * which blocks all signals.  If one returns false, the call ends with
+ * INCODE_CANCELLED, and calls none of them again.  No exception or longjmp may
+ * leave them. */
+struct incode_callbacks {
+    /* Writes x, y, z of the next points, at most `room`, to xyz[3 * room], and
+     * how many to *count; 0: there are no more.  Points have the row numbers 0,
+     * 1, ... as they come. */
+    bool (*points)(void *context, double *xyz, size_t room, size_t *count);
+    /* Takes `count` tetrahedra.  The array is valid until it returns. */
+    bool (*tetrahedra)(void *context, const uint32_t (*vertex)[4],
+                       size_t count);
+    /* Takes rows that repeat a point, each with the lowest row of that point.
+     * NULL: they are counted only. */
+    bool (*duplicates)(void *context, const uint32_t (*duplicate)[2],
+                       size_t count);
+    void *context;
+    const char *scratch; /* folder of what is put aside; NULL: /tmp */
+    void *reserved[4];   /* NULL */
+};
+
+struct incode_totals {
+    uint64_t points;
+    uint64_t count; /* tetrahedra */
+    uint64_t duplicate_count;
+    uint64_t scratch_max; /* bytes that were put aside at a time, at most */
+    uint64_t at;          /* of INCODE_NOT_FINITE: the row */
+    int error;            /* of INCODE_IO: the errno of the file system */
+    void *reserved[4];
+};
+
+/* Triangulates points that come from a callback, and gives the tetrahedra to
+ * another as they are found: blocks of at most 4,096, in no order, each
+ * tetrahedron once.  Together, and sorted, they are the rows of
+ * incode_delaunay, and each row is oriented and rotated as there.  If the call
+ * fails, the tetrahedra that were given are some of the result's.
+ *
+ * options->memory_max: bytes that the call has resident at most, stacks of
+ * threads and what the callbacks use apart; 16 MiB or more (less:
+ * INCODE_NO_MEMORY).  The rest is put aside in files without a name in the
+ * scratch folder, which are gone when the call ends, however it ends.  Each
+ * thread takes 16 MiB of the limit, so there may be fewer than
+ * options->threads.  The limit is of this call alone: other memory of the
+ * process, and other calls at the same time, which each have a limit of their
+ * own, do not count.  The kernel's cache of files does not count either.
+ * 0: no limit, and nothing is put aside.  options->flags must be 0.
+ *
+ * `out` need not be initialised; it owns no memory.  On an error only `at` and
+ * `error` in it have a meaning.  Limits as of incode_delaunay.
+ *
+ * Memory without a limit: about 110 bytes a point.  Scratch with one: about 120
+ * bytes a point, and up to 60 files that are open at once.  Work: as of
+ * incode_delaunay, without the sort. */
+enum incode_status
+incode_stream(const struct incode_callbacks *callbacks,
+              const struct incode_options *options, /* or NULL */
+              struct incode_totals *out /* or NULL */);
 
 /* A sentence without its period, in static memory, also for a value that is not
  * a status. */

@@ -215,42 +215,49 @@ static enum incode_status list_duplicates(struct work *w) {
 
 /* --- all together --------------------------------------------------------- */
 
-static enum incode_status make_order(struct work *w) {
+enum incode_status library_order(struct host_order *order, const double *xyz,
+                                 uint64_t rows, struct host_error *error) {
     static const enum incode_status status[] = {
         [HOST_ORDER_SOUND] = INCODE_NO_MEMORY,
         [HOST_ORDER_FEW] = INCODE_TOO_FEW,
         [HOST_ORDER_FLAT] = INCODE_FLAT,
         [HOST_ORDER_MANY] = INCODE_TOO_MANY};
+    if (rows < 4)
+        return INCODE_TOO_FEW;
+    return host_order_make(order, "points", xyz, rows, HOST_ADAPTIVE,
+                           host_direct_regions(host_threads(), rows), false,
+                           error) == 0
+               ? INCODE_OK
+               : status[order->fault];
+}
+
+static enum incode_status make_order(struct work *w) {
     uint64_t row = find_infinite(w->xyz, w->rows);
     if (row < w->rows) {
         w->out->at = row;
         return INCODE_NOT_FINITE;
     }
-    if (w->rows < 4)
-        return INCODE_TOO_FEW;
-    return host_order_make(&w->order, "points", w->xyz, w->rows, HOST_ADAPTIVE,
-                           host_direct_regions(w->call.host.threads, w->rows),
-                           false, &w->error) == 0
-               ? INCODE_OK
-               : status[w->order.fault];
+    return library_order(&w->order, w->xyz, w->rows, &w->error);
+}
+
+enum incode_status library_direct(enum host_direct outcome) {
+    static const enum incode_status status[] = {
+        [HOST_DIRECT_DONE] = INCODE_OK,
+        [HOST_DIRECT_CANCELLED] = INCODE_CANCELLED,
+        [HOST_DIRECT_MEMORY] = INCODE_NO_MEMORY,
+        [HOST_DIRECT_BROKEN] = INCODE_INTERNAL,
+        [HOST_DIRECT_UNKEPT] = INCODE_INTERNAL}; /* there is no store */
+    return status[outcome];
 }
 
 static enum incode_status triangulate(struct work *w) {
     enum incode_status status = make_order(w);
     w->call.host.phases = 1;
+    if (status == INCODE_OK)
+        status = library_direct(
+            host_direct_run(&w->order, &w->tets, NULL, &w->error));
     if (status != INCODE_OK)
         return status;
-    switch (host_direct_run(&w->order, &w->tets, NULL, &w->error)) {
-    case HOST_DIRECT_DONE:
-        break;
-    case HOST_DIRECT_CANCELLED:
-        return INCODE_CANCELLED;
-    case HOST_DIRECT_MEMORY:
-        return INCODE_NO_MEMORY;
-    case HOST_DIRECT_BROKEN:
-    case HOST_DIRECT_UNKEPT: /* there is no store */
-        return INCODE_INTERNAL;
-    }
     w->call.host.phases = 2;
     status = list_duplicates(w);
     host_order_free(&w->order);
@@ -343,7 +350,8 @@ const char *incode_status_text(enum incode_status status) {
         [INCODE_FLAT] = "all points lie on one plane or line",
         [INCODE_TOO_MANY] = "there are more points or tetrahedra than numbers "
                             "of 32 bits allow",
-        [INCODE_IO] = "a file or stream cannot be read or written",
+        [INCODE_IO] = "the scratch folder cannot take what is put aside; free "
+                      "some of its disk, or give another",
         [INCODE_CANCELLED] = "the caller has cancelled",
         [INCODE_INTERNAL] = "the library has a defect; please report it with "
                             "the points"};

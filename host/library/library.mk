@@ -4,7 +4,7 @@ library      := $(call files,incode host/library) transport/text.c \
 	boards/processor/processor.c $(patsubst %,host/%.c, \
 	base/error base/memory base/parallel base/scratch base/text \
 	mesh/adjacency mesh/duplicates mesh/kd_build mesh/lift mesh/order \
-	mesh/sort mesh/spill mesh/tetrahedra)
+	mesh/points mesh/sort mesh/spill mesh/tetrahedra)
 
 $(library:%.c=$(obj)/%.o): private BASE += -fPIC -fvisibility=hidden
 # Its code of each level in place of that of one.

@@ -23,6 +23,7 @@ struct direct_call {
     struct host_direct_sums *sums;         /* or NULL */
     const struct host_direct_store *store; /* or NULL */
     struct host_error *error;
+    pthread_mutex_t pouring; /* held while the sink takes rows */
     /* What the triangulators of threads work in; NULL: nothing yet. */
     void *arena[HOST_THREADS_MAX];
     size_t bytes[HOST_THREADS_MAX];
@@ -35,7 +36,8 @@ struct direct {
     struct host_tetrahedra *tets; /* [threads] */
     struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
     uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    unsigned level;               /* 0: its bricks count, for who watches */
+    unsigned level; /* 0: its bricks count, for who watches, and its
+                       tetrahedra go to the sink */
     const struct host_direct_store *store; /* or NULL */
     uint64_t key;                          /* then: of the order */
     unsigned threads;

@@ -258,6 +258,15 @@ static void sort_rows(void *argument) {
     flag_sort(s->v, s->n, digit, bits);
 }
 
+void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n,
+                               const uint32_t *map) {
+    for (uint64_t i = 0; i < n; i++) {
+        for (int k = 0; k < 4 && map != NULL; k++)
+            v[i][k] = map[v[i][k]];
+        canonical(v[i]);
+    }
+}
+
 struct canon {
     struct host_tetrahedra *tets;
     bool as_is;

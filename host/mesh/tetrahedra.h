@@ -43,6 +43,12 @@ void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map);
 int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
                          const uint32_t *map, struct host_error *error);
 
+/* Replaces every vertex number by map[vertex], if map is not NULL, and turns
+ * each of n rows so that its smallest vertex comes first, then the smallest
+ * that an even permutation allows. */
+void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n,
+                               const uint32_t *map);
+
 /* Gives back what is mapped beyond the rows. */
 void host_tetrahedra_trim(struct host_tetrahedra *tets);
 

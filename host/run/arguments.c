@@ -86,6 +86,12 @@ static const char *partition_name(unsigned i) {
     return host_partitions[i];
 }
 
+static const char *order_name(unsigned i) {
+    static const char *const names[] = {
+        [HOST_CANONICAL] = "canonical", [HOST_AS_MADE] = "as-made", NULL};
+    return names[i];
+}
+
 static const char *index_name(unsigned i) {
     return host_indexes[i];
 }
@@ -211,6 +217,14 @@ static const struct host_option rows[] = {
      "of a cube. Default: one a processor",
      HOST_AT(struct host_run_options, threads), .least = 1,
      .most = HOST_THREADS_MAX},
+    {"order", 0, "NAME",
+     "Tetrahedra in ascending order (canonical, the default), the same bytes "
+     "whatever made them, or as they were made (as-made), which saves the "
+     "sort. As made they have no digest; incode digest FILE makes it. .npy, "
+     ".msh and .mesh are written while threads triangulate, without --verify "
+     "and --stats; other outputs, and those of a cube, whose bricks a lost "
+     "node may change, at the end",
+     HOST_AT(struct host_run_options, row_order), .names = order_name},
     HOST_LIMITS_ROWS(struct host_run_options, limits.memory, limits.folder),
     {"resume", 0, "DIR",
      "Keep the run's state in DIR, which is made if it is not there. After a "

@@ -135,7 +135,10 @@ void host_report_run(FILE *file, const struct host_run_options *options,
     host_say(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
              (unsigned long long)r->points,
              r->duplicates > 0 ? "distinct " : "",
-             (unsigned long long)r->tetrahedra, r->digest.text);
+             (unsigned long long)r->tetrahedra,
+             options->row_order == HOST_AS_MADE
+                 ? "in the order in which they were made, so without a digest"
+                 : r->digest.text);
     if (r->duplicates > 0) {
         fprintf(file,
                 "%llu of %llu points are duplicates; each stands for its "
@@ -303,7 +306,10 @@ static json_t *run_object(const struct host_run_result *r) {
     put(o, "negative_zeros", r->negative_zeros);
     put(o, "tetrahedra", r->tetrahedra);
     put(o, "hull_facets", r->hull_facets);
-    put_text(o, "digest", r->digest.text);
+    if (r->digest.text[0] != '\0')
+        put_text(o, "digest", r->digest.text);
+    else
+        json_object_set_new(o, "digest", json_null()); /* as made */
     put_text(o, "strategy", r->strategy->name);
     put_text(o, "strategy_why", r->why);
     put_text(o, "partition", host_partitions[r->partition]);

@@ -17,6 +17,7 @@
 #include "host/formats/read.h"
 #include "host/service/strategies/strategies.h"
 #include "node/node.h"
+#include "as_made.h"
 #include "choose.h"
 #include "report.h"
 #include "state.h"
@@ -392,7 +393,8 @@ static int check_claims(const struct host_run_options *options,
 
 static int check_outputs(const struct host_run_options *options,
                          struct host_error *error) {
-    if (check_claims(options, error) != 0)
+    if (check_claims(options, error) != 0 ||
+        host_as_made_check(options, error) != 0)
         return error->code;
     if (options->stats != NULL && strcmp(options->stats, "-") != 0 &&
         host_write_probe(options->stats, NULL, error) != 0)
@@ -441,6 +443,12 @@ static int finish(const struct host_run_options *options,
     struct digest digest = {.tets = tets, .digest = &result->digest};
     struct host_fork fork;
     uint64_t start = host_now_us();
+    if (options->row_order == HOST_AS_MADE) {
+        bool is_done = host_as_made_end(tets, result, error);
+        result->host_cpu_s += used_seconds(CLOCK_PROCESS_CPUTIME_ID);
+        return is_done ? error->code
+                       : write_outputs(options, points, tets, result, error);
+    }
     host_progress_phase("sorting", NULL);
     host_tetrahedra_sort(tets);
     result->host_cpu_s += used_seconds(CLOCK_PROCESS_CPUTIME_ID);
@@ -679,6 +687,8 @@ static int triangulate(const struct host_run_options *options,
     sums.committed = show_progress;
     sums.by_vertex = is_checked_in_order(options);
     sums.store = host_state_store(options->state);
+    if (host_as_made_begin(options, points, &sums, error) != 0)
+        return error->code;
     if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
         return error->code;
     take_sums(&sums, r);
@@ -696,23 +706,20 @@ static int host_triangulate_direct(const struct host_run_options *options,
                                    struct host_run_result *result,
                                    struct host_error *error) {
     struct host_order order = {0};
-    struct timespec used;
     result->strategy = &strategy_direct;
     result->partition = HOST_ADAPTIVE;
     result->index = INCODE_KD;
     result->link = &link_memory;
     result->board = host_board_row(0);
     uint64_t start = host_now_us();
-    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
-    double before_s = (double)used.tv_sec + 1e-9 * (double)used.tv_nsec;
+    double before_s = used_seconds(CLOCK_PROCESS_CPUTIME_ID);
     int status = triangulate(options, points, tets, &order, result, error);
     status = host_state_order_kept(options->state, error);
     host_order_free(&order);
     result->time_triangulation_s =
         1e-6 * (double)(host_now_us() - start) - result->time_verify_s;
-    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
     result->host_triangulation_cpu_s =
-        (double)used.tv_sec + 1e-9 * (double)used.tv_nsec - before_s;
+        used_seconds(CLOCK_PROCESS_CPUTIME_ID) - before_s;
     result->tetrahedra = tets->count;
     return status == 0 && !is_checked_in_order(options)
                ? check(options, points, NULL, tets, result, error)

@@ -21,6 +21,10 @@ enum { HOST_OUTPUTS_MAX = 16 };
 
 struct host_run_result;
 
+/* Of the tetrahedra in the outputs: that of their digest, or as they were made,
+ * which has none. */
+enum host_row_order { HOST_CANONICAL, HOST_AS_MADE };
+
 struct host_run_options {
     const char *input;
     const char *format; /* of the input, for host_format_told; NULL: by name */
@@ -50,6 +54,7 @@ struct host_run_options {
     const char *resume;       /* a folder for the run's state, or NULL */
     struct host_state *state; /* what is in it (state.h); NULL: none */
     enum host_verifying verifying;
+    enum host_row_order row_order;
     bool quiet, table, map;
     bool explain;            /* print why `auto` chose the strategy */
     bool progress, anywhere; /* on a terminal; also without one */

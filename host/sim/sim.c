@@ -257,7 +257,7 @@ static int check_memory(struct host_sim_run *r, struct host_error *error) {
     struct host_scratch *s = r->call.scratch;
     if (s == NULL)
         return 0;
-    host_scratch_trim(s);
+    host_scratch_trim(s, 0);
     return s->resident_seen <= s->resident_max
                ? 0
                : host_fail(error, HOST_BROKEN,

@@ -47,6 +47,7 @@ example() { # LANGUAGE NUMBER FILE
 }
 example c 1 "$scratch/ten.c"
 example c 2 "$scratch/where.c"
+example c 3 "$scratch/stream.c"
 example cpp 1 "$scratch/surface.cpp"
 # shellcheck disable=SC2046
 succeeds 'install/an example in C' gcc -std=c11 -Wall -Wextra -Werror \
@@ -63,6 +64,12 @@ printf 'query %s\n' '0 is in tetrahedron 0' '1 is in tetrahedron 1' \
 echo 'point 0 has neighbours 1 2 3' >> "$scratch/expected"
 check 'install/what it finds' "$(xargs < "$scratch/answers")" \
     cmp -s "$scratch/answers" "$scratch/expected"
+# shellcheck disable=SC2046
+succeeds 'install/an example of streams' gcc -std=c11 -Wall -Wextra -Werror \
+    "$scratch/stream.c" $(pkg-config --cflags --libs incode) -o "$scratch/streams"
+check 'install/its blocks' 'not all tetrahedra, or none' \
+    grep -qE '^100000 points, 67[0-9]{4} tetrahedra, all seen$' \
+    <("$scratch/streams")
 if command -v g++ > "$scratch/where"; then
     # shellcheck disable=SC2046
     succeeds 'install/an example in C++' g++ -Wall -Wextra -Werror \
