@@ -93,10 +93,8 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                          "limit of memory out",
                          strerror(errno));
     }
-    if (is_over(scratch))
+    if (probe(scratch, error) == 0 && resident(scratch) > resident_max / 8 * 7)
         fail_over(scratch, error);
-    else
-        probe(scratch, error);
     if (error->code != 0)
         (void)close(scratch->statm);
     return error->code;
