@@ -59,7 +59,7 @@ check 'memory_cube/a node killed: it was lost' "$(jq -c .node_restarts "$stats")
 
 cut_files() {
     local file
-    for file in /proc/$host/fd/*; do
+    for file in /proc/"$host"/fd/*; do
         [[ $(readlink "$file") != *incode-scratch* ]] || truncate -s 0 "$file"
     done
 }
