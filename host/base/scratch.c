@@ -50,12 +50,12 @@ static bool is_over(const struct host_scratch *s) {
 
 static int fail_over(const struct host_scratch *s, struct host_error *error) {
     const uint64_t mb = 1 << 20;
-    uint64_t here = resident(s) / mb + 1;
+    uint64_t here = resident(s) / mb + 1, enough = 2 * here;
     return host_fail(error, HOST_USAGE,
                      "--host-memory %lluM: this process takes %lluM before it "
                      "has read a point, libraries included; give %lluM or more",
                      (unsigned long long)(s->resident_max / mb),
-                     (unsigned long long)here, (unsigned long long)(2 * here));
+                     (unsigned long long)here, (unsigned long long)enough);
 }
 
 static void prepare(struct host_scratch *scratch, const char *directory,
