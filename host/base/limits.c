@@ -88,6 +88,7 @@ static void on_fault(int number) {
 
 static int begin_scratch(const char *folder, uint64_t memory, unsigned threads,
                          struct host_error *error) {
+    const struct sigaction action = {.sa_handler = on_fault};
     uint64_t most = memory / HOST_RESIDENT_MIN;
     /* Each takes as much as one does. */
     call.threads = most < threads ? (unsigned)most : threads;
@@ -98,7 +99,7 @@ static int begin_scratch(const char *folder, uint64_t memory, unsigned threads,
     }
     call.scratch = &scratch;
     allow_files();
-    (void)signal(SIGBUS, on_fault);
+    (void)sigaction(SIGBUS, &action, NULL);
     return 0;
 }
 

@@ -52,12 +52,12 @@ static bool is_over(const struct host_scratch *s) {
 
 static int fail_over(const struct host_scratch *s, struct host_error *error) {
     const uint64_t mb = 1 << 20;
-    uint64_t here = resident(s) / mb + 1;
+    uint64_t here = resident(s) / mb + 1, enough = 2 * here;
     return host_fail(error, HOST_USAGE,
                      "--host-memory %lluM: this process takes %lluM before it "
                      "has read a point, libraries included; give %lluM or more",
                      (unsigned long long)(s->resident_max / mb),
-                     (unsigned long long)here, (unsigned long long)(2 * here));
+                     (unsigned long long)here, (unsigned long long)enough);
 }
 
 static void prepare(struct host_scratch *scratch, const char *directory,
@@ -99,10 +99,8 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                          "limit of memory out",
                          strerror(errno));
     }
-    if (is_over(scratch))
+    if (probe(scratch, error) == 0 && resident(scratch) > resident_max / 8 * 7)
         fail_over(scratch, error);
-    else
-        probe(scratch, error);
     if (error->code != 0)
         (void)close(scratch->statm);
     return error->code;

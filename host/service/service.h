@@ -9,7 +9,8 @@
  * run is over, the whole result is checked: audit.h.
  *
  * Memory: the cube's windows, 3 KiB a node, a byte a brick, the spilled faces
- * (see spill.h), and the tetrahedra themselves. */
+ * (see spill.h), and the tetrahedra themselves.  In a call that puts arrays
+ * aside (host/base/scratch.h), only the windows and what a node takes stay. */
 #ifndef HOST_SERVICE_H
 #define HOST_SERVICE_H
 

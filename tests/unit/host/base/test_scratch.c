@@ -166,6 +166,48 @@ TEST_WITH(test_an_array_grows_and_shrinks_with_what_it_holds, enter, leave) {
     host_unmap(array, 2 * MIB);
 }
 
+TEST_WITH(test_what_comes_first_stays_in_memory, enter, leave) {
+    scratch.memory_first = 8 * MIB;
+    uint64_t *first = host_map(6 * MIB), *second = host_map(1 * MIB);
+    assert_int_equal(scratch.arrays, 0);
+    for (size_t i = 0; i < 6 * MIB / sizeof *first; i++)
+        first[i] = i * 7;
+    first = host_remap(first, 6 * MIB, 12 * MIB); /* beyond it */
+    assert_int_equal(scratch.arrays, 1);
+    for (size_t i = 0; i < 6 * MIB / sizeof *first; i++)
+        assert_true(first[i] == i * 7);
+    assert_int_equal(first[12 * MIB / sizeof *first - 1], 0);
+    assert_true(resident() < limit);
+    host_unmap(first, 12 * MIB);
+    host_unmap(second, 1 * MIB);
+}
+
+TEST(test_a_limit_below_what_the_process_takes_is_an_error) {
+    struct host_error error = {0};
+    assert_int_equal(
+        host_scratch_begin(&scratch, "/tmp", resident(), 1, &error),
+        HOST_USAGE);
+    assert_non_null(strstr(error.text, "this process takes"));
+}
+
+static void note_thread(void *thread) {
+    *(pthread_t *)thread = pthread_self();
+}
+
+TEST(test_a_call_of_one_thread_has_one_beside_it) {
+    struct host_call one = {.threads = 1, .memory_max = UINT64_MAX};
+    struct host_fork fork = {0};
+    pthread_t thread = {0};
+    host_call_enter(&one);
+    host_fork_start(&fork, note_thread, &thread);
+    host_fork_join(&fork);
+    assert_true(pthread_equal(thread, pthread_self()) != 0);
+    host_fork_beside(&fork, note_thread, &thread);
+    host_fork_join(&fork);
+    assert_true(pthread_equal(thread, pthread_self()) == 0);
+    host_call_enter(NULL);
+}
+
 TEST_WITH(test_a_disk_without_room_is_an_error, enter, leave) {
     struct rlimit before, small = {0};
     struct host_error error = {0};
