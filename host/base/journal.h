@@ -7,13 +7,6 @@
  * heads are sound; behind a damaged head it goes on at the next sound one.
  * What follows the last sound record is cut off.
  *
- *     struct host_journal j;
- *     struct host_journal_head head = {.kind = 1};
- *     const struct host_bytes part[] = {{rows, sizeof rows}};
- *     if (host_journal_open(&j, folder, "spool", "DIR/spool", &error) == 0)
- *         (void)host_journal_append(&j, &head, part, 1, &error);
- *     host_journal_close(&j);
- *
  * A thread syncs the file once a second.  What was appended is kept when the
  * process is killed, and lost with the power if it was appended within the last
  * second, and the time that the disk takes to sync.

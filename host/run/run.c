@@ -329,10 +329,9 @@ int host_triangulate(const struct host_run_options *options,
         host_memory_check(options, result->strategy, result->nodes, 1, no_cells,
                           error) != 0)
         return error->code;
-    int status = order_points(options, points, &order, result, error);
-    if (status == 0)
-        status = start_nodes(options, &order, tets, result, error);
-    status = host_state_order_kept(options->state, error);
+    if (order_points(options, points, &order, result, error) == 0)
+        (void)start_nodes(options, &order, tets, result, error);
+    int status = host_state_order_kept(options->state, result, error);
     host_order_free(&order);
     return status;
 }
@@ -527,20 +526,7 @@ static int look_at_points(const struct host_run_options *options,
 
 /* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
  * and the points in order. */
-enum { ASIDE_BYTES = 320 };
-
-/* The run itself, with the state of --resume. */
-static int run_kept(struct host_run_options *options,
-                    const struct host_points *points,
-                    struct host_run_result *result,
-                    struct host_run_result *alone, struct host_error *error) {
-    if (options->resume != NULL &&
-        host_state_begin(options, points, error) != 0)
-        return error->code;
-    int status = run_on(options, points, result, alone, error);
-    host_state_report(options->state, result);
-    return status;
-}
+enum { ASIDE_BYTES = 320, KEPT_BYTES = ASIDE_BYTES + HOST_STATE_POINT_BYTES };
 
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
@@ -569,13 +555,12 @@ int host_run(const struct host_run_options *options,
         status = look_at_points(options, &points, error);
     if (status == 0)
         status = host_limits_check(
-            points.count *
-                (uint64_t)(ASIDE_BYTES + (options->resume != NULL
-                                              ? HOST_STATE_POINT_BYTES
-                                              : 0)),
+            points.count * (options->resume == NULL ? ASIDE_BYTES : KEPT_BYTES),
             !options->quiet, error);
     if (status == 0)
-        status = run_kept(&kept, &points, result, &alone, error);
+        status = host_state_begin(&kept, &points, error);
+    if (status == 0)
+        status = run_on(&kept, &points, result, &alone, error);
     host_progress_end();
     host_points_free(&points);
     result->scratch_bytes = host_limits_leave();
@@ -711,15 +696,12 @@ static int host_triangulate_direct(const struct host_run_options *options,
     result->index = INCODE_KD;
     result->link = &link_memory;
     result->board = host_board_row(0);
-    uint64_t start = host_now_us();
-    double before_s = used_seconds(CLOCK_PROCESS_CPUTIME_ID);
-    int status = triangulate(options, points, tets, &order, result, error);
-    status = host_state_order_kept(options->state, error);
+    struct stretch stretch = begin_stretch();
+    (void)triangulate(options, points, tets, &order, result, error);
+    int status = host_state_order_kept(options->state, result, error);
     host_order_free(&order);
-    result->time_triangulation_s =
-        1e-6 * (double)(host_now_us() - start) - result->time_verify_s;
-    result->host_triangulation_cpu_s =
-        used_seconds(CLOCK_PROCESS_CPUTIME_ID) - before_s;
+    end_stretch(&stretch, result);
+    result->time_triangulation_s -= result->time_verify_s;
     result->tetrahedra = tets->count;
     return status == 0 && !is_checked_in_order(options)
                ? check(options, points, NULL, tets, result, error)

@@ -328,6 +328,8 @@ int host_state_begin(struct host_run_options *options,
     static struct host_state state;
     struct host_state *s = &state;
     struct values before = {{{0}}};
+    if (options->resume == NULL)
+        return 0;
     memset(s, 0, sizeof *s);
     s->directory = options->resume;
     s->is_quiet = options->quiet;
@@ -590,21 +592,19 @@ struct host_kept *host_state_kept(struct host_state *state) {
     return state == NULL ? NULL : &state->kept;
 }
 
-int host_state_order_kept(struct host_state *state, struct host_error *error) {
-    if (state == NULL || !state->is_writing)
+int host_state_order_kept(struct host_state *state,
+                          struct host_run_result *result,
+                          struct host_error *error) {
+    if (state == NULL)
+        return error->code;
+    result->resumed_bricks = state->resumed + state->kept.resumed;
+    if (!state->is_writing)
         return error->code;
     host_fork_join(&state->fork);
     state->is_writing = false;
     if (error->code == 0)
         *error = state->order_error;
     return error->code;
-}
-
-void host_state_report(const struct host_state *state,
-                       struct host_run_result *result) {
-    if (state == NULL)
-        return;
-    result->resumed_bricks = state->resumed + state->kept.resumed;
 }
 
 static void remove_all(const struct host_state *s) {
@@ -619,10 +619,10 @@ static void remove_all(const struct host_state *s) {
 
 void host_state_end(struct host_state *state, bool done) {
     struct host_state *s = state;
-    struct host_error dropped = {.code = HOST_BROKEN};
     if (s == NULL)
         return;
-    (void)host_state_order_kept(s, &dropped);
+    if (s->is_writing)
+        host_fork_join(&s->fork);
     host_output_advice(NULL);
     unsigned unsound = s->unsound + s->kept.unsound;
     if (unsound > 0 && !s->is_quiet)

@@ -2,11 +2,11 @@
  * this user's alone, from which the same command goes on after a crash, kill -9
  * or loss of power.
  *
- *     DIR/state   what the run is of: the input's SHA-256, the options that
- *                 matter, the program's version; twice, each with a CRC
- *     DIR/order   the order of the points, a record (host/base/journal.h)
- *     DIR/spool   records: of a run on threads, its regions; of a cube, the
- *                 tetrahedra as they came, and commits (host/service/kept.c)
+ * - DIR/state says what the run is of: the input's SHA-256, the options that
+ *   matter, the program's version; twice, each with a CRC.
+ * - DIR/order is the order of the points, a record (host/base/journal.h).
+ * - DIR/spool is records: of a run on threads, its regions; of a cube, the
+ *   tetrahedra as they came, and commits (host/service/kept.h).
  *
  * `state` and `order` get their names when they are on the disk; `spool` is
  * synced once a second.  An order that is missing or damaged is made again: the
@@ -30,11 +30,11 @@ struct host_state;
  * more. */
 enum { HOST_STATE_POINT_BYTES = 200 };
 
-/* Opens options->resume for these points.  If the state of an earlier run is
- * there, options->strategy and nodes become those of that run, where they are
- * left open.  HOST_INPUT or HOST_USAGE: the folder is not to be used, another
- * process uses it, or its run had other points or options; nothing in it has
- * changed then.  Sets options->state. */
+/* Opens options->resume, if it is not NULL, for these points.  If the state of
+ * an earlier run is there, options->strategy and nodes become those of that
+ * run, where they are left open.  HOST_INPUT or HOST_USAGE: the folder is not
+ * to be used, another process uses it, or its run had other points or options;
+ * nothing in it has changed then.  Sets options->state. */
 int host_state_begin(struct host_run_options *options,
                      const struct host_points *points,
                      struct host_error *error);
@@ -63,12 +63,11 @@ host_state_store(const struct host_state *state);
 /* What a cube's service keeps; NULL without a state. */
 struct host_kept *host_state_kept(struct host_state *state);
 
-/* Returns when the order is kept, and may be freed. */
-int host_state_order_kept(struct host_state *state, struct host_error *error);
-
-/* Fills in what of the result came from an earlier run. */
-void host_state_report(const struct host_state *state,
-                       struct host_run_result *result);
+/* Returns when the order is kept, and may be freed.  Fills in what of the
+ * result came from an earlier run. */
+int host_state_order_kept(struct host_state *state,
+                          struct host_run_result *result,
+                          struct host_error *error);
 
 /* The run has succeeded, outputs included: removes the state.  Else it stays,
  * and a note says how to go on. */

@@ -66,7 +66,7 @@ static void run(bool done) {
                      0);
     assert_int_equal(host_state_start(options.state, &order, &result, &error),
                      0);
-    assert_int_equal(host_state_order_kept(options.state, &error), 0);
+    assert_int_equal(host_state_order_kept(options.state, &result, &error), 0);
     host_state_end(options.state, done);
 }
 
@@ -319,7 +319,8 @@ TEST_WITH(test_orders_with_a_grid, set_up, tear_down) {
                          0);
         assert_int_equal(
             host_state_start(options.state, &order, &result, &error), 0);
-        assert_int_equal(host_state_order_kept(options.state, &error), 0);
+        assert_int_equal(host_state_order_kept(options.state, &result, &error),
+                         0);
         host_state_end(options.state, false);
         if (i == 0)
             host_order_free(&order);
