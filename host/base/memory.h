@@ -13,8 +13,8 @@
  * (parallel.h); 0 bytes are taken as 1. */
 void *host_map(size_t bytes);
 
-/* The same of an array that is never put aside: a thread's part of the limit
- * (host_call_share) at most. */
+/* The same of an array that is never put aside: at most two of a thread's parts
+ * of the limit (host_call_share). */
 void *host_map_resident(size_t bytes);
 
 /* Copies a part of an array, or into one.  If the array is put aside, none of

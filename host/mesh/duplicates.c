@@ -12,6 +12,7 @@ enum {
     FORK_ROWS = 1 << 13,   /* fewer rows are not worth a thread: to search, */
     COPY_ROWS = 1 << 17,   /* to copy */
     POLL_ROWS = 1 << 12,   /* between two polls of whether it is cancelled */
+    FETCH_ROWS = 1 << 10,  /* a power of two */
     POLL_COPIED = 1 << 11, /* the same, of copies */
     AROUND = 1 << 16,      /* bytes that one row far from others touches */
     PARTS_MAX = 16
@@ -75,17 +76,32 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
     return row;
 }
 
+/* Points of the next rows: as they stand, or fetched where they are aside. */
+static const double *next_points(const struct search *s, uint64_t row,
+                                 double (*block)[3]) {
+    if (host_call_share() == SIZE_MAX)
+        return s->xyz + 3 * row;
+    uint64_t left = s->rows - row;
+    size_t n = left < FETCH_ROWS ? (size_t)left : FETCH_ROWS;
+    host_fetch(block, s->xyz + 3 * row, n * sizeof *block);
+    return block[0];
+}
+
 /* Rows whose hash belongs to the part, in input order: so the first of equal
  * rows is the lowest. */
 static uint64_t search_round(struct search *s, struct table *table,
                              unsigned part) {
     const uint64_t parts = (uint64_t)s->parts * s->rounds;
+    double block[FETCH_ROWS][3];
+    const double *p = s->xyz;
     uint64_t waiting[AHEAD];
     uint32_t waiting_row[AHEAD];
     uint64_t queued = 0, taken = 0, distinct = 0;
     for (uint64_t row = 0; row < s->rows || taken < queued;) {
         if (row < s->rows && queued - taken < AHEAD) {
-            uint64_t h = hash(s->xyz + 3 * row);
+            if (row % FETCH_ROWS == 0)
+                p = next_points(s, row, block);
+            uint64_t h = hash(p + 3 * (row % FETCH_ROWS));
             if ((h >> 40) * parts >> 24 == part) {
                 waiting[queued % AHEAD] = h;
                 waiting_row[queued % AHEAD] = (uint32_t)row;
@@ -93,8 +109,6 @@ static uint64_t search_round(struct search *s, struct table *table,
                 queued++;
             }
             row++;
-            if (row % POLL_ROWS == 0)
-                host_call_trim((size_t)POLL_ROWS * 3 * sizeof(double));
             if (row % POLL_ROWS == 0 && host_call_cancelled())
                 break;
             continue;
@@ -107,6 +121,8 @@ static uint64_t search_round(struct search *s, struct table *table,
             s->lowest[mine] = other;
         if (s->doubled != NULL && other != mine)
             s->doubled[mine] = 1;
+        if (s->lowest != NULL && taken % FETCH_ROWS == 0)
+            host_call_trim(FETCH_ROWS * parts * sizeof *s->lowest);
     }
     return distinct;
 }
@@ -135,7 +151,7 @@ static bool run_search(struct search *s) {
     bool enough = true;
     for (unsigned i = 0; i < s->parts; i++) {
         s->table[i].slots = slots;
-        s->table[i].slot = host_map(slots * sizeof(uint64_t));
+        s->table[i].slot = host_map_resident(slots * sizeof(uint64_t));
         enough = enough && s->table[i].slot != NULL;
     }
     if (enough)

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "incode/pages/pages.h"
 
@@ -259,4 +260,169 @@ void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
     struct task task = {items, n, first_brick, threads, 0, sink, context};
     if (n > 0)
         build(&task);
+}
+
+/* --- Parts of what is put aside ------------------------------------------- */
+
+enum { BLOCK_ITEMS = 512, SAMPLE_ITEMS = 1 << 12 };
+
+/* Below the wall, or not: what is equal to it is above. */
+struct wall {
+    struct host_item item;
+    int order[3];
+};
+
+struct parts {
+    const struct host_item *items;
+    struct host_item *to;
+    size_t n, room; /* items that a thread has in memory */
+    unsigned parts, threads;
+    struct wall wall[HOST_KD_PARTS_MAX]; /* a heap, from 1 on */
+    size_t (*count)[HOST_KD_PARTS_MAX];  /* [threads] then where they go */
+    struct host_item *memory[HOST_THREADS_MAX];
+    struct host_kd_part *part;
+};
+
+static unsigned part_of(const struct parts *p, const struct host_item *item) {
+    unsigned k = 1;
+    while (k < p->parts)
+        k = 2 * k + !less(item, &p->wall[k].item, p->wall[k].order, 1);
+    return k - p->parts;
+}
+
+/* Walls between so many samples, from number k of the heap on down. */
+static void set_walls(struct parts *p, unsigned k, struct host_item *sample,
+                      size_t n, const double lo[3], const double hi[3]) {
+    if (k >= p->parts) {
+        memcpy(p->part[k - p->parts].lo, lo, sizeof p->part->lo);
+        memcpy(p->part[k - p->parts].hi, hi, sizeof p->part->hi);
+        return;
+    }
+    double box[2][3], below[3], above[3];
+    host_kd_box(sample, n, box[0], box[1]);
+    int d = host_kd_longest(box[0], box[1]);
+    struct wall *w = &p->wall[k];
+    *w = (struct wall){.order = {d, d == 0 ? 1 : 0, d == 2 ? 1 : 2}};
+    host_kd_rank(sample, n, n / 2, d, 0);
+    w->item = sample[n / 2];
+    for (size_t i = n / 2; i < n; i++)
+        if (less(&sample[i], &w->item, w->order, 1))
+            w->item = sample[i];
+    memcpy(below, hi, sizeof below);
+    memcpy(above, lo, sizeof above);
+    below[d] = above[d] = w->item.c[d];
+    set_walls(p, 2 * k, sample, n / 2, lo, below);
+    set_walls(p, 2 * k + 1, sample + n / 2, n - n / 2, above, hi);
+}
+
+static size_t items_first(const struct parts *p, unsigned thread) {
+    return thread == p->threads ? p->n : p->n / p->threads * thread;
+}
+
+static size_t fetch_items(const struct parts *p, struct host_item *to, size_t i,
+                          size_t last) {
+    size_t n = last - i > BLOCK_ITEMS ? BLOCK_ITEMS : last - i;
+    host_fetch(to, p->items + i, n * sizeof *to);
+    return n;
+}
+
+static void count_items(void *context, unsigned thread) {
+    struct parts *p = context;
+    struct host_item block[BLOCK_ITEMS];
+    size_t i = items_first(p, thread), last = items_first(p, thread + 1);
+    for (size_t n = 0; i < last && !host_call_cancelled(); i += n) {
+        n = fetch_items(p, block, i, last);
+        for (size_t k = 0; k < n; k++)
+            p->count[thread][part_of(p, &block[k])]++;
+    }
+}
+
+/* In their order: the items of a thread before those of the next. */
+static void place_items(struct parts *p) {
+    size_t at = 0;
+    for (unsigned k = 0; k < p->parts; k++) {
+        size_t before = at;
+        for (unsigned t = 0; t < p->threads; t++) {
+            size_t count = p->count[t][k];
+            p->count[t][k] = at;
+            at += count;
+        }
+        p->part[k].n = at - before;
+    }
+}
+
+static void send_items(struct parts *p, unsigned thread, unsigned k,
+                       const struct host_item *from, size_t n) {
+    host_store(p->to + p->count[thread][k], from, n * sizeof *from);
+    p->count[thread][k] += n;
+}
+
+static void spread_items(void *context, unsigned thread) {
+    struct parts *p = context;
+    struct host_item block[BLOCK_ITEMS], *bucket = p->memory[thread];
+    size_t room = p->room / p->parts, used[HOST_KD_PARTS_MAX] = {0};
+    size_t i = items_first(p, thread), last = items_first(p, thread + 1);
+    for (size_t n = 0; i < last && !host_call_cancelled(); i += n) {
+        n = fetch_items(p, block, i, last);
+        for (size_t m = 0; m < n; m++) {
+            unsigned k = part_of(p, &block[m]);
+            bucket[k * room + used[k]++] = block[m];
+            if (used[k] == room) {
+                send_items(p, thread, k, bucket + k * room, room);
+                used[k] = 0;
+            }
+        }
+    }
+    for (unsigned k = 0; k < p->parts && !host_call_cancelled(); k++)
+        send_items(p, thread, k, bucket + k * room, used[k]);
+}
+
+static bool spread(struct parts *p, const double lo[3], const double hi[3]) {
+    size_t samples = (size_t)p->parts * SAMPLE_ITEMS;
+    samples = samples < p->room ? samples : p->room;
+    for (unsigned t = 0; t < p->threads; t++) {
+        p->memory[t] = host_map_resident(p->room * sizeof *p->to);
+        if (p->memory[t] == NULL)
+            return false;
+    }
+    uint64_t state = p->n;
+    for (size_t i = 0; i < samples; i++) {
+        size_t stretch = p->n / samples;
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        host_fetch(p->memory[0] + i,
+                   p->items + i * stretch + (size_t)(state >> 33) % stretch,
+                   sizeof *p->items);
+    }
+    set_walls(p, 1, p->memory[0], samples, lo, hi);
+    p->to = host_map(p->n * sizeof *p->to);
+    if (p->to == NULL)
+        return false;
+    host_fork_all(p->threads, count_items, p);
+    place_items(p);
+    host_fork_all(p->threads, spread_items, p);
+    return true;
+}
+
+bool host_kd_spread(struct host_item **items, size_t n, unsigned parts,
+                    const double lo[3], const double hi[3],
+                    struct host_kd_part part[HOST_KD_PARTS_MAX]) {
+    struct parts p = {.items = *items,
+                      .n = n,
+                      .parts = parts,
+                      .threads = host_threads(),
+                      .room = host_call_share() / sizeof *p.to,
+                      .part = part};
+    size_t counts = p.threads * sizeof *p.count;
+    if (n < p.room)
+        return false;
+    p.count = host_map_resident(counts);
+    bool done = p.count != NULL && spread(&p, lo, hi);
+    for (unsigned t = 0; t < p.threads; t++)
+        host_unmap(p.memory[t], p.room * sizeof *p.to);
+    host_unmap(p.count, counts);
+    if (done) {
+        host_unmap(*items, n * sizeof **items);
+        *items = p.to;
+    }
+    return done;
 }

@@ -6,6 +6,7 @@
 #ifndef HOST_KD_BUILD_H
 #define HOST_KD_BUILD_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -37,5 +38,22 @@ void host_kd_rank(struct host_item *items, size_t n, size_t k, int d,
  * up to `threads` threads. */
 void host_kd_bricks(struct host_item *items, size_t n, uint32_t first_brick,
                     unsigned threads, host_brick_sink *sink, void *context);
+
+/* Of items that are put aside (host/base/scratch.h): cuts them into parts of
+ * about equal numbers, a power of two, that stand one behind the other, by
+ * walls between items of a sample.  The array is another afterwards.  False:
+ * there is no room; nothing has changed.
+ *
+ * Work: items are read twice and written once, through their files. */
+enum { HOST_KD_PARTS_MAX = 64 };
+
+struct host_kd_part {
+    size_t n;
+    double lo[3], hi[3]; /* its cell; those of all parts tile the box */
+};
+
+bool host_kd_spread(struct host_item **items, size_t n, unsigned parts,
+                    const double lo[3], const double hi[3],
+                    struct host_kd_part part[HOST_KD_PARTS_MAX]);
 
 #endif

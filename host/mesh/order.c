@@ -387,9 +387,40 @@ static int allocate(struct host_order *order, struct host_error *error) {
     return 0;
 }
 
-static int build_items(struct host_order *order, struct host_item *items,
+/* As many parts as are ordered in memory each, where all are put aside. */
+static unsigned parts_aside(const struct host_order *order) {
+    size_t most = host_call_share() / sizeof(struct host_item);
+    unsigned parts = 1;
+    while (parts < HOST_KD_PARTS_MAX && parts < order->regions &&
+           order->points / parts / 2 > most)
+        parts *= 2;
+    return parts;
+}
+
+/* Regions of parts that stand one behind the other. */
+static void cut_parts(const struct cut *all, const struct host_kd_part *part,
+                      unsigned parts) {
+    struct cut cut = *all;
+    cut.regions = all->regions / parts;
+    for (unsigned k = 0; k < parts && !host_call_cancelled(); k++) {
+        cut.n = part[k].n;
+        memcpy(cut.lo, part[k].lo, sizeof cut.lo);
+        memcpy(cut.hi, part[k].hi, sizeof cut.hi);
+        cut_regions(&cut);
+        cut.region += cut.regions;
+        cut.first += cut.n;
+    }
+}
+
+static int build_items(struct host_order *order, struct host_distinct *distinct,
                        enum host_partition partition,
                        struct host_error *error) {
+    struct host_kd_part part[HOST_KD_PARTS_MAX];
+    unsigned parts = partition == HOST_ADAPTIVE ? parts_aside(order) : 1;
+    if (parts > 1 && !host_kd_spread(&distinct->items, order->points, parts,
+                                     order->lo, order->hi, part))
+        parts = 1;
+    struct host_item *items = distinct->items;
     struct cut cut = {.order = order,
                       .items = items,
                       .partition = partition,
@@ -398,7 +429,10 @@ static int build_items(struct host_order *order, struct host_item *items,
                       .n = order->points};
     memcpy(cut.lo, order->lo, sizeof cut.lo);
     memcpy(cut.hi, order->hi, sizeof cut.hi);
-    cut_regions(&cut);
+    if (parts > 1)
+        cut_parts(&cut, part, parts);
+    else
+        cut_regions(&cut);
     if (host_call_cancelled())
         return host_fail(error, HOST_BROKEN, "host: cancelled");
     uint64_t bricks = number_bricks(order);
@@ -456,7 +490,7 @@ int host_order_make(struct host_order *order, const char *where,
     if (order->region == NULL)
         host_fail_memory(error, "the regions");
     else if (error->code == 0)
-        build_items(order, distinct.items, partition, error);
+        build_items(order, &distinct, partition, error);
     host_distinct_free(&distinct);
     if (error->code == 0 && !host_call_cancelled())
         check_dimension(order, where, error);

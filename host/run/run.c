@@ -525,8 +525,18 @@ static int look_at_points(const struct host_run_options *options,
 }
 
 /* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
- * and the points in order. */
-enum { ASIDE_BYTES = 320, KEPT_BYTES = ASIDE_BYTES + HOST_STATE_POINT_BYTES };
+ * and the points in order; for their neighbours, which .ele has beside it, four
+ * times. */
+enum { ASIDE_BYTES = 320, ASIDE_NEIGHBOURS_BYTES = 500 };
+
+static uint64_t aside_bytes(const struct host_run_options *options) {
+    uint64_t kept = options->resume == NULL ? 0 : HOST_STATE_POINT_BYTES;
+    char name[HOST_PATH_MAX];
+    for (unsigned i = 0; i < options->outputs; i++)
+        if (host_write_file(options->output[i], 2, name, sizeof name) != NULL)
+            return ASIDE_NEIGHBOURS_BYTES + kept;
+    return ASIDE_BYTES + kept;
+}
 
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
@@ -554,9 +564,8 @@ int host_run(const struct host_run_options *options,
     if (status == 0)
         status = look_at_points(options, &points, error);
     if (status == 0)
-        status = host_limits_check(
-            points.count * (options->resume == NULL ? ASIDE_BYTES : KEPT_BYTES),
-            !options->quiet, error);
+        status = host_limits_check(points.count * aside_bytes(options),
+                                   !options->quiet, error);
     if (status == 0)
         status = host_state_begin(&kept, &points, error);
     if (status == 0)

@@ -93,7 +93,9 @@ int host_check(const struct host_sites *sites,
 
 /* The exact check (check.h) of tetrahedra whose vertices are rows of points.
  *
- * Memory: 4 bytes a point beyond that of the check.
+ * Memory: 4 bytes a point beyond that of the check.  Tetrahedra that are put
+ * aside (host/base/scratch.h) are checked in an order of the points in space:
+ * 28 bytes a point and 32 a tetrahedron more on the disk.
  *
  *     if (host_verify(&points, &tets, HOST_CHECK_DELAUNAY, &report, &error) ==
  * HOST_UNVERIFIED) fputs(report.text, stderr); */

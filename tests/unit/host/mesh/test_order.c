@@ -2,6 +2,8 @@
  * and boxes as stated, pages as nodes will see them. */
 #include <math.h>
 
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "host/mesh/duplicates.h"
 #include "host/mesh/order.h"
 #include "incode/pages/pager.h"
@@ -227,6 +229,38 @@ TEST(every_row_once) {
             }
         }
     }
+}
+
+/* The same where points are put aside: in parts, of about equal numbers. */
+TEST(every_row_once_where_they_are_aside) {
+    const double levels[] = {0, 40, 12};
+    struct host_scratch scratch;
+    struct host_error error = {0};
+    struct host_call call = {
+        .threads = 4, .memory_max = UINT64_MAX, .scratch = &scratch};
+    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 1 << 20, 4, &error),
+                     0);
+    host_call_enter(&call);
+    for (size_t i = 0; i < sizeof levels / sizeof *levels; i++) {
+        struct host_order order;
+        double *xyz = random_points(70000, levels[i]);
+        for (uint32_t regions = 1; regions <= 128; regions *= 32) {
+            check_all(xyz, 70000, HOST_ADAPTIVE, regions);
+            check_all(xyz, 70000, HOST_UNIFORM, regions);
+        }
+        assert_int_equal(host_order_make(&order, "test", xyz, 70000,
+                                         HOST_ADAPTIVE, 8, false, &error),
+                         0);
+        for (uint32_t r = 0; r < 8; r++)
+            assert_in_range(order.region[r].points, order.points / 8 / 3 * 2,
+                            order.points / 8 / 2 * 3);
+        host_order_free(&order);
+        free(xyz);
+    }
+    assert_int_equal(scratch.arrays, 0);
+    assert_int_equal(call.memory, 0);
+    host_call_enter(NULL);
+    host_scratch_end(&scratch);
 }
 
 /* Bricks as tight as a k-d arrangement makes them, and box pages too. */

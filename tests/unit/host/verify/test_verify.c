@@ -4,8 +4,10 @@
 #include <float.h>
 #include <math.h>
 
-#include "host/verify/check.h"
+#include "host/base/parallel.h"
+#include "host/base/scratch.h"
 #include "host/mesh/gen.h"
+#include "host/verify/check.h"
 #include "tests/unit/reference.h"
 #include "tests/unit/test.h"
 
@@ -169,6 +171,49 @@ TEST(each_turned_one_is_found) {
         reference_delaunay(f.points.xyz, 40, &f.tets);
         host_tetrahedra_sort(&f.tets);
     }
+    close_fixture(&f);
+}
+
+/* What is put aside is checked in an order of its own, here with two windows of
+ * rows, and the report is the same. */
+TEST(what_is_put_aside_is_checked_alike) {
+    static const struct {
+        uint32_t vertex;
+        const char *what;
+    } wrong[] = {{UINT32_MAX, ""},
+                 {0, ""},
+                 {6000, "is no row"},
+                 {4100, "repeats an earlier one"}};
+    struct fixture f = made("uniform", 6000, 8);
+    struct host_scratch scratch;
+    struct host_error error = {0};
+    struct host_call call = {
+        .threads = 4, .memory_max = UINT64_MAX, .scratch = &scratch};
+    memcpy(f.points.xyz + 3 * 17, f.points.xyz + 3 * 4100, 24); /* a repeat */
+    host_tetrahedra_free(&f.tets);
+    reference_delaunay(f.points.xyz, 6000, &f.tets);
+    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 1 << 18, 4, &error),
+                     0);
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        struct host_check_report in_memory, aside;
+        uint32_t *v = &f.tets.v[7000][1], before = *v;
+        *v = i == 0 ? before : wrong[i].vertex;
+        int code = verify(&f, &in_memory);
+        host_call_enter(&call);
+        assert_int_equal(verify(&f, &aside), code);
+        assert_int_equal(call.memory, 0);
+        host_call_enter(NULL);
+        *v = before;
+        assert_int_equal(code, i == 0 ? 0 : HOST_UNVERIFIED);
+        assert_int_equal(aside.faults, in_memory.faults);
+        assert_int_equal(aside.points, in_memory.points);
+        assert_int_equal(aside.distinct, in_memory.distinct);
+        assert_int_equal(aside.hull_facets, in_memory.hull_facets);
+        assert_int_equal(aside.tetrahedra, in_memory.tetrahedra);
+        assert_non_null(strstr(in_memory.text, wrong[i].what));
+        assert_non_null(strstr(aside.text, wrong[i].what));
+    }
+    host_scratch_end(&scratch);
     close_fixture(&f);
 }
 
