@@ -61,8 +61,8 @@ int host_limits_enter(const struct host_limits *limits, unsigned threads,
     if (memory > 0) {
         /* Each takes as much as one does. */
         call.threads = most < threads ? (unsigned)most : threads;
-        if (host_scratch_begin(&scratch, folder, memory, call.threads, false,
-                               error) != 0)
+        if (host_scratch_begin(&scratch, folder, memory, call.threads, error) !=
+            0)
             return error->code;
         call.scratch = &scratch;
     }

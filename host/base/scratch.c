@@ -31,43 +31,59 @@ static int make_file(const char *directory) {
     return file;
 }
 
-int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads, bool own,
-                       struct host_error *error) {
+static void prepare(struct host_scratch *scratch, const char *directory,
+                    uint64_t resident_max, unsigned threads) {
     uint64_t share = resident_max / SHARE;
     memset(scratch, 0, sizeof *scratch);
     scratch->directory = directory;
     scratch->resident_max = resident_max;
     scratch->array_min = share < ARRAY_MIN ? (size_t)share : ARRAY_MIN;
     scratch->step = (size_t)(resident_max / BETWEEN / threads);
+    scratch->statm = -1;
     (void)pthread_mutex_init(&scratch->lock, NULL);
-    scratch->own = own;
-    scratch->statm = own ? -1 : open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
-    if (!own && scratch->statm < 0) {
-        return host_fail(error, HOST_BROKEN,
-                         "/proc/self/statm: %s; mount /proc, or leave the "
-                         "limit of memory out",
-                         strerror(errno));
-    }
-    int file = make_file(directory);
+}
+
+static int probe(struct host_scratch *scratch, struct host_error *error) {
+    int file = make_file(scratch->directory);
     if (file < 0) {
         scratch->failure = errno;
-        host_fail(error, HOST_INPUT,
-                  "%s: no scratch file can be made here (%s); give another "
-                  "folder as --scratch DIR",
-                  directory, strerror(errno));
-        if (!own)
-            (void)close(scratch->statm);
-        return error->code;
+        return host_fail(error, HOST_INPUT,
+                         "%s: no scratch file can be made here (%s); give "
+                         "another folder as --scratch DIR",
+                         scratch->directory, strerror(errno));
     }
     (void)close(file);
     return 0;
 }
 
+int host_scratch_begin(struct host_scratch *scratch, const char *directory,
+                       uint64_t resident_max, unsigned threads,
+                       struct host_error *error) {
+    prepare(scratch, directory, resident_max, threads);
+    scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (scratch->statm < 0) {
+        return host_fail(error, HOST_BROKEN,
+                         "/proc/self/statm: %s; mount /proc, or leave the "
+                         "limit of memory out",
+                         strerror(errno));
+    }
+    if (probe(scratch, error) != 0)
+        (void)close(scratch->statm);
+    return error->code;
+}
+
+int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
+                           uint64_t resident_max, unsigned threads,
+                           struct host_error *error) {
+    prepare(scratch, directory, resident_max, threads);
+    scratch->own = true;
+    return probe(scratch, error);
+}
+
 void host_scratch_end(struct host_scratch *scratch) {
     while (scratch->arrays > 0)
         (void)close(scratch->array[--scratch->arrays].file);
-    if (!scratch->own)
+    if (scratch->statm >= 0)
         (void)close(scratch->statm);
     (void)pthread_mutex_destroy(&scratch->lock);
 }

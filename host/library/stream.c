@@ -159,8 +159,8 @@ static enum incode_status begin(struct stream *s) {
     if (s->resident_max == 0)
         return INCODE_OK;
     host->threads = most < host->threads ? (unsigned)most : host->threads;
-    if (host_scratch_begin(&s->state->scratch, folder, s->resident_max,
-                           host->threads, true, &s->error) != 0) {
+    if (host_scratch_begin_own(&s->state->scratch, folder, s->resident_max,
+                               host->threads, &s->error) != 0) {
         s->out->error = s->state->scratch.failure;
         return INCODE_IO;
     }
