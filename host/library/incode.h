@@ -198,8 +198,12 @@ struct incode_totals {
  * `out` need not be initialised; it owns no memory.  On an error only `at` and
  * `error` in it have a meaning.  Limits as of incode_delaunay.
  *
- * Memory without a limit: about 110 bytes a point.  Scratch with one: about 120
- * bytes a point, and up to 60 files that are open at once.  Work: as of
+ * A full disk is INCODE_IO.  A disk that loses what it took raises SIGBUS in
+ * the process, as of every file that is mapped.
+ *
+ * Memory without a limit: about 110 bytes a point, and 180 MB a thread. Scratch
+ * with one: 100 to 160 bytes a point and a quarter of the limit, in 12 files
+ * and up to 4 for each thread, which are open at once. Work: as of
  * incode_delaunay, without the sort. */
 enum incode_status
 incode_stream(const struct incode_callbacks *callbacks,
