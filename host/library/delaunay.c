@@ -30,7 +30,6 @@ struct common {
     /* What the triangulators of threads work in; NULL: nothing yet. */
     void *arena[HOST_THREADS_MAX];
     size_t bytes[HOST_THREADS_MAX];
-    pthread_mutex_t pouring; /* held while the sink takes rows */
 };
 
 /* The threads of one run. */
@@ -40,8 +39,7 @@ struct direct {
     struct host_tetrahedra *tets; /* [threads] */
     struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
     uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    bool is_first;                /* its bricks count, for who watches, and
-                                     its tetrahedra go to the sink */
+    bool is_first; /* its bricks count, and its rows go to the sink */
     unsigned threads;
     struct incode_setup setup;
     size_t arena;              /* bytes for each thread, if there are so many */
@@ -106,30 +104,18 @@ static void fail(struct direct *run, enum host_direct outcome,
 }
 
 static bool has_sink(const struct direct *run) {
-    const struct host_direct_sums *sums = run->common->sums;
-    return run->is_first && sums != NULL && sums->sink.put != NULL;
+    return run->is_first && run->common->sums != NULL &&
+           run->common->sums->sink.put != NULL;
 }
 
 /* Gives the rows of a thread's list to the sink, if there is one. */
 static void pour(const struct direct *run, struct host_tetrahedra *tets) {
-    enum { BLOCK = 1 << 12, TOUCHED = 40 /* bytes a row */ };
     struct host_direct_sums *sums = run->common->sums;
-    if (!has_sink(run))
-        return;
-    const uint32_t *row = sums->by_vertex ? NULL : run->order->row;
-    for (uint64_t i = 0; i < tets->count && !host_call_cancelled();) {
-        uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
-        host_tetrahedra_canonical(tets->v + i, n, row);
-        host_call_trim((size_t)n * TOUCHED);
-        (void)pthread_mutex_lock(&run->common->pouring);
-        if (!host_call_cancelled())
-            sums->sink.put(sums->sink.context,
-                           (const uint32_t(*)[4])tets->v + i, n);
-        (void)pthread_mutex_unlock(&run->common->pouring);
-        i += n;
+    if (has_sink(run)) {
+        sums->part[tets - run->tets].poured += tets->count;
+        host_tetrahedra_pour(tets, sums->by_vertex ? NULL : run->order->row,
+                             &sums->sink);
     }
-    sums->part[tets - run->tets].poured += tets->count;
-    host_tetrahedra_cut(tets, 0);
 }
 
 /* --- what a triangulator asks for ----------------------------------------- */
@@ -368,21 +354,17 @@ static void work(void *context, unsigned part) {
         if (w.t == NULL)
             fail(run, HOST_DIRECT_BROKEN, why);
     }
-    /* Room for as many as there will be, about, which costs nothing before it
-     * is touched. */
-    if (w.call == NULL || w.call->memory_max == UINT64_MAX)
+    /* Room for about as many as there will be: untouched it costs nothing. */
+    if (!has_sink(run) && (w.call == NULL || w.call->memory_max == UINT64_MAX))
         (void)host_tetrahedra_room(
-            w.tets,
-            (uint64_t)EXPECTED * run->order->points /
-                (has_sink(run) ? run->order->regions : run->threads),
+            w.tets, (uint64_t)EXPECTED * run->order->points / run->threads,
             &w.error);
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
            (region = atomic_fetch_add(&run->regions, 1)) <
                run->order->regions) {
         do_region(&w, region);
-        if (run->outcome == HOST_DIRECT_DONE)
-            pour(run, w.tets);
+        pour(run, w.tets);
     }
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
@@ -698,10 +680,8 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_tetrahedra *tets,
                                  struct host_direct_sums *sums,
                                  struct host_error *error) {
-    struct common common = {
-        .sums = sums, .error = error, .pouring = PTHREAD_MUTEX_INITIALIZER};
+    struct common common = {.sums = sums, .error = error};
     enum host_direct outcome = run_order(&common, order, true, true, tets);
-    (void)pthread_mutex_destroy(&common.pouring);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;

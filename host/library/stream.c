@@ -135,7 +135,7 @@ static enum incode_status triangulate(struct stream *s) {
     s->call.host.phases = 2;
     if (status != INCODE_OK || host_call_cancelled())
         return status;
-    s->state->sums.sink = (struct host_direct_sink){put, s};
+    s->state->sums.sink = (struct host_sink){put, s, PTHREAD_MUTEX_INITIALIZER};
     status = library_direct(
         host_direct_run(&s->order, &none, &s->state->sums, &s->error));
     s->call.host.phases = 3;

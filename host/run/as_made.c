@@ -48,7 +48,8 @@ int host_as_made_begin(const struct host_run_options *options,
                            error) != 0)
             return error->code;
     streams = true;
-    sums->sink = (struct host_direct_sink){.put = put};
+    sums->sink =
+        (struct host_sink){.put = put, .lock = PTHREAD_MUTEX_INITIALIZER};
     return 0;
 }
 
@@ -62,7 +63,7 @@ bool host_as_made_end(struct host_tetrahedra *tets,
         result->tetrahedra = made;
     for (uint64_t i = 0; i < tets->count; i += BLOCK) {
         uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
-        host_tetrahedra_canonical(tets->v + i, n, NULL);
+        host_tetrahedra_canonical(tets->v + i, n);
         host_call_trim((size_t)n * sizeof *tets->v);
     }
     return streams;
