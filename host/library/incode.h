@@ -150,7 +150,8 @@ void incode_adjacency_free(struct incode_adjacency *a);
 /* Where incode_stream gets points and puts tetrahedra.  The call calls one of
  * these at a time, from the calling thread or from another thread of the call,
  * which blocks all signals.  If one returns false, the call ends with
- * INCODE_CANCELLED, and calls none of them again.  No exception or longjmp may
+ * INCODE_CANCELLED, and calls none of them again.  The calling thread may call
+ * options->progress meanwhile.  No exception or longjmp may
  * leave them. */
 struct incode_callbacks {
     /* Writes x, y, z of the next points, at most `room`, to xyz[3 * room], and
