@@ -92,8 +92,8 @@ static int begin_scratch(const char *folder, uint64_t memory, unsigned threads,
     uint64_t most = memory / HOST_RESIDENT_MIN;
     /* Each takes as much as one does. */
     call.threads = most < threads ? (unsigned)most : threads;
-    if (host_scratch_begin(&scratch, folder, memory, call.threads, false,
-                           error) != 0) {
+    if (host_scratch_begin(&scratch, folder, memory, call.threads, error) !=
+        0) {
         call.threads = threads;
         return error->code;
     }

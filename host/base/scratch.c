@@ -86,12 +86,9 @@ static int probe(struct host_scratch *scratch, struct host_error *error) {
 }
 
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads, bool own,
+                       uint64_t resident_max, unsigned threads,
                        struct host_error *error) {
     prepare(scratch, directory, resident_max, threads);
-    scratch->own = own;
-    if (own)
-        return probe(scratch, error);
     scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
     if (scratch->statm < 0) {
         return host_fail(error, HOST_BROKEN,
@@ -104,6 +101,14 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
     if (error->code != 0)
         (void)close(scratch->statm);
     return error->code;
+}
+
+int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
+                           uint64_t resident_max, unsigned threads,
+                           struct host_error *error) {
+    prepare(scratch, directory, resident_max, threads);
+    scratch->own = true;
+    return probe(scratch, error);
 }
 
 int host_scratch_begin_small(struct host_scratch *scratch,

@@ -54,14 +54,19 @@ struct host_scratch {
     _Atomic uint64_t since;    /* with `own`: touched since pages left */
 };
 
-/* directory outlives the scratch.  own: the limit is of what the call has
- * resident, in a process with other memory and other calls.  No kernel counts
- * that, so pages leave after threads have touched half of the limit, the same
- * pages perhaps.  HOST_INPUT: no file can be made there.  HOST_USAGE: this
- * process has too much resident already, whatever is put aside. */
+/* directory outlives the scratch.  HOST_INPUT: no file can be made there.
+ * HOST_USAGE: this process has too much resident already, whatever is put
+ * aside. */
 int host_scratch_begin(struct host_scratch *scratch, const char *directory,
-                       uint64_t resident_max, unsigned threads, bool own,
+                       uint64_t resident_max, unsigned threads,
                        struct host_error *error);
+/* The same where the limit is of what the call itself has resident, in a
+ * process with other memory and other calls.  The kernel does not report that,
+ * so pages leave each time threads have touched half of the limit, the same
+ * pages perhaps.  `failure` is errno if no file can be made there. */
+int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
+                           uint64_t resident_max, unsigned threads,
+                           struct host_error *error);
 /* The same for one thread of the simulation, in whose process nodes are, too:
  * pages of arrays count alone, nearly all arrays are files, and all their pages
  * leave at every look. */

@@ -289,7 +289,7 @@ static const struct host_option rows[] = {
     {"host-memory", 0, "SIZE", "The limit of every second run. Default: 200M",
      HOST_AT(struct arguments, scale.memory)},
     {"scratch", 0, "DIR",
-     "Folder for the files: 300 bytes a point. Default: $TMPDIR, else /tmp",
+     "Folder for the files: 400 bytes a point. Default: $TMPDIR, else /tmp",
      HOST_AT(struct arguments, scale.folder)},
     {.help = "Of paper, scaling, scale and boards:"},
     {"csv", 0, "FILE", "All rows, as CSV",

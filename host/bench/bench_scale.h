@@ -7,7 +7,7 @@
  * program's, without the check that the statistics have it make; its memory is
  * the most that it has resident, that check included.
  *
- * Disk: 24 bytes a point for the points and 108 for the output, and about 160
+ * Disk: 24 bytes a point for the points and 108 for the output, and about 260
  * for what is put aside. */
 #ifndef HOST_BENCH_SCALE_H
 #define HOST_BENCH_SCALE_H

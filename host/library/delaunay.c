@@ -85,30 +85,18 @@ static void add_statistics(struct incode_statistics *to,
 }
 
 static bool has_sink(const struct direct *run) {
-    const struct host_direct_sums *sums = run->common->sums;
-    return run->level == 0 && sums != NULL && sums->sink.put != NULL;
+    return run->level == 0 && run->common->sums != NULL &&
+           run->common->sums->sink.put != NULL;
 }
 
 /* Gives the rows of a thread's list to the sink, if there is one. */
 static void pour(const struct direct *run, struct host_tetrahedra *tets) {
-    enum { BLOCK = 1 << 12, TOUCHED = 40 /* bytes a row */ };
     struct host_direct_sums *sums = run->common->sums;
-    if (!has_sink(run))
-        return;
-    const uint32_t *row = sums->by_vertex ? NULL : run->order->row;
-    for (uint64_t i = 0; i < tets->count && !host_call_cancelled();) {
-        uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
-        host_tetrahedra_canonical(tets->v + i, n, row);
-        host_call_trim((size_t)n * TOUCHED);
-        (void)pthread_mutex_lock(&run->common->pouring);
-        if (!host_call_cancelled())
-            sums->sink.put(sums->sink.context,
-                           (const uint32_t(*)[4])tets->v + i, n);
-        (void)pthread_mutex_unlock(&run->common->pouring);
-        i += n;
+    if (has_sink(run)) {
+        sums->part[tets - run->tets].poured += tets->count;
+        host_tetrahedra_pour(tets, sums->by_vertex ? NULL : run->order->row,
+                             &sums->sink);
     }
-    sums->part[tets - run->tets].poured += tets->count;
-    host_tetrahedra_cut(tets, 0);
 }
 
 static void work(void *context, unsigned part) {
@@ -134,21 +122,17 @@ static void work(void *context, unsigned part) {
         if (w.t == NULL)
             direct_fail(run, HOST_DIRECT_BROKEN, why);
     }
-    /* Room for as many as there will be, about, which costs nothing before it
-     * is touched. */
-    if (w.call == NULL || w.call->memory_max == UINT64_MAX)
+    /* Room for about as many as there will be: untouched it costs nothing. */
+    if (!has_sink(run) && (w.call == NULL || w.call->memory_max == UINT64_MAX))
         (void)host_tetrahedra_room(
-            w.tets,
-            (uint64_t)EXPECTED * run->order->points /
-                (has_sink(run) ? run->order->regions : run->threads),
+            w.tets, (uint64_t)EXPECTED * run->order->points / run->threads,
             &w.error);
     uint32_t region;
     while (run->outcome == HOST_DIRECT_DONE &&
            (region = atomic_fetch_add(&run->regions, 1)) <
                run->order->regions) {
         direct_region(&w, region);
-        if (run->outcome == HOST_DIRECT_DONE)
-            pour(run, w.tets);
+        pour(run, w.tets);
     }
     if (run->common->sums != NULL && w.t != NULL) {
         struct host_direct_part *p = &run->common->sums->part[part];
@@ -504,10 +488,8 @@ enum host_direct host_direct_run(const struct host_order *order,
                                  struct host_error *error) {
     struct direct_call common = {.sums = sums,
                                  .store = sums == NULL ? NULL : sums->store,
-                                 .error = error,
-                                 .pouring = PTHREAD_MUTEX_INITIALIZER};
+                                 .error = error};
     enum host_direct outcome = run_order(&common, order, 0, 0, true, tets);
-    (void)pthread_mutex_destroy(&common.pouring);
     for (unsigned i = 0; i < HOST_THREADS_MAX; i++)
         host_unmap(common.arena[i], common.bytes[i]);
     return outcome;

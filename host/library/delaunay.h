@@ -59,14 +59,6 @@ struct host_direct_store {
     void *context;
 };
 
-/* Takes final tetrahedra in blocks, as regions are done and at last the seam,
- * in place of the list.  put: each row canonical, one call at a time, by any
- * thread.  It cannot fail: what has no use for more cancels the call. */
-struct host_direct_sink {
-    void (*put)(void *context, const uint32_t (*v)[4], uint64_t count);
-    void *context;
-};
-
 struct host_direct_sums {
     const struct host_direct_store *store; /* or NULL */
     /* NULL, or called on the calling thread with the number of bricks that are
@@ -74,7 +66,9 @@ struct host_direct_sums {
     void (*committed)(uint32_t bricks);
     _Atomic uint32_t bricks;
     bool by_vertex; /* vertex numbers of the order, not rows of the input */
-    struct host_direct_sink sink; /* put: NULL for none */
+    /* Takes the tetrahedra as regions are done, and of the seam at last, in
+     * place of the list.  put: NULL for none. */
+    struct host_sink sink;
     unsigned threads;
     struct host_direct_part part[HOST_THREADS_MAX];
 };

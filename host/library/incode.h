@@ -150,7 +150,8 @@ void incode_adjacency_free(struct incode_adjacency *a);
 /* Where incode_stream gets points and puts tetrahedra.  The call calls one of
  * these at a time, from the calling thread or from another thread of the call,
  * which blocks all signals.  If one returns false, the call ends with
- * INCODE_CANCELLED, and calls none of them again.  No exception or longjmp may
+ * INCODE_CANCELLED, and calls none of them again.  The calling thread may call
+ * options->progress meanwhile.  No exception or longjmp may
  * leave them. */
 struct incode_callbacks {
     /* Writes x, y, z of the next points, at most `room`, to xyz[3 * room], and
@@ -198,8 +199,12 @@ struct incode_totals {
  * `out` need not be initialised; it owns no memory.  On an error only `at` and
  * `error` in it have a meaning.  Limits as of incode_delaunay.
  *
- * Memory without a limit: about 110 bytes a point.  Scratch with one: about 120
- * bytes a point, and up to 60 files that are open at once.  Work: as of
+ * A full disk is INCODE_IO.  A disk that loses what it took raises SIGBUS in
+ * the process, as of every file that is mapped.
+ *
+ * Memory without a limit: about 110 bytes a point, and 180 MB a thread. Scratch
+ * with one: 100 to 160 bytes a point and a quarter of the limit, in 12 files
+ * and up to 4 for each thread, which are open at once. Work: as of
  * incode_delaunay, without the sort. */
 enum incode_status
 incode_stream(const struct incode_callbacks *callbacks,

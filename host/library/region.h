@@ -23,7 +23,6 @@ struct direct_call {
     struct host_direct_sums *sums;         /* or NULL */
     const struct host_direct_store *store; /* or NULL */
     struct host_error *error;
-    pthread_mutex_t pouring; /* held while the sink takes rows */
     /* What the triangulators of threads work in; NULL: nothing yet. */
     void *arena[HOST_THREADS_MAX];
     size_t bytes[HOST_THREADS_MAX];

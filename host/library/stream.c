@@ -135,7 +135,7 @@ static enum incode_status triangulate(struct stream *s) {
     s->call.host.phases = 2;
     if (status != INCODE_OK || host_call_cancelled())
         return status;
-    s->state->sums.sink = (struct host_direct_sink){put, s};
+    s->state->sums.sink = (struct host_sink){put, s, PTHREAD_MUTEX_INITIALIZER};
     status = library_direct(
         host_direct_run(&s->order, &none, &s->state->sums, &s->error));
     s->call.host.phases = 3;
@@ -159,8 +159,8 @@ static enum incode_status begin(struct stream *s) {
     if (s->resident_max == 0)
         return INCODE_OK;
     host->threads = most < host->threads ? (unsigned)most : host->threads;
-    if (host_scratch_begin(&s->state->scratch, folder, s->resident_max,
-                           host->threads, true, &s->error) != 0) {
+    if (host_scratch_begin_own(&s->state->scratch, folder, s->resident_max,
+                               host->threads, &s->error) != 0) {
         s->out->error = s->state->scratch.failure;
         return INCODE_IO;
     }

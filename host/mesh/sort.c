@@ -258,13 +258,28 @@ static void sort_rows(void *argument) {
     flag_sort(s->v, s->n, digit, bits);
 }
 
-void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n,
-                               const uint32_t *map) {
-    for (uint64_t i = 0; i < n; i++) {
-        for (int k = 0; k < 4 && map != NULL; k++)
-            v[i][k] = map[v[i][k]];
+void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n) {
+    for (uint64_t i = 0; i < n; i++)
         canonical(v[i]);
+}
+
+void host_tetrahedra_pour(struct host_tetrahedra *tets, const uint32_t *map,
+                          struct host_sink *sink) {
+    enum { BLOCK = 1 << 12, TOUCHED = 40 /* bytes a row */ };
+    for (uint64_t i = 0; i < tets->count && !host_call_cancelled();) {
+        row_t *v = tets->v + i;
+        uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
+        for (uint64_t k = 0; k < 4 * n && map != NULL; k++)
+            v[k / 4][k % 4] = map[v[k / 4][k % 4]];
+        host_tetrahedra_canonical(v, n);
+        host_call_trim((size_t)n * TOUCHED);
+        (void)pthread_mutex_lock(&sink->lock);
+        if (!host_call_cancelled())
+            sink->put(sink->context, (const uint32_t(*)[4])v, n);
+        (void)pthread_mutex_unlock(&sink->lock);
+        i += n;
     }
+    host_tetrahedra_cut(tets, 0);
 }
 
 struct canon {

@@ -7,6 +7,7 @@
 #ifndef HOST_TETRAHEDRA_H
 #define HOST_TETRAHEDRA_H
 
+#include <pthread.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -43,11 +44,22 @@ void host_tetrahedra_map(struct host_tetrahedra *tets, const uint32_t *map);
 int host_tetrahedra_join(struct host_tetrahedra *tets, unsigned lists,
                          const uint32_t *map, struct host_error *error);
 
-/* Replaces every vertex number by map[vertex], if map is not NULL, and turns
- * each of n rows so that its smallest vertex comes first, then the smallest
- * that an even permutation allows. */
-void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n,
-                               const uint32_t *map);
+/* Turns each of n rows so that its smallest vertex comes first, then the
+ * smallest that an even permutation allows. */
+void host_tetrahedra_canonical(uint32_t (*v)[4], uint64_t n);
+
+/* Takes rows in blocks, each row canonical, one call at a time, from any
+ * thread. It cannot fail: what has no use for more rows cancels the call. */
+struct host_sink {
+    void (*put)(void *context, const uint32_t (*v)[4], uint64_t count);
+    void *context;
+    pthread_mutex_t lock; /* held meanwhile */
+};
+
+/* Gives all rows to the sink, with map[vertex] for each vertex if map is not
+ * NULL, and drops them. */
+void host_tetrahedra_pour(struct host_tetrahedra *tets, const uint32_t *map,
+                          struct host_sink *sink);
 
 /* Gives back what is mapped beyond the rows. */
 void host_tetrahedra_trim(struct host_tetrahedra *tets);

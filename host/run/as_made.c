@@ -28,9 +28,22 @@ int host_as_made_check(const struct host_run_options *options,
 /* The sink: by any thread, one at a time. */
 static void put(void *context, const uint32_t (*v)[4], uint64_t count) {
     (void)context;
-    for (unsigned i = 0; i < outputs; i++)
+    for (unsigned i = 0; i < outputs; i++) {
         host_rows_put(&output[i], v, count);
+        if (output[i].out.failure != 0)
+            host_call()->cancelled = true; /* the rest is of no use */
+    }
     made += count;
+}
+
+int host_as_made_fail(struct host_error *error) {
+    struct host_error why = {0};
+    for (unsigned i = 0; i < outputs; i++)
+        if (output[i].out.failure != 0)
+            host_rows_close(&output[i], &why);
+    if (why.code != 0)
+        *error = why;
+    return error->code;
 }
 
 int host_as_made_begin(const struct host_run_options *options,
@@ -48,7 +61,8 @@ int host_as_made_begin(const struct host_run_options *options,
                            error) != 0)
             return error->code;
     streams = true;
-    sums->sink = (struct host_direct_sink){.put = put};
+    sums->sink =
+        (struct host_sink){.put = put, .lock = PTHREAD_MUTEX_INITIALIZER};
     return 0;
 }
 
@@ -62,7 +76,7 @@ bool host_as_made_end(struct host_tetrahedra *tets,
         result->tetrahedra = made;
     for (uint64_t i = 0; i < tets->count; i += BLOCK) {
         uint64_t n = tets->count - i < BLOCK ? tets->count - i : BLOCK;
-        host_tetrahedra_canonical(tets->v + i, n, NULL);
+        host_tetrahedra_canonical(tets->v + i, n);
         host_call_trim((size_t)n * sizeof *tets->v);
     }
     return streams;

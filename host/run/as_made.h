@@ -20,6 +20,10 @@ int host_as_made_begin(const struct host_run_options *options,
                        const struct host_points *points,
                        struct host_direct_sums *sums, struct host_error *error);
 
+/* Of a run that has failed: if that is because such an output takes no more,
+ * the error says so.  error->code. */
+int host_as_made_fail(struct host_error *error);
+
 /* Ends such outputs, and counts what they have: true.  Without them, turns the
  * rows of `tets` into what they are in every order, for outputs that take them
  * now: false. */

@@ -684,7 +684,7 @@ static int triangulate(const struct host_run_options *options,
     if (host_as_made_begin(options, points, &sums, error) != 0)
         return error->code;
     if (host_direct_run(order, tets, &sums, error) != HOST_DIRECT_DONE)
-        return error->code;
+        return host_as_made_fail(error);
     take_sums(&sums, r);
     if (!sums.by_vertex)
         return 0;

@@ -11,8 +11,11 @@ import cffi
 
 
 def declarations(header):
-    """The header without what is for the preprocessor and for C++."""
+    """The header without what is for the preprocessor and for C++, and without
+    what is in struct incode_callbacks, which the package does not use: cffi
+    compiles no function with a pointer to constant arrays."""
     text = re.sub(r"#ifdef __cplusplus.*?#endif", "", header, flags=re.S)
+    text = re.sub(r"(struct incode_callbacks) {.*?\n}", r"\1", text, flags=re.S)
     return re.sub(r"^#.*$", "", text, flags=re.M)
 
 

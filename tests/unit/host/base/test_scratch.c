@@ -37,7 +37,7 @@ static int enter(void **unused) {
     limit = resident() + 16 * MIB;
     call = (struct host_call){
         .threads = THREADS, .memory_max = UINT64_MAX, .scratch = &scratch};
-    if (host_scratch_begin(&scratch, "/tmp", limit, THREADS, false, &error) != 0)
+    if (host_scratch_begin(&scratch, "/tmp", limit, THREADS, &error) != 0)
         return -1;
     host_call_enter(&call);
     return 0;
@@ -233,7 +233,7 @@ TEST_WITH(test_a_disk_without_room_is_an_error, enter, leave) {
 TEST(test_a_folder_that_takes_no_file_is_an_error) {
     struct host_error error = {0};
     assert_int_equal(
-        host_scratch_begin(&scratch, "/absent", 16 * MIB, 1, false, &error),
+        host_scratch_begin(&scratch, "/absent", 16 * MIB, 1, &error),
         HOST_INPUT);
     assert_non_null(strstr(error.text, "/absent: no scratch file"));
 }

@@ -348,7 +348,7 @@ static void begin_call(void) {
     struct host_error error = {0};
     call = (struct host_call){
         .threads = 1, .memory_max = UINT64_MAX, .scratch = &scratch};
-    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 64 << 20, 1, false, &error),
+    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 64 << 20, 1, &error),
                      0);
     host_call_enter(&call);
 }

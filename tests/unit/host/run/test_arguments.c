@@ -120,6 +120,7 @@ TEST(test_refused) {
         {"--index=tree", "naive, grid, kd"},
         {"--face-rule=all", "own, paper"},
         {"--build=stars", "auto, faces, points"},
+        {"--order=sorted", "canonical, as-made"},
         {"--link=wet-string", "no such name; allowed: tcp, "},
         {"--link=a-name-longer-than-any-other-name-that-there-is",
          "no such name; allowed: tcp"},
