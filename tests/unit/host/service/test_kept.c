@@ -254,7 +254,7 @@ TEST(test_nothing_to_keep) {
     struct host_error error = {0};
     host_kept_rows(NULL, NULL, NULL, NULL, 3);
     assert_int_equal(host_kept_load(NULL, NULL, NULL, NULL, &error), 0);
-    assert_int_equal(host_kept_brick(NULL, NULL, 0, &error), 0);
+    assert_int_equal(host_kept_brick(NULL, &ledger, 0, &error), 0);
     assert_int_equal(host_kept_write(NULL, NULL, 0, &error), 0);
     assert_int_equal(host_kept_lose(NULL, NULL, &error), 0);
     host_kept_lost(NULL, NULL, NULL);
