@@ -131,7 +131,7 @@ static bool scan_values(struct values *v, const char copy[COPY]) {
     text[crc - copy] = '\0';
     for (int i = 0; (line = strsep(&next, "\n")) != NULL && i < FIELDS; i++) {
         const char *value = strchr(line, ' ');
-        set(v, i, value == NULL ? "" : value + 1);
+        set(v, (enum field)i, value == NULL ? "" : value + 1);
     }
     return true;
 }

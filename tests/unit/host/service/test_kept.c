@@ -252,11 +252,11 @@ TEST_WITH(test_another_order, set_up, tear_down) {
 
 TEST(test_nothing_to_keep) {
     struct host_error error = {0};
-    host_kept_rows(NULL, NULL, NULL, NULL, 3);
-    assert_int_equal(host_kept_load(NULL, NULL, NULL, NULL, &error), 0);
-    assert_int_equal(host_kept_brick(NULL, NULL, 0, &error), 0);
-    assert_int_equal(host_kept_write(NULL, NULL, 0, &error), 0);
-    assert_int_equal(host_kept_lose(NULL, NULL, &error), 0);
-    host_kept_lost(NULL, NULL, NULL);
+    host_kept_rows(NULL, &ledger, &order, NULL, 3);
+    assert_int_equal(host_kept_load(NULL, &ledger, &order, &tets, &error), 0);
+    assert_int_equal(host_kept_brick(NULL, &ledger, 0, &error), 0);
+    assert_int_equal(host_kept_write(NULL, &tets, 0, &error), 0);
+    assert_int_equal(host_kept_lose(NULL, &tets, &error), 0);
+    host_kept_lost(NULL, &ledger, &tets);
     host_kept_free(NULL);
 }
