@@ -77,7 +77,10 @@ int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
                            struct host_error *error) {
     prepare(scratch, directory, resident_max, threads);
     scratch->own = true;
-    return probe(scratch, error);
+    scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (probe(scratch, error) != 0 && scratch->statm >= 0)
+        (void)close(scratch->statm);
+    return error->code;
 }
 
 void host_scratch_end(struct host_scratch *scratch) {
@@ -97,14 +100,21 @@ uint64_t host_scratch_free(const struct host_scratch *scratch) {
 
 /* --- trims ---------------------------------------------------------------- */
 
-static uint64_t resident(const struct host_scratch *s) {
-    char text[256], *end;
+/* Bytes by field `at` of statm, from 0. */
+static uint64_t bytes_of(const struct host_scratch *s, unsigned at) {
+    char text[256], *next = text;
+    uint64_t pages = 0;
     ssize_t n = pread(s->statm, text, sizeof text - 1, 0);
     if (n <= 0)
         return UINT64_MAX;
     text[n] = '\0';
-    (void)strtoull(text, &end, 10); /* address space */
-    return strtoull(end, NULL, 10) * PAGE;
+    for (unsigned i = 0; i <= at; i++)
+        pages = strtoull(next, &next, 10);
+    return pages * PAGE;
+}
+
+static uint64_t resident(const struct host_scratch *s) {
+    return bytes_of(s, 1);
 }
 
 /* Arenas of triangulators, a quarter of the limit, are touched all the time. */
@@ -121,14 +131,17 @@ void host_scratch_trim(struct host_scratch *scratch, size_t touched) {
     if (!is_over(scratch))
         return;
     (void)pthread_mutex_lock(&scratch->lock);
-    bool all_fit =
-        scratch->own && scratch->bytes < scratch->resident_max / 4 * 3;
     bool leave = is_over(scratch);
-    for (unsigned i = 0; i < scratch->arrays && leave && !all_fit; i++)
+    if (leave && scratch->own) {
+        /* No more than all files that this process has mapped. */
+        uint64_t mapped = bytes_of(scratch, 2);
+        bool fit = mapped < scratch->resident_max / 8 * 3;
+        leave = !fit && scratch->bytes >= scratch->resident_max / 4 * 3;
+        scratch->since = fit ? mapped : 0;
+    }
+    for (unsigned i = 0; i < scratch->arrays && leave; i++)
         (void)madvise(scratch->array[i].at, scratch->array[i].bytes,
                       MADV_DONTNEED);
-    if (leave)
-        scratch->since = 0;
     (void)pthread_mutex_unlock(&scratch->lock);
 }
 

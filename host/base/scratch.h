@@ -38,7 +38,7 @@ struct host_scratch {
     bool own;
     size_t array_min;     /* bytes of an array that becomes a file */
     size_t step;          /* bytes that a thread touches between two looks */
-    int statm;            /* tells how much is resident; -1 with `own` */
+    int statm;            /* tells how much is resident; -1: nothing does */
     pthread_mutex_t lock; /* of all that follows */
     struct host_scratch_array array[HOST_SCRATCH_ARRAYS];
     unsigned arrays;
@@ -54,9 +54,10 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                        uint64_t resident_max, unsigned threads,
                        struct host_error *error);
 /* The same where the limit is of what the call itself has resident, in a
- * process with other memory and other calls.  The kernel does not report that,
- * so pages leave each time threads have touched half of the limit, the same
- * pages perhaps.  `failure` is errno if no file can be made there. */
+ * process with other memory and other calls.  The kernel does not report that.
+ * So pages leave when threads have touched half of the limit, unless all files
+ * that the process has mapped have less resident.  `failure` is errno if no
+ * file can be made there. */
 int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
                            uint64_t resident_max, unsigned threads,
                            struct host_error *error);
