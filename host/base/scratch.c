@@ -34,14 +34,21 @@ static int make_file(const char *directory) {
     return file;
 }
 
-static uint64_t resident(const struct host_scratch *s) {
-    char text[256], *end;
+/* Bytes by field `at` of statm, from 0. */
+static uint64_t bytes_of(const struct host_scratch *s, unsigned at) {
+    char text[256], *next = text;
+    uint64_t pages = 0;
     ssize_t n = pread(s->statm, text, sizeof text - 1, 0);
     if (n <= 0)
         return UINT64_MAX;
     text[n] = '\0';
-    (void)strtoull(text, &end, 10); /* address space */
-    return strtoull(end, NULL, 10) * PAGE;
+    for (unsigned i = 0; i <= at; i++)
+        pages = strtoull(next, &next, 10);
+    return pages * PAGE;
+}
+
+static uint64_t resident(const struct host_scratch *s) {
+    return bytes_of(s, 1);
 }
 
 /* Arenas of triangulators, a quarter of the limit, are touched all the time. */
@@ -108,7 +115,10 @@ int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
                            struct host_error *error) {
     prepare(scratch, directory, resident_max, threads);
     scratch->own = true;
-    return probe(scratch, error);
+    scratch->statm = open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+    if (probe(scratch, error) != 0 && scratch->statm >= 0)
+        (void)close(scratch->statm);
+    return error->code;
 }
 
 int host_scratch_begin_small(struct host_scratch *scratch,
@@ -174,6 +184,15 @@ static uint64_t resident_of(const struct host_scratch *s,
     return bytes;
 }
 
+/* Whether threads have not touched the same pages again and again: the call has
+ * no more in files than all that this process has mapped. */
+static bool own_is_over(struct host_scratch *s) {
+    uint64_t mapped = bytes_of(s, 2);
+    bool fit = mapped < s->resident_max / 8 * 3;
+    s->since = fit ? mapped : 0;
+    return !fit && s->bytes >= s->resident_max / 4 * 3;
+}
+
 static void trim_small(struct host_scratch *s) {
     uint64_t bytes = 0;
     for (unsigned i = 0; i < s->arrays; i++)
@@ -191,15 +210,10 @@ void host_scratch_trim(struct host_scratch *scratch, size_t touched) {
     if (scratch->pagemap < 0 && !is_over(scratch))
         return;
     (void)pthread_mutex_lock(&scratch->lock);
-    bool all_fit =
-        scratch->own && scratch->bytes < scratch->resident_max / 4 * 3;
-    if (scratch->pagemap >= 0) {
+    if (scratch->pagemap >= 0)
         trim_small(scratch);
-    } else if (is_over(scratch)) { /* still */
-        if (!all_fit)
-            let_leave(scratch);
-        scratch->since = 0;
-    }
+    else if (is_over(scratch) && (!scratch->own || own_is_over(scratch)))
+        let_leave(scratch); /* it is over still */
     (void)pthread_mutex_unlock(&scratch->lock);
 }
 

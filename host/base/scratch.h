@@ -40,7 +40,7 @@ struct host_scratch {
     uint64_t memory_first; /* bytes of arrays of the call that stay in memory
                               before any becomes a file */
     size_t step;           /* bytes that a thread touches between two looks */
-    int statm;             /* tells how much is resident; -1 with `own` */
+    int statm;             /* tells how much is resident; -1: nothing does */
     int pagemap;           /* and of these arrays; -1: is not asked */
     uint64_t resident_seen,
         trims;            /* then: the most, and how often pages left */
@@ -61,9 +61,10 @@ int host_scratch_begin(struct host_scratch *scratch, const char *directory,
                        uint64_t resident_max, unsigned threads,
                        struct host_error *error);
 /* The same where the limit is of what the call itself has resident, in a
- * process with other memory and other calls.  The kernel does not report that,
- * so pages leave each time threads have touched half of the limit, the same
- * pages perhaps.  `failure` is errno if no file can be made there. */
+ * process with other memory and other calls.  The kernel does not report that.
+ * So pages leave when threads have touched half of the limit, unless all files
+ * that the process has mapped have less resident.  `failure` is errno if no
+ * file can be made there. */
 int host_scratch_begin_own(struct host_scratch *scratch, const char *directory,
                            uint64_t resident_max, unsigned threads,
                            struct host_error *error);
