@@ -85,9 +85,10 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     if (incode_fixed_differences(n, p + 1, 3, a, most))
         return incode_fixed_orient3d((const int64_t(*)[3])n);
     int sign;
-    if (least < UNEVEN * most && incode_scaled_orient3d(p, most, &sign))
-        return sign;
-    if (incode_pair_orient3d(p, most, &sign))
+    bool uneven = least < UNEVEN * most;
+    if ((uneven && incode_scaled_orient3d(p, most, &sign)) ||
+        incode_pair_orient3d(p, most, &sign) ||
+        (!uneven && incode_scaled_orient3d(p, most, &sign)))
         return sign;
     incode_yield_after(&tally->yield, EXACT_ORIENT3D_UNITS);
     return incode_exact_orient3d(p);
@@ -128,9 +129,9 @@ static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
     incode_yield_after(&tally->yield, IN_SPHERE_UNITS);
     if (incode_fixed_differences(n, p, 4, p[4], most))
         return incode_fixed_in_sphere((const int64_t(*)[3])n, near_zero);
-    if (uneven && incode_scaled_in_sphere(p, most, &sign))
-        return sign;
-    if (incode_pair_in_sphere(p, most, &sign))
+    if ((uneven && incode_scaled_in_sphere(p, most, &sign)) ||
+        incode_pair_in_sphere(p, most, &sign) ||
+        (!uneven && incode_scaled_in_sphere(p, most, &sign)))
         return sign;
     sign = incode_exact_in_sphere(p, &tally->yield);
     return sign != 0 ? sign : in_sphere_tie(tally, p);
