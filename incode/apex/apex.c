@@ -290,8 +290,8 @@ void incode_search_from(struct incode_make *n, struct incode_search *s) {
     const struct incode_local_points *local = &n->maker->local;
     struct incode_query *q = &s->query;
     /* A ball that is known is relative to the vertex. */
-    bool turns = !n->regular && !(n->degenerate.known &&
-                                  n->degenerate.ball.radius < 1e300);
+    bool turns = !n->regular &&
+                 !(n->degenerate.known && n->degenerate.ball.radius < 1e300);
     if (n->bare)
         incode_make_sphere(n);
     set_face(n, q);
