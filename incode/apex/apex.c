@@ -239,9 +239,36 @@ static enum incode_near contest_all(struct incode_make *n) {
     return fits ? INCODE_NEAR_FOUND : INCODE_NEAR_SEARCH;
 }
 
-void incode_search_from(struct incode_make *n, struct incode_search *s) {
+/* Turns an irregular face so that it begins with the vertex across its longest
+ * edge: relative to it, the two others lose least, and so do the points around
+ * them. */
+static void turn(struct incode_query *q) {
+    const double *const p[3] = {q->pv, q->pb, q->pc};
+    const uint32_t id[3] = {q->v, q->b, q->c};
+    double turned[3][3], most = -1;
+    int at = 0;
+    for (int i = 0; i < 3; i++) {
+        const double *const edge[2] = {p[(i + 1) % 3], p[(i + 2) % 3]};
+        for (int d = 0; d < 3; d++) {
+            double e = __builtin_fabs(edge[0][d] - edge[1][d]);
+            at = e > most ? i : at;
+            most = e > most ? e : most;
+        }
+    }
+    for (int i = 0; i < 3; i++)
+        memcpy(turned[i], p[(at + i) % 3], sizeof turned[i]);
+    q->v = id[at];
+    q->b = id[(at + 1) % 3];
+    q->c = id[(at + 2) % 3];
+    memcpy(q->pv, turned[0], sizeof q->pv);
+    memcpy(q->pb, turned[1], sizeof q->pb);
+    memcpy(q->pc, turned[2], sizeof q->pc);
+    incode_query_face(q);
+}
+
+/* Sets the query's face. */
+static void set_face(const struct incode_make *n, struct incode_query *q) {
     const struct incode_local_points *local = &n->maker->local;
-    struct incode_query *q = &s->query;
     memset(q, 0, sizeof *q);
     q->question = INCODE_QUERY_APEX;
     q->v = local->vertex;
@@ -253,23 +280,38 @@ void incode_search_from(struct incode_make *n, struct incode_search *s) {
     q->scale = local->scale;
     memcpy(q->rb, n->rb, sizeof q->rb);
     memcpy(q->rc, n->rc, sizeof q->rc);
+    q->sphere = n->sphere;
     q->best = INCODE_NONE;
     q->empty = &n->maker->empty;
+    q->degenerate = n->degenerate;
+}
+
+void incode_search_from(struct incode_make *n, struct incode_search *s) {
+    const struct incode_local_points *local = &n->maker->local;
+    struct incode_query *q = &s->query;
+    /* A ball that is known is relative to the vertex. */
+    bool turns = !n->regular &&
+                 !(n->degenerate.known && n->degenerate.ball.radius < 1e300);
+    if (n->bare)
+        incode_make_sphere(n);
+    set_face(n, q);
     s->radius = local->radius > DBL_MIN ? local->radius : DBL_MIN;
     s->looked = local->near;
     s->final = false;
     s->degenerate = n->degenerate.known;
-    q->degenerate = n->degenerate;
+    if (turns) {
+        incode_maker_yield(n->maker, INCODE_FINE_UNITS);
+        turn(q);
+        s->radius = s->radius * q->scale > 1 ? s->radius : 1 / q->scale;
+    }
     if (n->best == INCODE_LOCAL_NONE) {
-        q->sphere = n->sphere;
         s->radius *= 2;
         incode_search_box(n->maker, s);
         return;
     }
-    if (n->bare)
-        incode_make_sphere(n);
-    q->sphere = n->sphere;
     incode_maker_yield(n->maker, INCODE_LESSEN_UNITS);
+    if (turns)
+        incode_query_apex(q, &n->maker->counts.tally, n->store[3]);
     incode_query_start(q, local->id[n->best], n->store[3]);
     incode_search_last(n->maker, s);
     q->done = true;

@@ -152,6 +152,17 @@ static bool is_outside(struct incode_query *q, struct incode_tally *tally,
     return incode_near_degenerate_outside(&q->degenerate, q->pv, p, q->scale);
 }
 
+void incode_query_apex(struct incode_query *q, struct incode_tally *tally,
+                       const double p[3]) {
+    double r[3];
+    incode_query_relative(r, q, p);
+    incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
+    if (incode_sphere_is_ill_conditioned(&q->sphere)) {
+        incode_yield_after(&tally->yield, INCODE_FINE_UNITS);
+        incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
+    }
+}
+
 void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
                            uint32_t id, const double p[3]) {
     incode_yield_after(&tally->yield, CONSIDER_UNITS);
@@ -162,13 +173,7 @@ void incode_query_consider(struct incode_query *q, struct incode_tally *tally,
     if (q->best != INCODE_NONE &&
         incode_in_sphere(tally, q->pv, q->pb, q->pc, q->best_p, p) < 0)
         return;
-    double r[3];
-    incode_query_relative(r, q, p);
-    incode_sphere_apex(&q->sphere, q->rb, q->rc, r);
-    if (incode_sphere_is_ill_conditioned(&q->sphere)) {
-        incode_yield_after(&tally->yield, INCODE_FINE_UNITS);
-        incode_sphere_refine(&q->sphere, q->pv, q->pb, q->pc, p, q->scale);
-    }
+    incode_query_apex(q, tally, p);
     if (q->degenerate.known)
         incode_yield_after(&tally->yield, INCODE_LESSEN_UNITS);
     if (q->looked >= INCODE_QUERY_CROWD)

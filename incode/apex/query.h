@@ -117,6 +117,10 @@ void incode_query_half_space(struct incode_query *q, const double pv[3],
 /* Sets the face (v, b, c) of an APEX query: plane and scale. */
 void incode_query_face(struct incode_query *q);
 
+/* Sets the sphere through the face and a point beyond it. */
+void incode_query_apex(struct incode_query *q, struct incode_tally *tally,
+                       const double p[3]);
+
 /* The first candidate, known to be beyond the face; the sphere is that through
  * it already. */
 void incode_query_start(struct incode_query *q, uint32_t id, const double p[3]);

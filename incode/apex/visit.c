@@ -418,7 +418,7 @@ enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
     struct incode_search *s = &m->search[slot];
     const struct incode_query *q = &s->query;
     uint16_t near[2] = {INCODE_LOCAL_NONE, INCODE_LOCAL_NONE};
-    uint32_t apex = INCODE_LOCAL_NONE;
+    uint32_t apex = INCODE_LOCAL_NONE, v = m->local.vertex, b, c;
     s->advanced = false;
     if (s->stage == INCODE_SEARCH_POINTS) {
         enum incode_step r = incode_search_run(m, s);
@@ -426,13 +426,16 @@ enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
             return r;
         s->stage = INCODE_SEARCH_FOUND;
     }
+    /* The face as it came: the search may have turned it. */
+    b = q->v == v ? q->b : q->b == v ? q->c : q->v;
+    c = q->v == v ? q->c : q->b == v ? q->v : q->b;
     if (q->best != INCODE_NONE) {
         apex = incode_local_find(&m->local, q->best);
         if (apex == INCODE_LOCAL_NONE)
             apex = incode_local_append(&m->local, q->best, q->best_p);
-        enum incode_step r = resolve(m, q->b, &near[0], &s->page);
+        enum incode_step r = resolve(m, b, &near[0], &s->page);
         if (r == INCODE_FINISHED)
-            r = resolve(m, q->c, &near[1], &s->page);
+            r = resolve(m, c, &near[1], &s->page);
         if (r != INCODE_FINISHED || apex == INCODE_LOCAL_NONE)
             return r != INCODE_FINISHED ? r : INCODE_AGAIN;
     }
@@ -443,7 +446,7 @@ enum incode_step incode_maker_resume(struct incode_maker *m, unsigned slot,
     if (q->best != INCODE_NONE)
         set_answer(a, m, near[0], near[1], (uint16_t)apex);
     else
-        set_hull(a, q->v, q->b, q->c);
+        set_hull(a, v, b, c);
     return INCODE_FINISHED;
 }
 

@@ -485,3 +485,153 @@ bool incode_pair_in_sphere(const double *const p[5], double most, int *sign) {
     return decide(incode_dd_plus(incode_dd_minus(a, b), incode_dd_minus(c, e)),
                   IN_SPHERE_BOUND * m[0] * m[1] * m[2] * (w * w), sign);
 }
+
+/* --- scaled --------------------------------------------------------------- */
+
+/* Roundings, in units of 2^-53 of the sum of the sizes of all terms: at most 8
+ * (orient3d) and 16 (in_sphere) of them lead to a term's share of the sum
+ * (Shewchuk, Discrete and Computational Geometry 18:305-363, 1997).  The sum of
+ * sizes is rounded as often, which half as much again covers. */
+#define SCALED_ORIENT3D_BOUND (12 * 0x1p-53)
+#define SCALED_IN_SPHERE_BOUND (24 * 0x1p-53)
+/* What underflows is below 2^-1022 a time, and no factor exceeds 16. */
+#define SCALED_LOST 0x1p-1000
+
+/* The exponent e of a number, 2^e <= |a| < 2^(e + 1); at least -1023, for 0 and
+ * denormals. */
+static int32_t exponent_of(double a) {
+    uint64_t bits;
+    memcpy(&bits, &a, sizeof bits);
+    return (int32_t)(bits >> 52 & 0x7ff) - 1023;
+}
+
+/* a * 2^e, |e| <= 3069, where it does not overflow. */
+static double shifted(double a, int32_t e) {
+    int32_t third = e / 3;
+    double by = incode_power_of_two(third);
+    return a * by * by * incode_power_of_two(e - 2 * third);
+}
+
+/* Differences from a point, each axis divided by a power of two, so that its
+ * largest is about 1, and then each row.  The sign of a determinant stays. */
+struct scaled_rows {
+    double d[4][3];
+    double square[4]; /* of the row's length, likewise */
+};
+
+static void set_squares(struct scaled_rows *s, double x[][3],
+                        const int32_t row[4]) {
+    int32_t e[4], most = INT32_MIN;
+    for (int i = 0; i < 4; i++) {
+        int32_t size = -1023;
+        s->square[i] = 0;
+        for (int k = 0; k < 3; k++)
+            size = exponent_of(x[i][k]) > size ? exponent_of(x[i][k]) : size;
+        for (int k = 0; k < 3; k++) {
+            double u = shifted(x[i][k], -size);
+            s->square[i] += u * u;
+        }
+        e[i] = 2 * size - row[i];
+        most = e[i] > most ? e[i] : most;
+    }
+    for (int i = 0; i < 4; i++)
+        s->square[i] =
+            e[i] - most < -1022 ? 0 : shifted(s->square[i], e[i] - most);
+}
+
+static void set_rows(struct scaled_rows *s, const double *const p[], int count,
+                     const double *origin) {
+    double x[4][3];
+    int32_t column[3] = {-1023, -1023, -1023}, row[4];
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++) {
+            x[i][k] = p[i][k] - origin[k];
+            int32_t e = exponent_of(x[i][k]);
+            column[k] = e > column[k] ? e : column[k];
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        row[i] = INT32_MIN;
+        for (int k = 0; k < 3; k++) {
+            int32_t e = exponent_of(x[i][k]) - column[k];
+            row[i] = e > row[i] ? e : row[i];
+        }
+        for (int k = 0; k < 3; k++)
+            s->d[i][k] = shifted(x[i][k], -column[k] - row[i]);
+    }
+    if (count == 4)
+        set_squares(s, x, row);
+}
+
+/* A determinant, and the sum of its terms' sizes. */
+struct sized {
+    double value, size;
+};
+
+static struct sized sized_minor3(const double a[3], const double b[3],
+                                 const double c[3]) {
+    struct sized m = {0, 0};
+    for (int k = 0; k < 3; k++) {
+        int u = (k + 1) % 3, v = (k + 2) % 3;
+        double p = b[u] * c[v], q = c[u] * b[v];
+        m.value += (p - q) * a[k];
+        m.size +=
+            (__builtin_fabs(p) + __builtin_fabs(q)) * __builtin_fabs(a[k]);
+    }
+    return m;
+}
+
+static bool decide_sized(struct sized m, double bound, int *sign) {
+    *sign = m.value > 0 ? 1 : -1;
+    return __builtin_fabs(m.value) > bound * m.size + SCALED_LOST;
+}
+
+/* No difference of two of the points overflows, where those from one of them
+ * are at most `most`. */
+static bool is_in_range(double most) {
+    return most < 0x1p1021;
+}
+
+/* Takes each point in turn for the origin, from the last on: what differences
+ * from one lose, those from another may keep. */
+bool incode_scaled_orient3d(const double *const p[4], double most, int *sign) {
+    struct scaled_rows s;
+    for (int i = 3; i >= 0 && is_in_range(most); i--) {
+        const double *q[3] = {p[i == 0 ? 3 : 0], p[i == 1 ? 3 : 1],
+                              p[i == 2 ? 3 : 2]};
+        set_rows(&s, q, 3, p[i]);
+        if (decide_sized(sized_minor3(s.d[0], s.d[1], s.d[2]),
+                         SCALED_ORIENT3D_BOUND, sign)) {
+            *sign = i == 3 ? -*sign : *sign;
+            return true;
+        }
+    }
+    return false;
+}
+
+static struct sized sized_in_sphere(const struct scaled_rows *s) {
+    static const uint8_t REST[4][3] = {
+        {1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
+    struct sized sum = {0, 0};
+    for (int i = 0; i < 4; i++) {
+        struct sized m =
+            sized_minor3(s->d[REST[i][0]], s->d[REST[i][1]], s->d[REST[i][2]]);
+        sum.value += s->square[i] * m.value;
+        sum.size += s->square[i] * m.size;
+    }
+    return sum;
+}
+
+bool incode_scaled_in_sphere(const double *const p[5], double most, int *sign) {
+    struct scaled_rows s;
+    for (int i = 4; i >= 0 && is_in_range(most); i--) {
+        const double *q[4] = {p[i == 0 ? 4 : 0], p[i == 1 ? 4 : 1],
+                              p[i == 2 ? 4 : 2], p[i == 3 ? 4 : 3]};
+        set_rows(&s, q, 4, p[i]);
+        if (decide_sized(sized_in_sphere(&s), SCALED_IN_SPHERE_BOUND, sign)) {
+            *sign = i == 4 ? *sign : -*sign;
+            return true;
+        }
+    }
+    return false;
+}

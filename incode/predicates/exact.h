@@ -88,4 +88,15 @@ bool incode_pair_orient3d(const double *const p[4], double most, int *sign);
  * largest |p[i][k] - p[4][k]| as rounded. */
 bool incode_pair_in_sphere(const double *const p[5], double most, int *sign);
 
+/* The predicates in doubles, for points with coordinates of very different
+ * exponents: axes and rows are scaled by powers of two, and the bound of the
+ * error is that of the terms themselves.
+ *
+ * Memory: under 1 KB of stack.  Work: up to 4 times 150 (orient3d) or 5 times
+ * 400 (in_sphere) operations.
+ *
+ * True: *sign is that of the exact predicate, as above. */
+bool incode_scaled_orient3d(const double *const p[4], double most, int *sign);
+bool incode_scaled_in_sphere(const double *const p[5], double most, int *sign);
+
 #endif

@@ -34,13 +34,25 @@ void incode_yield_fill(struct incode_yield *yield, void *memory, int byte,
 /* Each sign comes from the first stage that is sure of it:
  *   the rounded determinant and a bound on its error (static filter);
  *   integers of one common scale (fixed.h), which also settle true zeros;
- *   numbers of two doubles and a bound on their error (pair.h);
+ *   numbers of two doubles and a bound on their error (exact.h);
+ *   doubles scaled axis by axis and row by row, with the bound of their own
+ *   terms (exact.h): tried before pairs where the axes' differences are uneven;
  *   the polynomial itself, without rounding (exact.h).
  * Stack: below INCODE_EXACT_STACK + 1024 bytes. */
 
 /* Units of work, as yield.h counts them, of what no filter decides, at the
  * most: fixed.h and pair.h, then exact.h, which counts in_sphere itself. */
-enum { ORIENT3D_UNITS = 10, IN_SPHERE_UNITS = 32, EXACT_ORIENT3D_UNITS = 64 };
+enum {
+    ORIENT3D_UNITS = 10,
+    IN_SPHERE_UNITS = 32,
+    SCALED_ORIENT3D_UNITS = 10,
+    SCALED_IN_SPHERE_UNITS = 32,
+    EXACT_ORIENT3D_UNITS = 64
+};
+
+/* Of the largest difference, the largest of another axis: with less, the bounds
+ * of products of the largest are far too much. */
+#define UNEVEN 0x1p-20
 
 static double magnitude(double a) {
     return __builtin_fabs(a);
@@ -52,6 +64,18 @@ static double larger(double a, double b) {
 
 static double largest3(double a, double b, double c) {
     return larger(magnitude(a), larger(magnitude(b), magnitude(c)));
+}
+
+static bool scaled_orient3d(struct incode_tally *tally,
+                            const double *const p[4], double most, int *sign) {
+    incode_yield_after(&tally->yield, SCALED_ORIENT3D_UNITS);
+    return incode_scaled_orient3d(p, most, sign);
+}
+
+static bool scaled_in_sphere(struct incode_tally *tally,
+                             const double *const p[5], double most, int *sign) {
+    incode_yield_after(&tally->yield, SCALED_IN_SPHERE_UNITS);
+    return incode_scaled_in_sphere(p, most, sign);
 }
 
 int incode_orient3d(struct incode_tally *tally, const double a[3],
@@ -79,7 +103,10 @@ int incode_orient3d(struct incode_tally *tally, const double a[3],
     if (incode_fixed_differences(n, p + 1, 3, a, most))
         return incode_fixed_orient3d((const int64_t(*)[3])n);
     int sign;
-    if (incode_pair_orient3d(p, most, &sign))
+    bool uneven = least < UNEVEN * most;
+    if ((uneven && scaled_orient3d(tally, p, most, &sign)) ||
+        incode_pair_orient3d(p, most, &sign) ||
+        (!uneven && scaled_orient3d(tally, p, most, &sign)))
         return sign;
     incode_yield_after(&tally->yield, EXACT_ORIENT3D_UNITS);
     return incode_exact_orient3d(p);
@@ -113,14 +140,16 @@ static int in_sphere_tie(struct incode_tally *tally, const double *const p[5]) {
 
 /* p[4] is the query, `near_zero` as in fixed.h. */
 static int in_sphere_exact(struct incode_tally *tally, const double *const p[5],
-                           double most, bool near_zero) {
+                           bool uneven, double most, bool near_zero) {
     int64_t n[4][3];
     int sign;
     tally->exact_in_sphere++;
     incode_yield_after(&tally->yield, IN_SPHERE_UNITS);
     if (incode_fixed_differences(n, p, 4, p[4], most))
         return incode_fixed_in_sphere((const int64_t(*)[3])n, near_zero);
-    if (incode_pair_in_sphere(p, most, &sign))
+    if ((uneven && scaled_in_sphere(tally, p, most, &sign)) ||
+        incode_pair_in_sphere(p, most, &sign) ||
+        (!uneven && scaled_in_sphere(tally, p, most, &sign)))
         return sign;
     sign = incode_exact_in_sphere(p, &tally->yield);
     return sign != 0 ? sign : in_sphere_tie(tally, p);
@@ -158,7 +187,7 @@ int incode_in_sphere(struct incode_tally *tally, const double a[3],
             return -1;
     }
     const double *p[5] = {a, b, c, d, e};
-    return in_sphere_exact(tally, p, most, in_range);
+    return in_sphere_exact(tally, p, least < UNEVEN * most, most, in_range);
 }
 
 /* Differences of two points from the third, as rounded, and the largest. */

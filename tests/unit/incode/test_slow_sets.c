@@ -1,8 +1,9 @@
 /* Work that sets of hard shapes take face by face, counted and not by the
  * clock: a lattice of a plane and one point beside it, where most regions have
  * no point off the plane at hand; coordinates of very different exponents,
- * whose spheres reach most bricks, with pages for a part of them.  And point by
- * point: a plane, where few cells are known to be final by their boxes. */
+ * whose spheres reach most bricks, with pages for a part of them; and where
+ * each coordinate has an exponent of its own.  And point by point: a plane,
+ * where few cells are known to be final by their boxes. */
 #include <math.h>
 
 #include "tests/unit/incode/solo.h"
@@ -12,6 +13,9 @@ enum {
     PLANE = SIDE * SIDE + 1,
     MIXED = 4000,
     MORE_MIXED = 9000,
+    UNEVEN = 1000,
+    IN_SPHERES = 100, /* exact, a tetrahedron, and orient3d */
+    ORIENT3DS = 150,
     EXACT = 100,  /* orient3d that is exact, a tetrahedron */
     REQUESTS = 2, /* of pages, a tetrahedron */
     SCANS = 100   /* of all cells, by all regions */
@@ -152,4 +156,22 @@ TEST(released_vertices) {
     assert_int_equal(solo.tets.count,
                      count_by_points((const double(*)[3])xyz, PLANE));
     solo_close(&solo);
+}
+
+/* Coordinates of exponents of their own: a search relative to a far vertex of a
+ * face is in doubt about all points that are near to another. */
+TEST(uneven_coordinates) {
+    static double xyz[UNEVEN][3];
+    for (int i = 0; i < UNEVEN; i++)
+        for (int d = 0; d < 3; d++)
+            xyz[i][d] = (2 * draw() - 1) * pow(10, (int)(601 * draw()) - 300);
+    struct incode_statistics s =
+        run((const double(*)[3])xyz, UNEVEN, 1, 0, 1 << 20);
+    assert_int_equal(s.tetrahedra_kept,
+                     count_by_points((const double(*)[3])xyz, UNEVEN));
+    print_message("%.1f exact in_sphere a tetrahedron\n",
+                  (double)s.tally.exact_in_sphere / (double)s.tetrahedra_built);
+    assert_in_range(s.tally.exact_in_sphere, 0,
+                    IN_SPHERES * s.tetrahedra_built);
+    assert_in_range(s.tally.exact_orient3d, 0, ORIENT3DS * s.tetrahedra_built);
 }

@@ -263,7 +263,7 @@ TEST(test_lexicographic) {
 /* ---- the stages ---- */
 
 struct use {
-    long fixed, pair, exact;
+    long fixed, pair, scaled, exact;
 };
 
 static double largest_difference(double (*p)[3], int first, int n,
@@ -296,6 +296,10 @@ static void check_orient3d_stages(double (*p)[3], int family, long number,
         use->pair++;
         expect(sign, want, "pair orient3d", family, number, p);
     }
+    if (incode_scaled_orient3d(q, most, &sign)) {
+        use->scaled++;
+        expect(sign, want, "scaled orient3d", family, number, p);
+    }
 }
 
 static void check_in_sphere_stages(double (*p)[3], int family, long number,
@@ -311,6 +315,10 @@ static void check_in_sphere_stages(double (*p)[3], int family, long number,
     if (incode_pair_in_sphere(q, most, &sign)) {
         use->pair++;
         expect(sign, want, "pair in_sphere", family, number, p);
+    }
+    if (incode_scaled_in_sphere(q, most, &sign)) {
+        use->scaled++;
+        expect(sign, want, "scaled in_sphere", family, number, p);
     }
     bool fixed = incode_fixed_differences(d, q, 4, p[4], most);
     use->fixed += fixed;
@@ -338,17 +346,22 @@ TEST(test_stages) {
             check_orient3d_stages(p, family, n, &use);
             check_in_sphere_stages(p, family, n, &use);
         }
-        print_message("stages, %s: %ld cases, integers %ld, pairs %ld\n",
-                      hard_names[family], use.exact, use.fixed, use.pair);
+        print_message("stages, %s: %ld cases, integers %ld, pairs %ld, scaled "
+                      "%ld\n",
+                      hard_names[family], use.exact, use.fixed, use.pair,
+                      use.scaled);
         if (family <= HARD_FLOATS || family == HARD_DENORMAL)
             assert_true(use.fixed > use.exact * 9 / 10);
         if (family == HARD_SPREAD)
             assert_true(use.pair > use.exact * 9 / 10 &&
                         use.fixed < use.exact / 2);
+        if (family == HARD_EXPONENTS)
+            assert_true(use.scaled > use.exact * 9 / 10);
         all.fixed += use.fixed;
         all.pair += use.pair;
+        all.scaled += use.scaled;
     }
-    assert_true(all.fixed > 0 && all.pair > 0);
+    assert_true(all.fixed > 0 && all.pair > 0 && all.scaled > 0);
 }
 
 /* Integers as large as the stage allows, and every size below. */
