@@ -489,7 +489,7 @@ bool incode_pair_in_sphere(const double *const p[5], double most, int *sign) {
 /* --- scaled --------------------------------------------------------------- */
 
 /* Roundings, in units of 2^-53 of the sum of the sizes of all terms: at most 8
- * (orient3d) and 16 (in_sphere) of them lead to a term's share of the sum
+ * (orient3d) and 17 (in_sphere) of them lead to a term's share of the sum
  * (Shewchuk, Discrete and Computational Geometry 18:305-363, 1997).  The sum of
  * sizes is rounded as often, which half as much again covers. */
 #define SCALED_ORIENT3D_BOUND (12 * 0x1p-53)
