@@ -15,6 +15,8 @@ enum {
     FETCH_ROWS = 1 << 10,  /* a power of two */
     POLL_COPIED = 1 << 11, /* the same, of copies */
     AROUND = 1 << 16,      /* bytes that one row far from others touches */
+    ENTRIES_MIN = 16,      /* that go to a bucket at a time */
+    ENTRIES_MAX = 1 << 12,
     PARTS_MAX = 16
 };
 
@@ -25,12 +27,23 @@ struct table {
     size_t slots;   /* a power of two */
 };
 
+/* Rows of some hash values, of one thread's share. */
+struct bucket {
+    uint64_t next;  /* place of its next entry; when all are there, its end */
+    uint64_t count; /* entries that wait */
+};
+
 struct search {
     const double *xyz;
     uint64_t rows;
     unsigned parts;  /* threads */
     unsigned rounds; /* parts of the hash values for each */
     struct table table[PARTS_MAX];
+    /* Where the tables of all rows do not fit. */
+    struct bucket *bucket; /* [rounds * parts][parts] */
+    uint64_t *entry;   /* [rows] by buckets: half of the hash, and the row */
+    uint64_t *waiting; /* [rounds * parts][parts][each] entries */
+    size_t each;
     uint32_t *lowest; /* [rows], or NULL */
     uint8_t *doubled; /* [rows] 1 where an earlier row is equal, or NULL */
     uint64_t distinct[PARTS_MAX];
@@ -76,65 +89,178 @@ static uint32_t enter(const struct search *s, struct table *table, uint64_t h,
     return row;
 }
 
-/* Points of the next rows: as they stand, or fetched where they are aside. */
-static const double *next_points(const struct search *s, uint64_t row,
-                                 double (*block)[3]) {
-    if (host_call_share() == SIZE_MAX)
-        return s->xyz + 3 * row;
-    uint64_t left = s->rows - row;
-    size_t n = left < FETCH_ROWS ? (size_t)left : FETCH_ROWS;
-    host_fetch(block, s->xyz + 3 * row, n * sizeof *block);
-    return block[0];
+/* What is known of a row and the one it is equal to. */
+static void note(struct search *s, uint32_t mine, uint32_t other) {
+    if (s->lowest != NULL)
+        s->lowest[mine] = other;
+    if (s->doubled != NULL && other != mine)
+        s->doubled[mine] = 1;
+}
+
+static unsigned part_of(const struct search *s, uint64_t h) {
+    return (unsigned)((h >> 40) * s->parts * s->rounds >> 24);
 }
 
 /* Rows whose hash belongs to the part, in input order: so the first of equal
  * rows is the lowest. */
-static uint64_t search_round(struct search *s, struct table *table,
-                             unsigned part) {
-    const uint64_t parts = (uint64_t)s->parts * s->rounds;
-    double block[FETCH_ROWS][3];
-    const double *p = s->xyz;
+static void search_rows(struct search *s, unsigned part) {
+    struct table *table = &s->table[part];
     uint64_t waiting[AHEAD];
     uint32_t waiting_row[AHEAD];
-    uint64_t queued = 0, taken = 0, distinct = 0;
+    uint64_t queued = 0, taken = 0;
     for (uint64_t row = 0; row < s->rows || taken < queued;) {
         if (row < s->rows && queued - taken < AHEAD) {
-            if (row % FETCH_ROWS == 0)
-                p = next_points(s, row, block);
-            uint64_t h = hash(p + 3 * (row % FETCH_ROWS));
-            if ((h >> 40) * parts >> 24 == part) {
+            uint64_t h = hash(s->xyz + 3 * row);
+            if (part_of(s, h) == part) {
                 waiting[queued % AHEAD] = h;
                 waiting_row[queued % AHEAD] = (uint32_t)row;
                 __builtin_prefetch(&table->slot[h & (table->slots - 1)], 1);
                 queued++;
             }
             row++;
-            if (row % POLL_ROWS == 0 && host_call_cancelled())
-                break;
+            if (row % POLL_ROWS == 0) {
+                host_call_trim(POLL_ROWS * (3 * sizeof *s->xyz + 1));
+                if (host_call_cancelled())
+                    break;
+            }
             continue;
         }
         uint32_t mine = waiting_row[taken % AHEAD];
         uint32_t other = enter(s, table, waiting[taken % AHEAD], mine);
         taken++;
-        distinct += other == mine;
-        if (s->lowest != NULL)
-            s->lowest[mine] = other;
-        if (s->doubled != NULL && other != mine)
-            s->doubled[mine] = 1;
+        s->distinct[part] += other == mine;
+        note(s, mine, other);
         if (s->lowest != NULL && taken % FETCH_ROWS == 0)
-            host_call_trim(FETCH_ROWS * parts * sizeof *s->lowest);
+            host_call_trim(FETCH_ROWS * s->parts * sizeof *s->lowest);
     }
-    return distinct;
 }
 
 static void search_part(void *context, unsigned part) {
-    struct search *s = context;
-    struct table *table = &s->table[part];
-    for (unsigned i = 0; i < s->rounds && !host_call_cancelled(); i++) {
-        if (i > 0)
-            memset(table->slot, 0, table->slots * sizeof *table->slot);
-        s->distinct[part] += search_round(s, table, part * s->rounds + i);
+    search_rows(context, part);
+}
+
+/* --- Where the tables of all rows do not fit ------------------------------ */
+
+/* The rows go to buckets by their hash first, each in input order: an entry has
+ * half of the hash and the row.  Then threads search bucket after bucket. */
+
+static uint64_t part_start(const struct search *s, unsigned part) {
+    return s->rows / s->parts * part +
+           (part == s->parts ? s->rows % s->parts : 0);
+}
+
+/* Calls put for each row of the thread's share. */
+static void hash_rows(struct search *s, unsigned part,
+                      void (*put)(struct search *s, unsigned part,
+                                  unsigned bucket, uint64_t entry)) {
+    double block[FETCH_ROWS][3];
+    uint64_t last = part_start(s, part + 1);
+    for (uint64_t row = part_start(s, part); row < last;) {
+        size_t n = last - row < FETCH_ROWS ? (size_t)(last - row) : FETCH_ROWS;
+        host_fetch(block, s->xyz + 3 * row, n * sizeof *block);
+        for (size_t i = 0; i < n; i++, row++) {
+            uint64_t h = hash(block[i]);
+            put(s, part, part_of(s, h), h << 32 | row);
+        }
+        if (host_call_cancelled())
+            return;
     }
+}
+
+static struct bucket *bucket_of(const struct search *s, unsigned bucket,
+                                unsigned part) {
+    return &s->bucket[(size_t)bucket * s->parts + part];
+}
+
+static void count_entry(struct search *s, unsigned part, unsigned bucket,
+                        uint64_t entry) {
+    (void)entry;
+    bucket_of(s, bucket, part)->next++;
+}
+
+static void count_entries(void *context, unsigned part) {
+    hash_rows(context, part, count_entry);
+}
+
+static void flush(struct bucket *b, struct search *s) {
+    const uint64_t *waiting = s->waiting + (size_t)(b - s->bucket) * s->each;
+    host_store(s->entry + b->next, waiting, b->count * sizeof *s->entry);
+    b->next += b->count;
+    b->count = 0;
+}
+
+static void place_entry(struct search *s, unsigned part, unsigned bucket,
+                        uint64_t entry) {
+    struct bucket *b = bucket_of(s, bucket, part);
+    s->waiting[(size_t)(b - s->bucket) * s->each + b->count++] = entry;
+    if (b->count == s->each)
+        flush(b, s);
+}
+
+static void place_entries(void *context, unsigned part) {
+    struct search *s = context;
+    hash_rows(s, part, place_entry);
+    for (unsigned i = 0; i < s->parts * s->rounds; i++)
+        flush(bucket_of(s, i, part), s);
+}
+
+static void search_bucket(struct search *s, unsigned part, unsigned bucket) {
+    struct table *table = &s->table[part];
+    uint64_t block[FETCH_ROWS];
+    uint64_t at =
+        bucket == 0 ? 0 : bucket_of(s, bucket - 1, s->parts - 1)->next;
+    uint64_t last = bucket_of(s, bucket, s->parts - 1)->next;
+    memset(table->slot, 0, table->slots * sizeof *table->slot);
+    while (at < last && !host_call_cancelled()) {
+        size_t n = last - at < FETCH_ROWS ? (size_t)(last - at) : FETCH_ROWS;
+        host_fetch(block, s->entry + at, n * sizeof *block);
+        for (size_t i = 0; i < n; i++) {
+            uint32_t mine = (uint32_t)block[i],
+                     half = (uint32_t)(block[i] >> 32);
+            uint32_t other = enter(s, table, (uint64_t)half << 32 | half, mine);
+            s->distinct[part] += other == mine;
+            note(s, mine, other);
+        }
+        at += n;
+        host_call_trim(n * s->parts * s->rounds *
+                       (s->lowest != NULL ? sizeof *s->lowest : 1));
+    }
+}
+
+static void search_buckets(void *context, unsigned part) {
+    struct search *s = context;
+    for (unsigned i = 0; i < s->rounds && !host_call_cancelled(); i++)
+        search_bucket(s, part, part * s->rounds + i);
+}
+
+/* False: there is no memory. */
+static bool search_by_buckets(struct search *s) {
+    size_t buckets = (size_t)s->parts * s->parts * s->rounds;
+    size_t each = host_call_share() / 2 / (buckets * sizeof *s->waiting);
+    s->each = each < ENTRIES_MIN   ? ENTRIES_MIN
+              : each > ENTRIES_MAX ? ENTRIES_MAX
+                                   : each;
+    s->bucket = host_map_resident(buckets * sizeof *s->bucket);
+    s->waiting = host_map_resident(buckets * s->each * sizeof *s->waiting);
+    s->entry = host_map((size_t)s->rows * sizeof *s->entry);
+    bool enough = s->bucket != NULL && s->waiting != NULL && s->entry != NULL;
+    if (enough) {
+        uint64_t before = 0;
+        host_fork_all(s->parts, count_entries, s);
+        for (size_t i = 0; i < buckets; i++) {
+            uint64_t count = s->bucket[i].next;
+            s->bucket[i].next = before;
+            before += count;
+        }
+        if (!host_call_cancelled())
+            host_fork_all(s->parts, place_entries, s);
+    }
+    host_unmap(s->waiting, buckets * s->each * sizeof *s->waiting);
+    if (enough && !host_call_cancelled())
+        host_fork_all(s->parts, search_buckets, s);
+    host_unmap(s->bucket, buckets * sizeof *s->bucket);
+    host_unmap(s->entry, (size_t)s->rows * sizeof *s->entry);
+    return enough;
 }
 
 static bool run_search(struct search *s) {
@@ -154,7 +280,9 @@ static bool run_search(struct search *s) {
         s->table[i].slot = host_map_resident(slots * sizeof(uint64_t));
         enough = enough && s->table[i].slot != NULL;
     }
-    if (enough)
+    if (enough && s->rounds > 1)
+        enough = search_by_buckets(s);
+    else if (enough)
         host_fork_all(s->parts, search_part, s);
     for (unsigned i = 0; i < s->parts; i++)
         host_unmap(s->table[i].slot, slots * sizeof(uint64_t));
@@ -162,11 +290,6 @@ static bool run_search(struct search *s) {
 }
 
 /* --- Records -------------------------------------------------------------- */
-
-static uint64_t part_start(const struct search *s, unsigned part) {
-    return s->rows / s->parts * part +
-           (part == s->parts ? s->rows % s->parts : 0);
-}
 
 static void count_part(void *context, unsigned part) {
     struct search *s = context;

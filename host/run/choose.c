@@ -8,6 +8,8 @@
 #include "host/mesh/order.h"
 #include "host/nodes/remote.h"
 #include "transport/secure_wipe.h"
+#include "host/formats/write.h"
+#include "state.h"
 
 static unsigned cube_dimension(unsigned nodes) {
     unsigned dimension = 0;
@@ -329,4 +331,18 @@ int host_run_on_cube(struct host_run_options *options,
                                 : 0;
     options->begin = begin;
     return 0;
+}
+
+/* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
+ * and the points in order; for their neighbours, which .ele has beside it, four
+ * times. */
+enum { ASIDE_BYTES = 320, ASIDE_NEIGHBOURS_BYTES = 500 };
+
+uint64_t host_memory_aside(const struct host_run_options *options) {
+    uint64_t kept = options->resume == NULL ? 0 : HOST_STATE_POINT_BYTES;
+    char name[HOST_PATH_MAX];
+    for (unsigned i = 0; i < options->outputs; i++)
+        if (host_write_file(options->output[i], 2, name, sizeof name) != NULL)
+            return ASIDE_NEIGHBOURS_BYTES + kept;
+    return ASIDE_BYTES + kept;
 }

@@ -18,6 +18,9 @@ int host_memory_check(const struct host_run_options *options,
                       uint32_t bricks, const uint32_t cells[3],
                       struct host_error *error);
 
+/* Bytes of a point that may be put aside. */
+uint64_t host_memory_aside(const struct host_run_options *options);
+
 /* Fills in the result's strategy, nodes and what else is as in the options. */
 void host_choose(const struct host_run_options *options, uint64_t points,
                  struct host_run_result *result);

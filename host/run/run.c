@@ -1,13 +1,11 @@
 #include "run.h"
 
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <time.h>
 #include <unistd.h>
 
-#include "host/base/error.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/base/progress.h"
@@ -67,22 +65,6 @@ static void end_stretch(const struct stretch *stretch,
         used_seconds(CLOCK_PROCESS_CPUTIME_ID) - stretch->cpu_s;
 }
 
-static void host_run_sum_nodes(struct host_run_result *result);
-
-void host_run_sum(const struct host_service *service,
-                  struct host_run_result *result) {
-    struct host_run_result *r = result;
-    memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
-    r->retransmitted = service->retransmitted;
-    r->bytes_sent = service->bytes_sent;
-    r->bytes_received = service->bytes_received;
-    r->faces_spilled = service->spill.faces_total;
-    r->restarts = service->restarts;
-    r->lost = r->nodes - service->work.living;
-    r->generations = service->generations;
-    host_run_sum_nodes(r);
-}
-
 /* The sums over the reports of result->node. */
 static void host_run_sum_nodes(struct host_run_result *result) {
     struct host_run_result *r = result;
@@ -107,6 +89,20 @@ static void host_run_sum_nodes(struct host_run_result *result) {
         for (unsigned k = 0; k < 24; k++)
             r->candidates_histogram[k] += s->candidates_histogram[k];
     }
+}
+
+void host_run_sum(const struct host_service *service,
+                  struct host_run_result *result) {
+    struct host_run_result *r = result;
+    memcpy(r->node, service->report, r->nodes * sizeof r->node[0]);
+    r->retransmitted = service->retransmitted;
+    r->bytes_sent = service->bytes_sent;
+    r->bytes_received = service->bytes_received;
+    r->faces_spilled = service->spill.faces_total;
+    r->restarts = service->restarts;
+    r->lost = r->nodes - service->work.living;
+    r->generations = service->generations;
+    host_run_sum_nodes(r);
 }
 
 static uint64_t at_least(uint64_t count, uint64_t least) {
@@ -524,20 +520,6 @@ static int look_at_points(const struct host_run_options *options,
     return 0;
 }
 
-/* Of a point, what is put aside: at most the tetrahedra of a volume twice over,
- * and the points in order; for their neighbours, which .ele has beside it, four
- * times. */
-enum { ASIDE_BYTES = 320, ASIDE_NEIGHBOURS_BYTES = 500 };
-
-static uint64_t aside_bytes(const struct host_run_options *options) {
-    uint64_t kept = options->resume == NULL ? 0 : HOST_STATE_POINT_BYTES;
-    char name[HOST_PATH_MAX];
-    for (unsigned i = 0; i < options->outputs; i++)
-        if (host_write_file(options->output[i], 2, name, sizeof name) != NULL)
-            return ASIDE_NEIGHBOURS_BYTES + kept;
-    return ASIDE_BYTES + kept;
-}
-
 int host_run(const struct host_run_options *options,
              struct host_run_result *result, struct host_error *error) {
     static struct host_run_result alone;
@@ -564,7 +546,7 @@ int host_run(const struct host_run_options *options,
     if (status == 0)
         status = look_at_points(options, &points, error);
     if (status == 0)
-        status = host_limits_check(points.count * aside_bytes(options),
+        status = host_limits_check(points.count * host_memory_aside(options),
                                    !options->quiet, error);
     if (status == 0)
         status = host_state_begin(&kept, &points, error);
