@@ -11,13 +11,12 @@
 need_boards looks mps2-an500
 need_boards looks mps2-an385
 stats=$scratch/stats.json
-qemu=$(command -v qemu-system-arm)
 mkdir "$scratch/bin"
-cat > "$scratch/bin/qemu-system-arm" << EOF
-#!/bin/sh
-exec $qemu "\$@" -icount shift=5,sleep=on
-EOF
-chmod +x "$scratch/bin/qemu-system-arm"
+for name in qemu-system-arm qemu-system-riscv64; do
+    printf '#!/bin/sh\nexec %s "$@" -icount shift=5,sleep=on\n' \
+        "$(command -v $name)" > "$scratch/bin/$name"
+    chmod +x "$scratch/bin/$name"
+done
 
 in_time() { # FILE MOST
     jq -e --argjson most "$2" 'min > 0 and max <= $most' "$1" > "$scratch/told"
@@ -27,7 +26,7 @@ in_time() { # FILE MOST
 looks() {
     local name="looks/$2 $1" board=$2 file=$3 most=4000
     shift 3
-    [ "$board" = mps2-an500 ] || most=40000
+    [ "$board" != mps2-an385 ] || most=40000
     rm -f "$stats"
     # shellcheck disable=SC2086
     PATH=$scratch/bin:$PATH incode run "$file" --no-progress -q --board "$board" \
@@ -45,10 +44,12 @@ looks hub mps2-an500 "$scratch/hub.npy" --nodes 1
 looks grid mps2-an500 "$scratch/grid.npy" --nodes 1
 looks 'naive search' mps2-an500 "$scratch/uniform.npy" --nodes 2 \
     --strategy spatial --index naive
+need_boards looks icicle
+looks hub icicle "$scratch/hub.npy" --nodes 1
 [ "${1:-}" = all ] || exit 0
 
 gen uniform 1000 && gen hub 2000 && gen grid 1000
-for board in mps2-an500 mps2-an385; do
+for board in mps2-an500 mps2-an385 icicle; do
     for kind in uniform hub grid; do
         looks "$kind, by points" $board "$scratch/$kind.npy" --nodes 1
         looks "$kind, by faces" $board "$scratch/$kind.npy" --nodes 2 \
