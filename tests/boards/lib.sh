@@ -5,6 +5,7 @@
 said_there=${scratch:?}/console
 
 # The folders of bare boards.
+# shellcheck disable=SC2034
 mapfile -t bare_boards < <(printf '%s\n' boards/*/board.mk | cut -d / -f 2)
 
 # fact BOARD NAME: what its board.mk says of it, or its facts.h (BOARD_NAME).
@@ -24,7 +25,7 @@ has_card() { [ "$(fact "$1" BOARD_FLASH)" = HOST_FLASH_CARD ]; } # BOARD
 # make_flash BOARD: $flash, if it is not there: a chip is what the emulator
 # makes of a file, a card is made here.
 make_flash() {
-    if has_card "$1" && [ ! -s "$flash" ]; then
+    if has_card "$1" && [ ! -s "${flash:?}" ]; then
         "$BUILD/tests/chip" "$flash" card - > /dev/null
     fi
 }
