@@ -150,7 +150,7 @@ copy mps2-an385 plain
 sed -i '/^image_at/d' "$tree/boards/plain/board.mk"
 sed -i 's/^\(#define BOARD_FLASH\) .*/\1 HOST_FLASH_NONE/' \
     "$tree/boards/plain/facts.h"
-sed -i '/^static const struct loader_flash/,/;/d
+sed -i '/^static const struct loader_flash/d
     s/\.flash = [^,]*,/.flash = NULL,/; s/\.image_at = [^,]*,/.image_at = 0,/
     s/\.image_bytes =$/.image_bytes = 0};/; /^ *(4u << 20) - (64u/d' \
     "$tree/boards/plain/board.c"
