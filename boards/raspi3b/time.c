@@ -52,7 +52,3 @@ void raspi3b_time_start(void) {
     raspi3b_at(RASPI3B_LOCAL)[TIMERS] = TICK | GUARD_FAST;
     raspi3b_guard_on();
 }
-
-void board_interrupt(void) {
-    raspi3b_tick_at(0);
-}
