@@ -11,4 +11,4 @@
 #define BOARD_PACKAGE "qemu-system-misc"
 #define BOARD_MACHINE "microchip-icicle-kit"
 #define BOARD_PROGRAM_OPTION "-bios"
-#define BOARD_WIRE unix_file_pair
+#define BOARD_WIRE tcp_pair
