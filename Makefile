@@ -71,7 +71,8 @@ unit         := $(call files,tests/unit)
 fuzz         := $(wildcard tests/fuzz/fuzz_*.c)
 
 core_objects := $(freestanding:%.c=$(obj)/%.o) $(obj)/boards/processor/processor.o
-host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o)
+host_objects := $(host:%.c=$(obj)/%.o) $(drivers:%.c=$(obj)/%.o) \
+	$(bare_rows:.c=.o)
 node_objects := $(board:%.c=$(BUILD)/node/%.o) \
 	$(node_drivers:%.c=$(BUILD)/node/%.o)
 node          = $(BUILD)/incode-node$(if $(filter-out linux,$(1)),-$(1))

@@ -15,6 +15,29 @@ host/cube/lines_gpiod$(GPIOD).c:
 	@false
 endif
 
+# The rows of bare boards, a folder each with its facts.h, and their list.
+bare_facts  := $(patsubst boards/%/facts.h,%,$(wildcard boards/*/facts.h))
+bare_rows   := $(patsubst %,$(obj)/rows/%.c,$(bare_facts) bare_boards)
+bare_row     = host_board_$(subst -,_,$(1))
+$(bare_facts:%=$(obj)/rows/%.c): $(obj)/rows/%.c: boards/%/facts.h
+	@mkdir -p $(@D)
+	@printf '#include "%s"\n#include "host/nodes/board_emulated.h"\n%s\n' \
+		$< 'HOST_BOARD_ROW($(call bare_row,$*))' > $@
+bare_list    = \#include "host/nodes/boards.h"\n\
+	$(foreach b,$(bare_facts),extern const struct host_board \
+	$(call bare_row,$(b));\n)\
+	extern const struct host_board *const host_bare_boards[];\n\
+	const struct host_board *const host_bare_boards[] = \
+	{$(foreach b,$(bare_facts),&$(call bare_row,$(b)),)};\n\
+	extern const unsigned host_bare_boards_count;\n\
+	const unsigned host_bare_boards_count = $(words $(bare_facts));\n
+$(obj)/rows/bare_boards.c: FORCE
+	@mkdir -p $(@D)
+	@printf '$(bare_list)' | cmp -s - $@ || printf '$(bare_list)' > $@
+$(bare_rows:.c=.o): %.o: %.c $(BUILD)/flags
+	$(say) CC $<
+	$(Q)$(CC) $(HOSTED) -MMD -MP -c $< -o $@
+
 # HDF5 is loaded when a file calls for it, by the name that it has here.
 hdf5 = $(realpath $(shell $(CC) -print-file-name=libhdf5_serial.so))
 $(obj)/host/formats/hdf5.o: private HOSTED += $(if $(hdf5),-DHDF5_LIBRARY='"$(shell \

@@ -14,12 +14,12 @@ node_packages_riscv64 = gcc-riscv64-linux-gnu libc6-dev-riscv64-cross
 # Of the packages: Build-Depends of host/package/control.
 deb_packages   = $(run_packages) $(python_packages) dpkg-dev fakeroot debhelper \
 	dh-python gcc-aarch64-linux-gnu libc6-dev-arm64-cross gcc-arm-none-eabi \
-	libnewlib-arm-none-eabi
+	libnewlib-arm-none-eabi $(node_packages_riscv64)
 test_packages  = $(run_packages) libcmocka-dev libgmp-dev clang clang-format \
 	libclang-rt-dev clang-tidy cppcheck shellcheck valgrind jq man-db procps tmux \
 	openssl python3-h5py gcc-arm-none-eabi libnewlib-arm-none-eabi \
-	qemu-system-arm qemu-user-static openssh-server openssh-client $(node_packages) \
-	$(python_packages) python3-scipy python3-pytest
+	$(node_packages_riscv64) qemu-system-arm qemu-system-misc qemu-user-static \
+	openssh-server openssh-client $(node_packages) $(python_packages) python3-scipy python3-pytest
 bench_packages = $(run_packages) g++ gnuplot-nox libcgal-dev libtet1.5-dev \
 	libqhull-dev libgmsh-dev python3-scipy
 full_packages  = $(test_packages) $(bench_packages) $(deb_packages) lintian debootstrap \

@@ -71,6 +71,10 @@ _Noreturn void board_restart(void);
  * after power on, but that the guard goes on. */
 _Noreturn void board_launch(uint32_t address);
 
+/* Makes an interrupt due, whose handler returns.  For tests: a program that
+ * does not call it is linked without it. */
+void board_interrupt(void);
+
 /* --- what all share ------------------------------------------------------- */
 
 /* The node program, or the loader, from start to restart. */

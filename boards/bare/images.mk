@@ -1,9 +1,9 @@
 # Bare boards: those folders that have a board.mk, which gives the compiler's
 # prefix, the processor's flags (machine) and the sources beside the board's own
 # and those of boards/bare.  An image is a main's objects and all of these; what
-# it does not need, the linker leaves out.  image_at: of a board with a loader,
-# where that copies images to, behind itself.  code_at: where what runs first
-# begins, a loader or a test.
+# it does not need, the linker leaves out.  image_at, image_end: of a board with
+# a loader, from where to where that copies images.  code_at, code_end: of what
+# runs first, a loader or a test; or an image without a loader.
 bare_boards := $(patsubst boards/%/board.mk,%,$(wildcard boards/*/board.mk))
 bare_rest   := $(addprefix boards/bare/,sqrt.c program.c loader.c)
 # With -ffreestanding alone each memcpy of a few bytes is a call.  What serves
@@ -43,12 +43,16 @@ endef
 # bare_board BOARD: bare_BOARD is its objects without a main.
 define bare_board
 image_at :=
+image_end :=
 code_at := 0
+code_end :=
 include boards/$(1)/board.mk
 bare_cc_$(1) := $$(prefix)gcc $$(machine)
 bare_copy_$(1) := $$(prefix)objcopy
 bare_at_$(1) := $$(image_at)
+bare_to_$(1) := $$(image_end)
 bare_from_$(1) := $$(code_at)
+bare_until_$(1) := $$(code_end)
 bare_parts_$(1) := $$(filter-out $$(bare_rest),$$(wildcard boards/bare/*.c)) \
 	$$(wildcard boards/$(1)/*.[cS]) $$(sources)
 bare_$(1) := $$(patsubst %,$(BUILD)/firmware/$(1)/%.o,$$(basename \
@@ -60,7 +64,9 @@ $(BUILD)/firmware/$(1).elf: \
 $(BUILD)/firmware/$(1).elf: $$(bare_$(1)) \
 		boards/$(1)/board.ld boards/bare/start.ld
 	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1),$$(or $$(bare_at_$(1)),$$(bare_from_$(1))))
+	$$(Q)$$(if $$(bare_at_$(1)),$$(call \
+		bare_link,$(1),$$(bare_at_$(1)),$$(bare_to_$(1))),$$(call \
+		bare_link,$(1),$$(bare_from_$(1)),$$(bare_until_$(1))))
 $(if $(shell grep image_at boards/$(1)/board.mk),$(call bare_loader,$(1)),
 $(BUILD)/firmware/$(1).img: $(BUILD)/firmware/$(1).elf
 	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@)
@@ -91,7 +97,8 @@ $(BUILD)/firmware/loader/$(1).elf: $$(bare_loader_$(1)) $$(bare_sodium_$(1)) \
 		$(BUILD)/firmware/loader/$(1)/sign_key.o \
 		boards/$(1)/board.ld boards/bare/start.ld
 	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1),$$(bare_from_$(1)),$$(bare_at_$(1)))
+	$$(Q)$$(call bare_link,$(1),$$(bare_from_$(1)),$$(or \
+		$$(bare_until_$(1)),$$(bare_at_$(1))))
 $(BUILD)/firmware/loader/$(1).img: $(BUILD)/firmware/loader/$(1).elf
 	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
 $(BUILD)/firmware/$(1).img: $(BUILD)/firmware/$(1).elf $(BUILD)/incode \
@@ -113,7 +120,7 @@ $(BUILD)/firmware/tests/image-$(1)-$(2).elf: \
 		$$(bare_$(1)) boards/$(1)/board.ld boards/bare/start.ld
 	@mkdir -p $$(@D)
 	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1),$$(bare_at_$(1)))
+	$$(Q)$$(call bare_link,$(1),$$(bare_at_$(1)),$$(bare_to_$(1)))
 $(BUILD)/firmware/tests/image-$(1)-$(2).img: \
 		$(BUILD)/firmware/tests/image-$(1)-$(2).elf $(BUILD)/incode \
 		$(BUILD)/firmware/sign
@@ -129,13 +136,13 @@ $(BUILD)/firmware/tests/$(1)-$(2).elf: $$(patsubst \
 		$$(bare_$(1)) boards/$(1)/board.ld boards/bare/start.ld
 	@mkdir -p $$(@D)
 	$$(say) LINK $$@
-	$$(Q)$$(call bare_link,$(1),$$(bare_from_$(1)))
+	$$(Q)$$(call bare_link,$(1),$$(bare_from_$(1)),$$(bare_until_$(1)))
 $(BUILD)/firmware/tests/$(1)-$(2).img: $(BUILD)/firmware/tests/$(1)-$(2).elf
 	$$(Q)$$(bare_copy_$(1)) -O binary $$< $$@
 endef
 # Code from an address on, up to another.
 bare_link = $(bare_cc_$(1)) -nostdlib -nostartfiles -Wl,--gc-sections \
-	-Wl,--build-id=none -Wl,--defsym=CODE_AT=$(2) \
+	-Wl,--build-id=none -Wl,--orphan-handling=error -Wl,--defsym=CODE_AT=$(2) \
 	-Wl,--defsym=CODE_END=$(or $(3),0x400000) -Wl,--fatal-warnings \
 	-Wl,-Map=$(@:.elf=.map) -T boards/$(1)/board.ld -L boards/bare \
 	$(filter %.o,$^) -lgcc -o $@

@@ -42,9 +42,9 @@ static inline uint32_t bare_ring_room(const struct bare_ring *ring) {
  * processor, so that it is the compiler alone that must keep the order. */
 BARE_INLINE bool bare_ring_put(struct bare_ring *ring, uint8_t byte) {
     uint32_t put = ring->put;
-    if (put - ring->taken > ring->mask)
+    if (__builtin_expect(put - ring->taken > ring->mask, 0))
         return false;
-    ring->bytes[put & ring->mask] = byte;
+    ring->bytes[put & (uintptr_t)ring->mask] = byte;
     atomic_signal_fence(memory_order_release);
     ring->put = put + 1;
     return true;
@@ -55,7 +55,7 @@ BARE_INLINE bool bare_ring_take(struct bare_ring *ring, uint8_t *byte) {
     if (ring->put == taken)
         return false;
     atomic_signal_fence(memory_order_acquire);
-    *byte = ring->bytes[taken & ring->mask];
+    *byte = ring->bytes[taken & (uintptr_t)ring->mask];
     atomic_signal_fence(memory_order_release);
     ring->taken = taken + 1;
     return true;

@@ -44,8 +44,10 @@ void cmsdk_mpu_start(void) {
     uint32_t n = 0;
     for (; n < sizeof regions / sizeof regions[0]; n++)
         set(n, regions[n]);
-    set(n++, (struct region){(uint32_t)(uintptr_t)board_facts.flash->context,
-                             FLASH});
+    if (board_facts.flash != NULL) {
+        set(n++, (struct region){
+                     (uint32_t)(uintptr_t)board_facts.flash->context, FLASH});
+    }
     if (loader) {
         set(CODE, (struct region){0, IMAGES});
         set(n, (struct region){0, LOADER});

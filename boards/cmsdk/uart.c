@@ -87,3 +87,9 @@ void cmsdk_uarts_start(void) {
         *cmsdk_at(CORTEX_NVIC) = UINT32_C(3) << interrupt[i];
     }
 }
+
+enum { PENDING = 0x100 }; /* behind CORTEX_NVIC */
+
+void board_interrupt(void) {
+    *cmsdk_at(CORTEX_NVIC + PENDING) = UINT32_C(1) << interrupt[0];
+}

@@ -2,9 +2,6 @@
 prefix  = arm-none-eabi-
 machine = -mcpu=cortex-m3 -mthumb -mfloat-abi=soft
 sources = $(wildcard boards/cmsdk/*.[cS]) boards/bare/sqrt.c
-# How tests start it, with a file for its flash.
-emulator = qemu-system-arm -M mps2-an385,memory-backend=ram -object \
-	memory-backend-file,id=ram,size=16M,share=on,mem-path=$(flash)
 # For tests/stack: who reports faults, and what the processor puts on the stack
 # that an interrupt comes upon.
 fault = cmsdk_fault

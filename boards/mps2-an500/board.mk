@@ -2,9 +2,6 @@
 prefix  = arm-none-eabi-
 machine = -mcpu=cortex-m7 -mthumb -mfloat-abi=hard -mfpu=fpv5-d16
 sources = $(wildcard boards/cmsdk/*.[cS])
-# How tests start it, with a file for its flash.
-emulator = qemu-system-arm -M mps2-an500,memory-backend=ram -object \
-	memory-backend-file,id=ram,size=16M,share=on,mem-path=$(flash)
 # For tests/stack: who reports faults, and what the processor puts on the stack
 # that an interrupt comes upon.
 fault = cmsdk_fault

@@ -1,13 +1,15 @@
 /* Raspberry Pi 3: UART 0 is the PL011 (GPIO 14, 15), UART 1, which is dimension
  * 0, the mini UART (GPIO 32, 33).  Its flash is a partition of its card. */
 #include "boards/bare/bare.h"
+#include "boards/sdhci/sdhci.h"
+#include "facts.h"
 #include "registers.h"
 
-const struct board_facts board_facts = {.name = "raspi3b",
-                                        .ports = 1,
-                                        .baud = 115200,
+const struct board_facts board_facts = {.name = BOARD_NAME,
+                                        .ports = BOARD_UARTS - 1,
+                                        .baud = BOARD_BAUD,
                                         .data_bytes = 4u << 20,
-                                        .flash = &raspi3b_flash,
+                                        .flash = &sdhci_flash,
                                         .image_at = 2u << 20,
                                         .image_bytes = 2u << 20};
 

@@ -3,14 +3,14 @@
 prefix  = aarch64-linux-gnu-
 machine = -mcpu=cortex-a53 -mno-outline-atomics -fno-pie -no-pie \
 	-fno-stack-protector -fno-asynchronous-unwind-tables
-sources =
+sources = $(wildcard boards/sdhci/*.c)
 $(BUILD)/firmware/raspi3b/boards/raspi3b/%.o \
 $(BUILD)/firmware/loader/raspi3b/boards/raspi3b/%.o: private BARE += \
 	-mgeneral-regs-only
-# Of the handlers' stack, what start.S takes first.
+# For tests/stack: who reports faults, and what start.S takes first of the
+# handlers' stack.
+fault = raspi3b_fault
 exception_bytes = 192
 # Where the firmware loads what it starts, and where that runs images.
 code_at = 0x80000
 image_at = 0x200000
-# How tests start it, with a file for its card.
-emulator = qemu-system-aarch64 -M raspi3b -drive if=sd,format=raw,file=$(flash)

@@ -1,6 +1,7 @@
 /* What the chip's pins are, and which are held high where nobody drives them.
  */
 #include "boards/bare/bare.h"
+#include "boards/sdhci/sdhci.h"
 #include "registers.h"
 
 enum { PUD = 0x94 / 4, PUDCLK = 0x98 / 4 }; /* words behind RASPI3B_GPIO */
@@ -28,4 +29,20 @@ void raspi3b_pull_up(uint64_t pins) {
     settle();
     gpio[PUD] = 0;
     gpio[PUDCLK] = gpio[PUDCLK + 1] = 0;
+}
+
+/* --- the card's ----------------------------------------------------------- */
+
+enum { CLOCK_PIN = 48, LAST_PIN = 53 };
+
+volatile uint32_t *sdhci_registers(void) {
+    return raspi3b_at(RASPI3B_CARD);
+}
+
+/* Its power is the board's. */
+uint32_t sdhci_start(void) {
+    for (unsigned i = CLOCK_PIN; i <= LAST_PIN; i++)
+        raspi3b_pin(i, RASPI3B_FUNCTION_3);
+    raspi3b_pull_up(UINT64_C(0x1F) << (CLOCK_PIN + 1)); /* not the clock */
+    return 0;
 }

@@ -5,8 +5,6 @@
 
 #include <stdint.h>
 
-#include "node/loader/flash.h"
-
 #define RASPI3B_INTERRUPTS UINT32_C(0x3F00B200)
 #define RASPI3B_PM UINT32_C(0x3F100000)
 #define RASPI3B_GPIO UINT32_C(0x3F200000)
@@ -60,10 +58,6 @@ void raspi3b_time_start(void);
 enum { RASPI3B_FUNCTION_0 = 4, RASPI3B_FUNCTION_3 = 7, RASPI3B_FUNCTION_5 = 2 };
 void raspi3b_pin(unsigned number, uint32_t function);
 void raspi3b_pull_up(uint64_t pins); /* a bit each */
-
-/* --- the card ------------------------------------------------------------- */
-
-extern const struct loader_flash raspi3b_flash;
 
 /* --- handlers ------------------------------------------------------------- */
 

@@ -293,6 +293,13 @@ function raspi3b_tick_at
     isb
     ret
 
+function board_interrupt
+    msr cntp_cval_el0, xzr
+    mov x0, #1
+    msr cntp_ctl_el0, x0
+    ret
+    .size board_interrupt, . - board_interrupt /* tests/boards/trial asks */
+
 function raspi3b_guard_at
     msr cntv_cval_el0, x0
     mov x0, #1

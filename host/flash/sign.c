@@ -318,20 +318,13 @@ static const struct host_option image_rows[] = {
     {0}};
 
 static int check_board(const struct sign *s) {
-    char allowed[120] = "";
-    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
-        const struct host_board *board = host_board_row(i);
-        size_t used = strlen(allowed);
-        if (board->bare == NULL)
-            continue;
-        if (strcmp(s->board, board->name) == 0)
-            return 0;
-        snprintf(allowed + used, sizeof allowed - used, "%s%s",
-                 used == 0 ? "" : ", ", board->name);
-    }
-    return host_fail(s->error, HOST_USAGE,
-                     "--board %s: no board without a system; allowed: %s",
-                     s->board, allowed);
+    char allowed[HOST_BARE_NAMES];
+    host_bare_names(allowed);
+    return host_bare_named(s->board) != NULL
+               ? 0
+               : host_fail(s->error, HOST_USAGE,
+                           "--board %s: no board without a system; allowed: %s",
+                           s->board, allowed);
 }
 
 /* --- sign ----------------------------------------------------------------- */

@@ -217,7 +217,9 @@ static int make_flash(struct board *board, unsigned node,
                       struct host_error *error) {
     struct stat about;
     char name[32];
-    bool card = board->emulator.bare->card;
+    if (board->emulator.bare->flash == HOST_FLASH_NONE)
+        return 0;
+    bool card = board->emulator.bare->flash == HOST_FLASH_CARD;
     snprintf(name, sizeof name, "flash%u", node);
     board->flash = open_file(name, options, error);
     if (board->flash < 0)
@@ -367,9 +369,12 @@ static void tell_errors(const struct cube *cube) {
     ssize_t got = pread(cube->errors, text, sizeof text - 1, from);
     text[got > 0 ? got : 0] = '\0';
     for (char *rest = text, *line; (line = strsep(&rest, "\n")) != NULL;)
-        said = strncmp(line, "qemu", 4) == 0 ? line : said;
+        said =
+            strncmp(line, "qemu", 4) == 0 && strstr(line, ": warning: ") == NULL
+                ? line
+                : said;
     for (unsigned i = 0; i < cube->cluster.nodes && *image == '\0'; i++)
-        image = cube->board[i].emulator.kernel;
+        image = cube->board[i].emulator.first;
     if (said != NULL)
         host_note("%s; is %s whole? make firmware makes it", said, image);
 }
@@ -424,11 +429,10 @@ static struct host_machine machine_of(struct cube *cube) {
     return machine;
 }
 
-/* The start function of a board whose row names what emulates it. */
-static int host_emulated_start(const struct host_board *board,
-                               const struct host_cluster_options *options,
-                               struct host_started *started,
-                               struct host_error *error) {
+int host_emulated_start(const struct host_board *board,
+                        const struct host_cluster_options *options,
+                        struct host_started *started,
+                        struct host_error *error) {
     const struct host_bare *bare = board->bare;
     struct cube *cube = &the_cube;
     struct host_cluster_options mine = *options;
@@ -470,56 +474,3 @@ static int host_emulated_start(const struct host_board *board,
                       &started->receive_bytes);
     return 0;
 }
-
-/* --- the boards ----------------------------------------------------------- */
-
-static const struct host_bare an500 = {.machine = "mps2-an500",
-                                       .program = "qemu-system-arm",
-                                       .package = "qemu-system-arm",
-                                       .image = "mps2-an500.img",
-                                       .loader = "loader/mps2-an500.img",
-                                       .uarts = 5,
-                                       .serial_baud = 115200,
-                                       .pair = unix_file_pair};
-
-const struct host_board host_board_mps2_an500 = {
-    .name = "mps2-an500",
-    .help = "emulated: Cortex-M7 with double precision, up to 16 nodes",
-    .bare = &an500,
-    .start = host_emulated_start,
-};
-
-static const struct host_bare an385 = {.machine = "mps2-an385",
-                                       .program = "qemu-system-arm",
-                                       .package = "qemu-system-arm",
-                                       .image = "mps2-an385.img",
-                                       .loader = "loader/mps2-an385.img",
-                                       .uarts = 5,
-                                       .serial_baud = 115200,
-                                       .pair = unix_file_pair};
-
-const struct host_board host_board_mps2_an385 = {
-    .name = "mps2-an385",
-    .help = "emulated: Cortex-M3, up to 16 nodes",
-    .bare = &an385,
-    .start = host_emulated_start,
-};
-
-/* The emulator waits for room in a wire of these UARTs, and with it the node:
- * so a wire has to hold what neighbours send each other at a time. */
-static const struct host_bare raspi = {.machine = "raspi3b",
-                                       .program = "qemu-system-aarch64",
-                                       .package = "qemu-system-arm",
-                                       .image = "raspi3b.img",
-                                       .loader = "loader/raspi3b.img",
-                                       .uarts = 2,
-                                       .card = true,
-                                       .serial_baud = 115200,
-                                       .pair = tcp_pair};
-
-const struct host_board host_board_raspi3b = {
-    .name = "raspi3b",
-    .help = "emulated: Raspberry Pi 3 without an operating system, 2 nodes",
-    .bare = &raspi,
-    .start = host_emulated_start,
-};

@@ -6,19 +6,27 @@
 
 #include "cube_file.h"
 
-/* A row a board: host_board_NAME of some file of this room. */
-#define BOARDS(ROW) ROW(linux) ROW(mps2_an500) ROW(mps2_an385) ROW(raspi3b)
+/* A row a board: host_board_NAME of some file of this room.  Behind them those
+ * of bare boards, of which the build makes a list. */
+#define BOARDS(ROW) ROW(linux)
 
 #define DECLARE(name) extern const struct host_board host_board_##name;
 #define POINT(name) &host_board_##name,
 BOARDS(DECLARE)
 static const struct host_board *const boards[] = {BOARDS(POINT)};
 
+extern const struct host_board *const host_bare_boards[];
+extern const unsigned host_bare_boards_count;
+
 const struct host_board host_board_mixed = {.name = "mixed",
                                             .help = "several boards"};
 
 const struct host_board *host_board_row(unsigned i) {
-    return i < sizeof boards / sizeof boards[0] ? boards[i] : NULL;
+    const unsigned count = sizeof boards / sizeof boards[0];
+    if (i < count)
+        return boards[i];
+    return i - count < host_bare_boards_count ? host_bare_boards[i - count]
+                                              : NULL;
 }
 
 const char *host_board_name(unsigned i) {
@@ -32,6 +40,21 @@ const struct host_board *host_board_named(const char *name) {
         if (strcmp(name, board->name) == 0)
             break;
     return board;
+}
+
+const struct host_board *host_bare_named(const char *name) {
+    const struct host_board *board = host_board_named(name);
+    return board == NULL || board->bare == NULL ? NULL : board;
+}
+
+void host_bare_names(char text[HOST_BARE_NAMES]) {
+    size_t used = 0;
+    text[0] = '\0';
+    for (unsigned i = 0; i < host_bare_boards_count && used < HOST_BARE_NAMES;
+         i++) {
+        used += (size_t)snprintf(text + used, HOST_BARE_NAMES - used, "%s%s",
+                                 i == 0 ? "" : ", ", host_bare_boards[i]->name);
+    }
 }
 
 /* Nodes as processes of this machine, of the program of boards/linux. */

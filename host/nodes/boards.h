@@ -1,6 +1,8 @@
 /* What a node may run on, one row a board, by which --board, cube files,
  * statistics and messages name it, and by which its nodes are started.  A new
- * board is a file that defines host_board_NAME, and a row of boards.c.  A run
+ * board with an operating system is a file that defines host_board_NAME, and a
+ * row of boards.c.  A bare board is a folder of boards/, of whose facts.h the
+ * build makes the row.  A run
  * on a cube file has its board's name alone, and starts what the file says.
  * Ranks of MPI, whose program is that of boards/mpi, are a kind of link: they
  * are processes of the board linux. */
@@ -45,5 +47,12 @@ extern const struct host_board host_board_mixed;
 
 /* NULL: there is none of that name. */
 const struct host_board *host_board_named(const char *name);
+
+/* Boards without a system alone. */
+const struct host_board *host_bare_named(const char *name);
+
+/* Their names, separated by commas. */
+enum { HOST_BARE_NAMES = 400 };
+void host_bare_names(char text[HOST_BARE_NAMES]);
 
 #endif

@@ -75,7 +75,9 @@ int host_emulator_find(const struct host_bare *bare,
     if (find_program(bare, emulator->program, error) != 0 ||
         find_image(bare->image, emulator->image, error) != 0)
         return error->code;
-    return find_image(bare->loader, emulator->kernel, error);
+    return find_image(bare->flash == HOST_FLASH_NONE ? bare->image
+                                                     : bare->loader,
+                      emulator->first, error);
 }
 
 bool host_firmware_find(const char *board, char path[PATH_MAX]) {
@@ -201,9 +203,9 @@ void host_emulator_become(const struct host_emulator *emulator, unsigned turn) {
     add(w, "%s", e->bare->program);
     add(w, "-M");
     add(w, "%s", e->bare->machine);
-    add_flash(w, e->flash, e->bare->card);
-    add(w, "-kernel");
-    add(w, "%s", e->kernel);
+    add_flash(w, e->flash, e->bare->flash == HOST_FLASH_CARD);
+    add(w, "%s", e->bare->option);
+    add(w, "%s", e->first);
     add(w, "-display");
     add(w, "none");
     add(w, "-nic");

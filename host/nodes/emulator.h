@@ -24,16 +24,21 @@ enum {
     HOST_BARE_WIRE_BYTES = 5000000
 };
 
+/* What stands for a board's flash: a memory of the machine, in a file; or a
+ * card.  A board without flash has no loader, and runs its image at once. */
+enum host_flash { HOST_FLASH_NONE, HOST_FLASH_CHIP, HOST_FLASH_CARD };
+
 /* A bare board, and what emulates it.  UART 0 is its console, and the host's
  * wire; the others are the links of dimensions 0, 1 .. */
 struct host_bare {
     const char *machine; /* QEMU's name of it */
     const char *program; /* QEMU for its processor, */
     const char *package; /* of the distribution */
+    const char *option;  /* QEMU's, for the file that runs first */
     const char *image;   /* its firmware, a file's name, */
     const char *loader;  /* and its loader's, which starts it */
     unsigned uarts;
-    bool card;               /* its flash is a memory card's, not a chip */
+    enum host_flash flash;
     uint32_t serial_baud;    /* that its firmware takes its wires for */
     int (*pair)(int fds[2]); /* of which a wire between two is made */
 };
@@ -48,7 +53,7 @@ struct host_place {
 struct host_emulator {
     const struct host_bare *bare;
     char program[PATH_MAX], image[PATH_MAX];
-    char kernel[PATH_MAX];   /* what it runs at first: the loader */
+    char first[PATH_MAX]; /* what it runs at first: the loader, or the image */
     struct host_place flash; /* the chip's or card's file: HOST_FLASH_BYTES */
     /* What is at the other end of a UART: a connected socket, or a path at
      * which it listens; and the file that keeps what it sends. */

@@ -39,23 +39,20 @@ struct emulate {
 static void take_board(void *into, const char *value,
                        struct host_error *error) {
     struct emulate *e = into;
-    char allowed[120] = "";
-    e->board = NULL;
-    for (unsigned i = 0; host_board_name(i) != NULL; i++) {
-        const struct host_board *board = host_board_row(i);
-        if (board->bare == NULL)
-            continue;
-        size_t used = strlen(allowed);
-        snprintf(allowed + used, sizeof allowed - used, "%s%s",
-                 used == 0 ? "" : ", ", board->name);
-        if (strcmp(value, board->name) == 0) {
-            e->board = board;
-            return;
-        }
+    char allowed[HOST_BARE_NAMES];
+    host_bare_names(allowed);
+    e->board = host_bare_named(value);
+    if (e->board == NULL) {
+        host_fail(error, HOST_USAGE,
+                  "--board %s: no board that is emulated; allowed: %s", value,
+                  allowed);
     }
-    host_fail(error, HOST_USAGE,
-              "--board %s: no board that is emulated; allowed: %s", value,
-              allowed);
+}
+
+static char *list_boards(const char *text) {
+    char names[HOST_BARE_NAMES], *whole = NULL;
+    host_bare_names(names);
+    return asprintf(&whole, "%s%s", text, names) < 0 ? NULL : whole;
 }
 
 /* "2,3" */
@@ -83,8 +80,7 @@ static void take_linux(void *into, const char *value,
 }
 
 static const struct host_option rows[] = {
-    {"board", 0, "NAME", "mps2-an500, mps2-an385 or raspi3b",
-     .take = take_board},
+    {"board", 0, "NAME", "One of ", .take = take_board, .fill = list_boards},
     {"nodes", 0, "N", "Nodes of the cube", HOST_AT(struct emulate, nodes),
      .most = HOST_EMULATED_MAX, .powers = ""},
     {"linux", 0, "N,N",

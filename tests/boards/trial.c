@@ -8,9 +8,6 @@
 #include "boards/bare/handover.h"
 #include "boards/bare/sections.h"
 #include "boards/bare/stack.h"
-#ifndef __aarch64__
-#include "boards/cmsdk/registers.h"
-#endif
 
 /* clock: more than an emulator is held up on a busy machine. */
 enum { GUARD_US = 3000000, SILENCE_US = 1000000, DEEP = 10000 };
@@ -62,14 +59,8 @@ static __attribute__((noinline)) void hang(void) {
 
 /* Hangs so that an interrupt comes at nearly each step. */
 static __attribute__((noinline)) void hang_interrupted(void) {
-    while (hanging) {
-#ifdef __aarch64__
-        __asm volatile("msr cntp_cval_el0, xzr\n\tmsr cntp_ctl_el0, %0" ::"r"(
-            UINT64_C(1)));
-#else
-        *cmsdk_at(CORTEX_NVIC + 0x100) = 1; /* of UART 0, received: due */
-#endif
-    }
+    while (hanging)
+        board_interrupt();
 }
 
 /* Takes nothing that comes until nothing more does.  clock: for a second. */

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A format and a board are a file and a row: in a copy of the tree one of each
-# is added so, and it is read, written, listed and run on.  What is built
+# A format and a board are a file and a row, a bare board is a folder: in a copy
+# of the tree each is added so, and it is read, written, listed and run on.  What is built
 # already is copied with the sources, so that little is built again.
 . tests/system/lib.sh
 
@@ -138,6 +138,22 @@ const struct host_board host_board_toy = {
     .start = start,
 };
 END
+# Two bare boards, which are folders and nothing else: a copy of raspi3b under
+# another name throughout, and one of mps2-an385 without loader and flash.
+copy() { # OF NAME: its symbols as well
+    cp -a "boards/$1" "$tree/boards/$2"
+    sed -i "s/$1/$2/g" "$tree/boards/$2"/*
+    sed -i "s/\(BOARD_MACHINE\) .*/\1 \"$1\"/" "$tree/boards/$2/facts.h"
+}
+copy raspi3b newpi
+copy mps2-an385 plain
+sed -i '/^image_at/d' "$tree/boards/plain/board.mk"
+sed -i 's/^\(#define BOARD_FLASH\) .*/\1 HOST_FLASH_NONE/' \
+    "$tree/boards/plain/facts.h"
+sed -i '/^static const struct loader_flash/d
+    s/\.flash = [^,]*,/.flash = NULL,/; s/\.image_at = [^,]*,/.image_at = 0,/
+    s/\.image_bytes =$/.image_bytes = 0};/; /^ *(4u << 20) - (64u/d' \
+    "$tree/boards/plain/board.c"
 # The fuzzer of points, which takes its formats from the table.
 mkdir -p "$tree/tests/unit"
 cp -a tests/fuzz "$tree/tests"
@@ -250,3 +266,58 @@ succeeds adding/board/on-a-cube \
 rm "$tree/build/incode-node-toy"
 says adding/board/its-program 'incode-node-toy: No such file' \
     "$new" run "$scratch/a.xyz" --board toy
+
+# --- a bare board -------------------------------------------------------------
+
+need_boards adding/bare raspi3b
+need_boards adding/bare mps2-an385
+cp -a "$BUILD/source" "$BUILD/libsodium" "$tree/build"
+mkdir -p "$tree/build/firmware" "$tree/build/tests" "$tree/tests/system"
+cp -a "$BUILD"/firmware/*.sign* "$tree/build/firmware"
+cp -a "$BUILD/tests/chip" "$tree/build/tests"
+cp -a tests/boards tests/stack tests/stack.* "$tree/tests"
+cp -a tests/system/lib.sh "$tree/tests/system"
+bare() { # TARGET...
+    "${MAKE:-make}" -C "$tree" --no-print-directory -j2 -o build/flags \
+        -o build/incode BUILD=build OPT=-O0 ARCH=native BARE_OPT=-Os "$@" \
+        > "$scratch/log" 2>&1
+}
+if ! bare build/firmware/newpi.img build/firmware/loader/newpi.img \
+    build/firmware/plain.img build/firmware/tests/newpi-trial.img; then
+    fail adding/bare/build "$(grep -m 1 -E 'error|\*\*\*' "$scratch/log")"
+    exit 1
+fi
+pass adding/bare/build
+"$old" gen uniform 200 --seed 1 -o "$scratch/few.npy" 2> /dev/null
+"$old" run "$scratch/few.npy" -q --nodes 1 --stats "$scratch/native.json"
+for board in newpi plain; do
+    says "adding/bare/$board: help" "$board (emulated: " "$new" run --help
+    says "adding/bare/$board: emulate" "$board" "$new" emulate --help
+    # shellcheck disable=SC2086
+    succeeds "adding/bare/$board: a run" within "$new" run "$scratch/few.npy" \
+        -q --board $board --nodes 2 $patient --stats "$scratch/$board.json"
+    check "adding/bare/$board: the digest" 'another triangulation' \
+        [ "$(stat_of "$scratch/$board.json" digest)" = \
+        "$(stat_of "$scratch/native.json" digest)" ]
+    (cd "$tree" && BUILD=build bash tests/stack $board) > "$scratch/said" 2>&1
+    status=$?
+    check "adding/bare/$board: its stack" "$(head -n 1 "$scratch/said")" \
+        [ $status = 0 ]
+done
+(cd "$tree" && BUILD=build BOARDS=newpi bash tests/boards/trial) \
+    > "$scratch/said" 2>&1
+check 'adding/bare/newpi: its trial' "$(grep -m 1 FAIL "$scratch/said")" \
+    [ "$(grep -c '^PASS' "$scratch/said").$(grep -c '^FAIL' \
+        "$scratch/said")" = 22.0 ]
+
+# A section that start.ld does not name is an error, and not memory that nobody
+# fills.
+printf '%s\n' '.section .nobodys, "aw"' '.global newpi_nobodys' \
+    'newpi_nobodys:' '.word 1' > "$tree/boards/newpi/nobodys.S"
+sed -i 's/^void board_start(void) {/extern int newpi_nobodys;\n&\n    newpi_nobodys++;/' \
+    "$tree/boards/newpi/board.c"
+bare build/firmware/newpi.elf
+status=$?
+check 'adding/bare/a section that nobody names' "exit $status" [ $status != 0 ]
+check 'adding/bare/a section that nobody names: which' "$(last "$scratch/log")" \
+    grep -q "orphan section \`.nobodys'" "$scratch/log"

@@ -31,10 +31,9 @@ for image in "$BUILD"/firmware/tests/*-arithmetic.img; do
     board=$(basename "$image" -arithmetic.img)
     flash=$scratch/$board.flash
     make_flash "$board"
-    # shellcheck disable=SC2046
+    command_of "$board" "$image"
     within tests/arithmetic/compare "0 1089 $step,1090 1099 1" \
-        $(fact "$board" emulator) -kernel "$image" -display none -nic none \
-        -serial stdio > "$scratch/said" 2> "$scratch/errors"
+        "${command[@]}" > "$scratch/said" 2> "$scratch/errors"
     status=$?
     check "arithmetic/$board" "$(head -n 1 "$scratch/said")" [ $status = 0 ]
     cat "$scratch/said"

@@ -6,6 +6,7 @@
 with_faults
 
 need_boards boards mps2-an500
+need_boards boards icicle
 
 points=$scratch/points.npy
 "$INCODE" gen uniform 500 --seed 1 -o "$points" 2> /dev/null
@@ -45,7 +46,7 @@ deepest() {
     tests/stack "$1" | sed -n 's/.*: bare_main takes \([0-9]*\) of .*/\1/p'
 }
 
-for board in mps2-an500 mps2-an385; do
+for board in mps2-an500 mps2-an385 icicle; do
     most=$(deepest $board)
     computes "boards/$board" --board $board --nodes 4 --verify \
         -o "$scratch/out.npy"
@@ -67,6 +68,9 @@ computes 'boards/one' --board mps2-an500 --nodes 1
 # A board of two UARTs, whose flash is a part of its card.
 computes 'boards/raspi3b' --board raspi3b --nodes 2 --verify
 computes 'boards/raspi3b: reset' --board raspi3b --nodes 2 --board-reset 200
+# RISC-V: the most nodes, and a reset.
+computes 'boards/icicle: 16 nodes' --board icicle --nodes 16
+computes 'boards/icicle: reset' --board icicle --nodes 2 --board-reset 400
 
 # --- what happens in mid-run ----------------------------------------------------
 

@@ -11,12 +11,9 @@
 need_boards looks mps2-an500
 need_boards looks mps2-an385
 stats=$scratch/stats.json
-qemu=$(command -v qemu-system-arm)
 mkdir "$scratch/bin"
-cat > "$scratch/bin/qemu-system-arm" << EOF
-#!/bin/sh
-exec $qemu "\$@" -icount shift=5,sleep=on
-EOF
+printf '#!/bin/sh\nexec %s "$@" -icount shift=5,sleep=on\n' \
+    "$(command -v qemu-system-arm)" > "$scratch/bin/qemu-system-arm"
 chmod +x "$scratch/bin/qemu-system-arm"
 
 in_time() { # FILE MOST
@@ -27,7 +24,7 @@ in_time() { # FILE MOST
 looks() {
     local name="looks/$2 $1" board=$2 file=$3 most=4000
     shift 3
-    [ "$board" = mps2-an500 ] || most=40000
+    [ "$board" != mps2-an385 ] || most=40000
     rm -f "$stats"
     # shellcheck disable=SC2086
     PATH=$scratch/bin:$PATH incode run "$file" --no-progress -q --board "$board" \

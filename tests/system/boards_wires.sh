@@ -37,3 +37,12 @@ computes 'wires/node 0 killed' '--strategy exchange' kill_board 0
 tells 'wires/node 0 killed: is noticed' '.generations > 1'
 part
 end_boards wires
+
+# Noise on the wires of RISC-V.
+need_boards wires/icicle icicle
+emulate icicle 2
+join 115200 flip=3000 drop=5000 burst=10000 fifo=512 seed=1
+computes 'wires/icicle: noise' '--strategy spatial'
+part
+suffered 'wires/icicle: noise' '[1-9][0-9]* flips, [1-9][0-9]* drops, [1-9][0-9]* bursts'
+end_boards wires/icicle

@@ -70,8 +70,11 @@ need_data() { has_data "$1" || exit 0; }
 
 # need_boards NAME BOARD: ends the script where there is no emulator or image.
 need_boards() {
-    if ! command -v qemu-system-arm > /dev/null; then
-        skip "$1" 'qemu-system-arm is not there: make deps'
+    local emulator
+    emulator=$(sed -n 's/^#define BOARD_EMULATOR "\(.*\)"$/\1/p' \
+        "boards/$2/facts.h")
+    if ! command -v "$emulator" > /dev/null; then
+        skip "$1" "$emulator is not there: make deps"
         exit 0
     fi
     if [ ! -r "$BUILD/firmware/$2.img" ]; then

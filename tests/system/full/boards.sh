@@ -45,7 +45,7 @@ for points in 500 5000 20000; do
         2> /dev/null
 done
 small=$(digest_of "$scratch/500.npy")
-for board in mps2-an500 mps2-an385; do
+for board in mps2-an500 mps2-an385 icicle; do
     for points in 500 5000; do
         computes "$board $points" 120 "$scratch/$points.npy" \
             "$(digest_of "$scratch/$points.npy")" --board $board --nodes 4

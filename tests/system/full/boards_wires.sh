@@ -30,7 +30,7 @@ trouble() {
 }
 
 strategies=(auto spatial sequential exchange master-slaves)
-for board in mps2-an500 mps2-an385; do
+for board in mps2-an500 mps2-an385 icicle; do
     for size in 2 4; do
         emulate $board $size
         for round in $(seq "$rounds"); do

@@ -1,11 +1,8 @@
-/* The card from which the board starts, which is its flash as well: by the
- * chip's first controller of cards, Arasan's, whose registers are those of the
- * SD Host Controller standard.  A block at a time, one line of data, without
- * interrupts; each wait has its end. */
-#include "boards/bare/bare.h"
-#include "registers.h"
+#include "sdhci.h"
 
-/* Words behind RASPI3B_CARD. */
+#include "boards/bare/bare.h"
+
+/* Words behind sdhci_registers(). */
 enum {
     BLOCKS = 0x04 / 4,
     ARGUMENT = 0x08 / 4,
@@ -77,8 +74,6 @@ enum { SLOW_DIVISOR = 313 /* 400 kHz */, FAST_DIVISOR = 5 /* 25 MHz */ };
  * the chip loses the second. */
 enum { SLOW_WRITE_US = 10, FAST_WRITE_US = 1 };
 
-enum { CLOCK_PIN = 48, LAST_PIN = 53 };
-
 enum { BLOCK = LOADER_CARD_BLOCK };
 
 enum {
@@ -97,7 +92,7 @@ static struct {
 /* --- the controller ------------------------------------------------------- */
 
 static uint32_t get(unsigned word) {
-    return raspi3b_at(RASPI3B_CARD)[word];
+    return sdhci_registers()[word];
 }
 
 static void pass(uint64_t us) {
@@ -107,7 +102,7 @@ static void pass(uint64_t us) {
 }
 
 static void put(unsigned word, uint32_t value) {
-    raspi3b_at(RASPI3B_CARD)[word] = value;
+    sdhci_registers()[word] = value;
     pass(it.write_us);
 }
 
@@ -195,14 +190,12 @@ static bool start(void) {
     it.ready = false;
     it.relative = 0;
     it.write_us = SLOW_WRITE_US;
-    for (unsigned i = CLOCK_PIN; i <= LAST_PIN; i++)
-        raspi3b_pin(i, RASPI3B_FUNCTION_3);
-    raspi3b_pull_up(UINT64_C(0x1F) << (CLOCK_PIN + 1)); /* not the clock */
-    put(LINES, 0);
+    uint32_t lines = sdhci_start();
     put(CLOCK, RESET_ALL);
     if (!wait_for(CLOCK, RESET_ALL, false, COMMAND_US) ||
         !set_clock(SLOW_DIVISOR))
         return false;
+    put(LINES, lines);
     put(EVENTS_CALL, 0);
     put(EVENTS_SEEN, ALL_EVENTS);
     pass(1000); /* 74 cycles of the clock and more, before a card listens */
@@ -233,7 +226,7 @@ static void give(const uint8_t *bytes) {
         uint32_t word = 0;
         for (unsigned k = 0; k < 4; k++)
             word |= (uint32_t)bytes[i + k] << 8 * k;
-        raspi3b_at(RASPI3B_CARD)[DATA] = word;
+        sdhci_registers()[DATA] = word;
     }
 }
 
@@ -267,20 +260,18 @@ static bool try_to(uint32_t block, uint8_t *to, const uint8_t *from) {
     return false;
 }
 
-static bool raspi3b_card_read(void *device, uint32_t block, uint8_t *bytes) {
+static bool sdhci_read(void *device, uint32_t block, uint8_t *bytes) {
     (void)device;
     return try_to(block, bytes, NULL);
 }
 
-static bool raspi3b_card_write(void *device, uint32_t block,
-                               const uint8_t *bytes) {
+static bool sdhci_write(void *device, uint32_t block, const uint8_t *bytes) {
     (void)device;
     return try_to(block, NULL, bytes);
 }
 
 /* --- as a flash ----------------------------------------------------------- */
 
-static struct loader_card card = {.read = raspi3b_card_read,
-                                  .write = raspi3b_card_write};
+static struct loader_card card = {.read = sdhci_read, .write = sdhci_write};
 
-const struct loader_flash raspi3b_flash = LOADER_CARD(&card);
+const struct loader_flash sdhci_flash = LOADER_CARD(&card);
