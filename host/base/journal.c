@@ -26,13 +26,16 @@ static uint32_t head_crc(const struct host_journal_head *head) {
     return frame_crc32c(0, head, offsetof(struct host_journal_head, crc));
 }
 
-/* As pread, without interruptions; what lies past the end counts as failed. */
+/* As pread, without interruptions; what lies past the end counts as failed, and
+ * errno is 0 then. */
 static bool read_at(int file, void *to, size_t bytes, uint64_t at) {
     char *next = to;
     while (bytes > 0) {
         ssize_t n = pread(file, next, bytes, (off_t)at);
         if (n < 0 && errno == EINTR)
             continue;
+        if (n == 0)
+            errno = 0;
         if (n <= 0)
             return false;
         next += n, at += (uint64_t)n, bytes -= (size_t)n;
@@ -46,7 +49,9 @@ static bool write_at(int file, const void *from, size_t bytes, uint64_t at) {
         ssize_t n = pwrite(file, next, bytes, (off_t)at);
         if (n < 0 && errno == EINTR)
             continue;
-        if (n < 0)
+        if (n == 0)
+            errno = ENOSPC;
+        if (n <= 0)
             return false;
         next += n, at += (uint64_t)n, bytes -= (size_t)n;
     }
@@ -65,17 +70,26 @@ static bool is_head(const struct host_journal_head *head, uint64_t at,
            head->bytes <= size - at - STEP;
 }
 
+/* As read_at; a disk that fails is the journal's failure. */
+static bool read_place(struct host_journal *j, void *to, size_t bytes,
+                       uint64_t at) {
+    bool is_read = read_at(j->file, to, bytes, at);
+    if (!is_read && errno != 0)
+        j->failure = errno;
+    return is_read;
+}
+
 /* The place of the next sound head from `at` on; `size`: there is none. */
-static uint64_t find_head(int file, uint64_t at, uint64_t size,
+static uint64_t find_head(struct host_journal *j, uint64_t at, uint64_t size,
                           struct host_journal_head *head) {
     char bytes[SEARCH];
-    if (at + STEP <= size && read_at(file, head, sizeof *head, at) &&
+    if (at + STEP <= size && read_place(j, head, sizeof *head, at) &&
         is_head(head, at, size))
         return at;
     for (at += STEP; at + STEP <= size; at += SEARCH) {
         size_t n = size - at < SEARCH ? (size_t)(size - at) : SEARCH;
-        if (!read_at(file, bytes, n, at))
-            continue;
+        if (!read_place(j, bytes, n, at))
+            return size;
         for (size_t i = 0; i + STEP <= n; i += STEP) {
             memcpy(head, bytes + i, sizeof *head);
             if (is_head(head, at + i, size))
@@ -103,14 +117,19 @@ static int list_records(struct host_journal *j, uint64_t size,
                         struct host_error *error) {
     struct host_journal_head head;
     uint64_t at;
-    while ((at = find_head(j->file, j->end, size, &head)) < size) {
+    while ((at = find_head(j, j->end, size, &head)) < size) {
         j->damaged += at - j->end;
         if (add_record(j, &head, at, error) != 0)
             return error->code;
         j->end = at + STEP + whole_steps(head.bytes);
         j->sequence = head.sequence + 1;
     }
-    return 0;
+    return j->failure == 0
+               ? 0
+               : host_fail(error, HOST_INPUT,
+                           "%s: cannot be read (%s); check the disk, and give "
+                           "the same command again",
+                           j->path, strerror(j->failure));
 }
 
 /* --- what is durable ------------------------------------------------------ */
@@ -118,7 +137,10 @@ static int list_records(struct host_journal *j, uint64_t size,
 static void sync_now(struct host_journal *j) {
     j->dirty = false;
     (void)pthread_mutex_unlock(&j->lock);
-    int failure = fdatasync(j->file) == 0 || errno == EINVAL ? 0 : errno;
+    int failure;
+    do
+        failure = fdatasync(j->file) == 0 || errno == EINVAL ? 0 : errno;
+    while (failure == EINTR);
     (void)pthread_mutex_lock(&j->lock);
     j->failure = j->failure == 0 ? failure : j->failure;
 }
@@ -145,12 +167,11 @@ static int tell(const struct host_journal *j, int failure,
                 struct host_error *error) {
     return host_fail(
         error, HOST_INPUT,
-        "%s: cannot be written (%s); %s, and give the same command again: it "
-        "goes on from what is there",
+        "%s: cannot be written (%s); %s, and give the same command again",
         j->path, strerror(failure),
         failure == ENOSPC || failure == EDQUOT || failure == EFBIG
             ? "make room"
-            : "look after the disk");
+            : "check the disk");
 }
 
 int host_journal_sync(struct host_journal *journal, struct host_error *error) {
@@ -178,6 +199,18 @@ static void start_thread(struct host_journal *j) {
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
+bool host_journal_is(int folder, const char *name) {
+    struct stat about;
+    uint64_t magic = 0;
+    int file = host_folder_file(folder, name, O_RDONLY);
+    bool is = file >= 0 && fstat(file, &about) == 0 &&
+              (about.st_size == 0 || (read_at(file, &magic, sizeof magic, 0) &&
+                                      (magic == MAGIC || magic == 0)));
+    if (file >= 0)
+        (void)close(file);
+    return is;
+}
+
 int host_journal_open(struct host_journal *journal, int folder,
                       const char *name, const char *path,
                       struct host_error *error) {
@@ -203,7 +236,8 @@ int host_journal_open(struct host_journal *journal, int folder,
 }
 
 void host_journal_clear(struct host_journal *journal) {
-    (void)ftruncate(journal->file, 0);
+    if (ftruncate(journal->file, 0) != 0)
+        journal->failure = errno;
     journal->end = 0;
     journal->records = 0;
     journal->damaged = 0;
@@ -256,7 +290,9 @@ int host_journal_append(struct host_journal *journal,
         if (!j->synced_by_thread)
             sync_now(j);
     }
-    j->failure = failure;
+    if (failure != 0)
+        j->failure = failure;
+    failure = j->failure; /* of the sync as well */
     (void)pthread_mutex_unlock(&j->lock);
     return failure == 0 ? 0 : tell(j, failure, error);
 }

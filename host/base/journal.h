@@ -28,8 +28,8 @@ struct host_journal_head {
     uint64_t bytes;   /* of the payload */
     uint64_t rows[2]; /* the caller's */
     uint32_t kind, number, part; /* the caller's */
-    uint32_t sequence; /* of records: a gap shows that some are missing */
-    uint32_t payload_crc, crc; /* crc: of all before it */
+    uint32_t sequence;           /* of records */
+    uint32_t payload_crc, crc;   /* crc: of all before it */
 };
 
 struct host_journal_record {
@@ -63,6 +63,10 @@ struct host_journal {
 int host_journal_open(struct host_journal *journal, int folder,
                       const char *name, const char *path,
                       struct host_error *error);
+
+/* Whether a file of that folder may be a journal: it is empty, or begins as one
+ * does, or with zeros, as a loss of power may leave it. */
+bool host_journal_is(int folder, const char *name);
 
 /* Drops all records. */
 void host_journal_clear(struct host_journal *journal);

@@ -16,6 +16,7 @@
 
 static struct host_call call;
 static struct host_scratch scratch;
+static uint64_t reserved; /* bytes that were checked to be free */
 
 /* Where to put aside what is not said. */
 static const char *folder_for(const char *output) {
@@ -58,6 +59,8 @@ static uint64_t limit_for(const char *input, bool *is_pipe) {
                                       : HOST_RESIDENT_MIN;
 }
 
+enum { PATIENCE_S = 10 };
+
 /* Files that may be open at a time: an array each, besides all others. */
 static void allow_files(void) {
     struct rlimit files;
@@ -82,8 +85,8 @@ static void on_fault(int number) {
     (void)!write(STDERR_FILENO, scratch.directory, strlen(scratch.directory));
     (void)!write(STDERR_FILENO, what, sizeof what - 1);
     (void)kill(getpid(), SIGTERM);
-    for (;;)
-        (void)pause();
+    (void)sleep(PATIENCE_S); /* unless the signal is ignored */
+    _exit(HOST_BROKEN);
 }
 
 static int begin_scratch(const char *folder, uint64_t memory, unsigned threads,
@@ -113,6 +116,7 @@ int host_limits_enter(const struct host_limits *limits, unsigned threads,
         limits->folder == NULL ? folder_for(output) : limits->folder;
     threads = threads == 0 ? host_processors() : threads;
     memset(&call, 0, sizeof call);
+    reserved = 0;
     call.threads = threads;
     call.memory_max = UINT64_MAX;
     if (memory > 0 && begin_scratch(folder, memory, threads, error) != 0) {
@@ -131,6 +135,15 @@ uint64_t host_limits_memory(void) {
                                                         : 0;
 }
 
+uint64_t host_limits_reserved(dev_t device) {
+    struct stat about;
+    return host_call() == &call && call.scratch != NULL &&
+                   stat(scratch.directory, &about) == 0 &&
+                   about.st_dev == device
+               ? reserved
+               : 0;
+}
+
 int host_limits_check(uint64_t need, bool noted, struct host_error *error) {
     const double mb = 1e6;
     if (host_call() != &call || call.scratch == NULL)
@@ -138,6 +151,7 @@ int host_limits_check(uint64_t need, bool noted, struct host_error *error) {
     uint64_t room = host_scratch_free(&scratch) + scratch.bytes;
     if (need <= scratch.memory_first)
         return 0;
+    reserved = need;
     if (room < need) {
         return host_fail(error, HOST_INPUT,
                          "%s: %.0f MB are free on its file system, and %.0f MB "

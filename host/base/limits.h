@@ -4,6 +4,8 @@
 #ifndef HOST_LIMITS_H
 #define HOST_LIMITS_H
 
+#include <sys/types.h>
+
 #include "options.h"
 
 enum { HOST_RESIDENT_MIN = 16 << 20 };
@@ -51,6 +53,9 @@ uint64_t host_limits_memory(void);
 /* Where so many bytes may be put aside in all: notes that, or HOST_INPUT if the
  * disk has no room for them.  Nothing without a limit. */
 int host_limits_check(uint64_t need, bool noted, struct host_error *error);
+
+/* Bytes that were checked to be free on this device. */
+uint64_t host_limits_reserved(dev_t device);
 
 /* Ends it, if one has begun.  The most bytes that were put aside at a time. */
 uint64_t host_limits_leave(void);

@@ -279,7 +279,7 @@ bool host_scratch_write(struct host_scratch *scratch, void *to,
     for (size_t done = 0; file >= 0 && done < bytes;) {
         ssize_t n =
             pwrite(file, byte + done, bytes - done, where + (off_t)done);
-        if (n < 0 && errno != EINTR)
+        if (n == 0 || (n < 0 && errno != EINTR))
             return false;
         done += n > 0 ? (size_t)n : 0;
     }
@@ -299,6 +299,8 @@ static int write_zeros(int file, size_t from, size_t to) {
     while (from < to) {
         size_t n = to - from < sizeof zeros ? to - from : sizeof zeros;
         ssize_t written = pwrite(file, zeros, n, (off_t)from);
+        if (written == 0)
+            return ENOSPC;
         if (written < 0 && errno != EINTR)
             return errno;
         from += written > 0 ? (size_t)written : 0;

@@ -464,6 +464,28 @@ int host_output_commit(struct host_error *error) {
     return error->code;
 }
 
+int host_output_sync(const char *path, struct host_error *error) {
+    char above[HOST_PATH_MAX];
+    struct stat about;
+    const char *slash = strrchr(path, '/');
+    (void)snprintf(above, sizeof above, "%.*s",
+                   slash == NULL ? 1 : (int)(slash - path) + 1,
+                   slash == NULL ? "." : path);
+    if (stat(path, &about) != 0 || !S_ISREG(about.st_mode))
+        return 0;
+    const char *both[] = {path, above};
+    for (int i = 0; i < 2 && error->code == 0; i++) {
+        int file = open(both[i], O_RDONLY | O_CLOEXEC);
+        if (file < 0 || (fsync(file) != 0 && errno != EINVAL))
+            host_fail(error, HOST_INPUT,
+                      "%s: may not be on the disk (%s); check the disk", path,
+                      strerror(errno));
+        if (file >= 0)
+            (void)close(file);
+    }
+    return error->code;
+}
+
 int host_output_printed(struct host_error *error) {
     errno = 0;
     if (fflush(stdout) == 0 && ferror(stdout) == 0)

@@ -83,6 +83,9 @@ int host_output_close(struct host_output *out, size_t n,
  */
 int host_output_commit(struct host_error *error);
 
+/* Waits until a plain file and its name are on the disk: 0, or HOST_INPUT. */
+int host_output_sync(const char *path, struct host_error *error);
+
 /* Flushes what was printed on standard output.  HOST_INPUT, and the rest of it
  * is dropped, where that does not arrive. */
 int host_output_printed(struct host_error *error);

@@ -1,6 +1,7 @@
 #include "as_made.h"
 
 #include "host/formats/write.h"
+#include "state.h"
 
 static struct host_row_output output[HOST_OUTPUTS_MAX];
 static unsigned outputs;
@@ -51,7 +52,8 @@ int host_as_made_begin(const struct host_run_options *options,
                        struct host_direct_sums *sums,
                        struct host_error *error) {
     bool can = options->row_order == HOST_AS_MADE && options->stats == NULL &&
-               options->verifying != HOST_VERIFY_ALWAYS;
+               options->verifying != HOST_VERIFY_ALWAYS &&
+               !host_state_is_resumed(options->state);
     for (unsigned i = 0; i < options->outputs; i++)
         can = can && host_rows_can(options->output[i]);
     if (!can)

@@ -9,7 +9,6 @@
 #include "host/nodes/remote.h"
 #include "transport/secure_wipe.h"
 #include "host/formats/write.h"
-#include "state.h"
 
 static unsigned cube_dimension(unsigned nodes) {
     unsigned dimension = 0;
@@ -339,10 +338,9 @@ int host_run_on_cube(struct host_run_options *options,
 enum { ASIDE_BYTES = 320, ASIDE_NEIGHBOURS_BYTES = 500 };
 
 uint64_t host_memory_aside(const struct host_run_options *options) {
-    uint64_t kept = options->resume == NULL ? 0 : HOST_STATE_POINT_BYTES;
     char name[HOST_PATH_MAX];
     for (unsigned i = 0; i < options->outputs; i++)
         if (host_write_file(options->output[i], 2, name, sizeof name) != NULL)
-            return ASIDE_NEIGHBOURS_BYTES + kept;
-    return ASIDE_BYTES + kept;
+            return ASIDE_NEIGHBOURS_BYTES;
+    return ASIDE_BYTES;
 }

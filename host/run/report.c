@@ -128,9 +128,9 @@ static void host_report_map(FILE *file, const struct host_run_result *result) {
     }
 }
 
-void host_report_run(FILE *file, const struct host_run_options *options,
-                     const struct host_run_result *result,
-                     const struct host_run_result *alone) {
+static void report(FILE *file, const struct host_run_options *options,
+                   const struct host_run_result *result,
+                   const struct host_run_result *alone) {
     const struct host_run_result *r = result;
     host_say(file, "%s: %llu %spoints, %llu tetrahedra, %s\n", options->input,
              (unsigned long long)r->points,
@@ -383,4 +383,20 @@ int host_stats_write(const char *path, const struct host_run_result *result,
     }
     json_decref(object);
     return error->code;
+}
+
+/* Whether standard output takes tetrahedra or statistics. */
+static bool stdout_is_data(const struct host_run_options *options) {
+    bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
+    for (unsigned i = 0; i < options->outputs; i++)
+        data = data || strcmp(options->output[i], "-") == 0;
+    return data;
+}
+
+int host_report(const struct host_run_options *options,
+                const struct host_run_result *result,
+                const struct host_run_result *alone, struct host_error *error) {
+    FILE *file = stdout_is_data(options) ? stderr : stdout;
+    report(file, options, result, alone);
+    return file == stdout ? host_output_printed(error) : 0;
 }

@@ -3,15 +3,14 @@
 #ifndef HOST_REPORT_H
 #define HOST_REPORT_H
 
-#include <stdio.h>
-
 #include "run.h"
 
-/* A summary; with `alone` (the same on one node), the columns of the paper's
- * Table 2 and a line a node. */
-void host_report_run(FILE *file, const struct host_run_options *options,
-                     const struct host_run_result *result,
-                     const struct host_run_result *alone);
+/* A summary, on standard error if standard output takes data; with `alone` (the
+ * same on one node), the columns of the paper's Table 2 and a line a node.
+ * HOST_INPUT: standard output does not take it. */
+int host_report(const struct host_run_options *options,
+                const struct host_run_result *result,
+                const struct host_run_result *alone, struct host_error *error);
 
 /* The statistics of a run as one JSON object.
  *

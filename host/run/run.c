@@ -332,24 +332,6 @@ int host_triangulate(const struct host_run_options *options,
     return status;
 }
 
-/* Whether standard output takes tetrahedra or statistics. */
-static bool stdout_is_data(const struct host_run_options *options) {
-    bool data = options->stats != NULL && strcmp(options->stats, "-") == 0;
-    for (unsigned i = 0; i < options->outputs; i++)
-        data = data || strcmp(options->output[i], "-") == 0;
-    return data;
-}
-
-/* The summary, which has to arrive where it goes to standard output. */
-static int report(const struct host_run_options *options,
-                  const struct host_run_result *result,
-                  const struct host_run_result *alone,
-                  struct host_error *error) {
-    FILE *file = stdout_is_data(options) ? stderr : stdout;
-    host_report_run(file, options, result, alone);
-    return file == stdout ? host_output_printed(error) : 0;
-}
-
 void host_run_clean(const struct host_run_options *options, pid_t writer) {
     char name[HOST_PATH_MAX];
     const char *file;
@@ -560,10 +542,9 @@ int host_run(const struct host_run_options *options,
     if (status == 0 && options->stats != NULL)
         status = host_stats_write(options->stats, result, error);
     if (status == 0 && !options->quiet)
-        report(options, result, options->table ? &alone : NULL, error);
-    status = host_output_commit(error);
-    host_state_end(kept.state, status == 0);
-    return status;
+        host_report(options, result, options->table ? &alone : NULL, error);
+    (void)host_output_commit(error);
+    return host_state_end(&kept, error);
 }
 
 /* The library's way: threads of this process instead of nodes. */
@@ -599,13 +580,18 @@ static void take_sums(const struct host_direct_sums *sums,
     host_run_sum_nodes(r);
 }
 
+/* What an earlier run has kept is checked, too. */
+static bool is_checked(const struct host_run_options *options) {
+    return options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL ||
+           host_state_is_resumed(options->state);
+}
+
 /* The exact check where it is asked for.  The count of the hull's facets, which
  * only statistics need, comes from the check that the tetrahedra tile.  What is
  * put aside is checked by vertex numbers of the order, as neighbours have close
  * ones: each place of it is read once. */
 static bool is_checked_in_order(const struct host_run_options *options) {
-    return host_limits_memory() > 0 &&
-           (options->verifying == HOST_VERIFY_ALWAYS || options->stats != NULL);
+    return host_limits_memory() > 0 && is_checked(options);
 }
 
 static int check(const struct host_run_options *options,
@@ -616,7 +602,7 @@ static int check(const struct host_run_options *options,
     bool exact = options->verifying == HOST_VERIFY_ALWAYS;
     enum host_check_depth depth =
         exact ? HOST_CHECK_DELAUNAY : HOST_CHECK_TILING;
-    if (!exact && options->stats == NULL)
+    if (!is_checked(options))
         return 0;
     uint64_t start = host_now_us();
     host_progress_phase("checking", NULL);

@@ -24,7 +24,7 @@
 #include "transport/frame.h"
 
 enum {
-    COPY = 1024, /* bytes of each of the two copies of `state` */
+    COPY = 4096, /* bytes of each of the two copies of `state`: a block */
     VALUE = 72,
     KEPT_A_THREAD = 4,        /* regions, */
     KEPT_POINTS_MIN = 100000, /* of so many points or more */
@@ -164,8 +164,13 @@ static int write_values(struct host_state *s, struct host_error *error) {
         host_folder_file(s->folder, "state.new", O_WRONLY | O_CREAT | O_TRUNC);
     if (file < 0)
         return cannot(s, STATE_FILE, errno, error);
-    ssize_t n = write(file, both, sizeof both);
-    int reason = n == (ssize_t)sizeof both ? 0 : n < 0 ? errno : ENOSPC;
+    size_t done = 0;
+    int reason = 0;
+    while (done < sizeof both && reason == 0) {
+        ssize_t n = write(file, both[0] + done, sizeof both - done);
+        done += n > 0 ? (size_t)n : 0;
+        reason = n == 0 ? ENOSPC : n < 0 && errno != EINTR ? errno : 0;
+    }
     if (reason == 0 && fsync(file) != 0 && errno != EINVAL)
         reason = errno;
     (void)close(file);
@@ -177,20 +182,24 @@ static bool exists(const struct host_state *s, int file) {
     return faccessat(s->folder, names[file], F_OK, AT_SYMLINK_NOFOLLOW) == 0;
 }
 
-static int not_a_state(const struct host_state *s, struct host_error *error) {
+static int not_a_state(const struct host_state *s, int file,
+                       struct host_error *error) {
     return host_fail(error, HOST_INPUT,
                      "%s: was not made by incode run --resume; give another "
                      "folder, or remove it",
-                     s->path[exists(s, STATE_FILE)   ? STATE_FILE
-                             : exists(s, ORDER_FILE) ? ORDER_FILE
-                                                     : SPOOL_FILE]);
+                     s->path[file]);
 }
 
-/* Whether so many bytes begin as a copy does. */
-static bool is_ours(const char copy[COPY], ssize_t bytes) {
-    ssize_t mark = (ssize_t)strlen(fields[FORMAT].name);
-    return bytes >= 0 && memcmp(copy, fields[FORMAT].name,
-                                (size_t)(bytes < mark ? bytes : mark)) == 0;
+/* Whether a damaged copy was one, or is what a loss of power may leave. */
+static bool is_ours(const char copy[COPY]) {
+    static const char zeros[COPY];
+    return memcmp(copy, fields[FORMAT].name, strlen(fields[FORMAT].name)) ==
+               0 ||
+           memcmp(copy, zeros, COPY) == 0;
+}
+
+static bool is_journal(const struct host_state *s, int file) {
+    return !exists(s, file) || host_journal_is(s->folder, names[file]);
 }
 
 /* The earlier run's values; is_new where there are none. */
@@ -198,10 +207,11 @@ static int read_values(struct host_state *s, struct values *v,
                        struct host_error *error) {
     char both[2][COPY] = {{0}};
     s->is_new = true;
+    for (int i = ORDER_FILE; i < FILES; i++)
+        if (!is_journal(s, i))
+            return not_a_state(s, i, error);
     if (!exists(s, STATE_FILE))
-        return exists(s, ORDER_FILE) || exists(s, SPOOL_FILE)
-                   ? not_a_state(s, error)
-                   : 0;
+        return 0;
     int file = host_folder_file(s->folder, names[STATE_FILE], O_RDONLY);
     ssize_t n = file < 0 ? -1 : read(file, both, sizeof both);
     if (file >= 0)
@@ -213,8 +223,9 @@ static int read_values(struct host_state *s, struct values *v,
     s->is_new = !scan_values(v, both[0]) && !scan_values(v, both[1]);
     if (!s->is_new)
         return 0;
-    if (!is_ours(both[0], n) && !is_ours(both[1], n - COPY))
-        return not_a_state(s, error);
+    if (!is_ours(both[0]) || !is_ours(both[1]) ||
+        (n == 0 && !exists(s, SPOOL_FILE)))
+        return not_a_state(s, STATE_FILE, error);
     if (!s->is_quiet)
         host_note("%s: is damaged, so the run begins anew",
                   s->path[STATE_FILE]);
@@ -232,7 +243,7 @@ static int compare_values(const struct host_state *s,
             continue;
         return host_fail(
             error, fields[i].code,
-            "%s: is of another run (%s %.16s there, %.16s now); give "
+            "%s: belongs to another run (%s %.16s there, %.16s now); give "
             "that run's points and options again, or another "
             "folder",
             s->path[STATE_FILE], fields[i].what, was, now);
@@ -283,8 +294,19 @@ static int open_folder(struct host_state *s, struct host_error *error) {
     if (s->folder < 0)
         return error->code;
     set(&s->values, FOLDER, is_there ? "found" : "made");
-    if (flock(s->folder, LOCK_EX | LOCK_NB) == 0 || errno == ENOLCK)
+    int above = is_there ? -1 : openat(s->folder, "..", O_RDONLY | O_CLOEXEC);
+    if (above >= 0) {
+        (void)fsync(above);
+        (void)close(above);
+    }
+    if (flock(s->folder, LOCK_EX | LOCK_NB) == 0)
         return 0;
+    if (errno != EWOULDBLOCK) {
+        return host_fail(error, HOST_INPUT,
+                         "%s: cannot be locked (%s); give a folder of a local "
+                         "disk",
+                         s->directory, strerror(errno));
+    }
     return host_fail(error, HOST_INPUT,
                      "%s: is in use by another run; wait for its end, or give "
                      "another folder",
@@ -297,18 +319,21 @@ static int check_room(const struct host_state *s, uint64_t points,
     struct statvfs about;
     struct stat file;
     uint64_t need = points * HOST_STATE_POINT_BYTES;
-    if (fstatvfs(s->folder, &about) != 0)
+    if (fstatvfs(s->folder, &about) != 0 || fstat(s->folder, &file) != 0)
         return 0;
+    need += host_limits_reserved(file.st_dev);
     uint64_t room = (uint64_t)about.f_bavail * about.f_frsize;
     for (int i = 0; i < FILES; i++)
         if (fstatat(s->folder, names[i], &file, AT_SYMLINK_NOFOLLOW) == 0)
             room += (uint64_t)file.st_blocks * 512;
     if (room >= need)
         return 0;
-    return host_fail(error, HOST_INPUT,
-                     "%s: has room for %" PRIu64 " MB, and the state may take "
-                     "%" PRIu64 " MB; make room, or give another folder",
-                     s->directory, room / 1000000, need / 1000000);
+    return host_fail(
+        error, HOST_INPUT,
+        "%s: has room for %" PRIu64 " MB, and the state may take "
+        "%" PRIu64
+        " MB, what is put aside included; make room, or give another folder",
+        s->directory, room / 1000000, need / 1000000);
 }
 
 /* What the user leaves open is as it was. */
@@ -363,10 +388,10 @@ int host_state_begin(struct host_run_options *options,
 static void write_order(void *context) {
     struct host_state *s = context;
     struct host_journal file = {0};
+    (void)unlinkat(s->folder, "order.new", 0); /* of a run that was killed */
     if (host_journal_open(&file, s->folder, "order.new", s->path[ORDER_FILE],
                           &s->order_error) != 0)
         return;
-    host_journal_clear(&file);
     if (host_order_append(s->order, &file, s->key, &s->order_error) == 0 &&
         host_journal_sync(&file, &s->order_error) == 0)
         give_name(s, "order.new", ORDER_FILE, &s->order_error);
@@ -562,9 +587,10 @@ int host_state_start(struct host_state *state, const struct host_order *order,
         (void)unlinkat(s->folder, names[ORDER_FILE], 0);
         set_order(s, order, result);
     }
-    if ((s->is_new && write_values(s, error) != 0) ||
-        host_journal_open(&s->spool, s->folder, names[SPOOL_FILE],
-                          s->path[SPOOL_FILE], error) != 0)
+    /* The spool first: the folder is synced when `state` has its name. */
+    if (host_journal_open(&s->spool, s->folder, names[SPOOL_FILE],
+                          s->path[SPOOL_FILE], error) != 0 ||
+        (s->is_new && write_values(s, error) != 0))
         return error->code;
     s->store =
         (struct host_direct_store){regions_kept, load_region, keep_region, s};
@@ -588,6 +614,10 @@ host_state_store(const struct host_state *state) {
     return state == NULL ? NULL : &state->store;
 }
 
+bool host_state_is_resumed(const struct host_state *state) {
+    return state != NULL && !state->is_new;
+}
+
 struct host_kept *host_state_kept(struct host_state *state) {
     return state == NULL ? NULL : &state->kept;
 }
@@ -602,8 +632,11 @@ int host_state_order_kept(struct host_state *state,
         return error->code;
     host_fork_join(&state->fork);
     state->is_writing = false;
-    if (error->code == 0)
-        *error = state->order_error;
+    if (state->order_error.code != 0 && !state->is_quiet) {
+        host_note("%s; without its order, a run that goes on orders the points "
+                  "again",
+                  state->order_error.text);
+    }
     return error->code;
 }
 
@@ -617,23 +650,48 @@ static void remove_all(const struct host_state *s) {
         (void)rmdir(s->directory);
 }
 
-void host_state_end(struct host_state *state, bool done) {
-    struct host_state *s = state;
+/* The outputs outlive a loss of power before the state goes. */
+static void make_durable(const struct host_run_options *options,
+                         struct host_error *error) {
+    char name[HOST_PATH_MAX];
+    const char *file;
+    for (unsigned i = 0; i < options->outputs; i++)
+        for (unsigned k = 0;
+             (file = host_write_file(options->output[i], k, name,
+                                     sizeof name)) != NULL;
+             k++)
+            (void)host_output_sync(file, error);
+    if (options->stats != NULL)
+        (void)host_output_sync(options->stats, error);
+}
+
+int host_state_end(const struct host_run_options *options,
+                   struct host_error *error) {
+    struct host_state *s = options->state;
     if (s == NULL)
-        return;
+        return error->code;
     if (s->is_writing)
         host_fork_join(&s->fork);
     host_output_advice(NULL);
     unsigned unsound = s->unsound + s->kept.unsound;
     if (unsound > 0 && !s->is_quiet)
-        host_note("%s: of the records %u were damaged; what was in them was "
-                  "done again",
+        host_note("%s: damaged records: %u; what was in them was done again",
                   s->path[SPOOL_FILE], unsound);
-    if (done)
+    if (error->code == 0)
+        make_durable(options, error);
+    if (error->code == 0) {
         remove_all(s);
-    else if (s->spool.path != NULL && !s->is_quiet)
+    } else if (error->code == HOST_UNVERIFIED && s->spool.path != NULL) {
+        host_journal_clear(&s->spool);
+        if (!s->is_quiet)
+            host_note("%s: what was kept was part of a wrong result, and is "
+                      "removed; the same command starts over",
+                      s->directory);
+    } else if (s->spool.path != NULL && !s->is_quiet) {
         host_note("%s: the same command goes on from what is here",
                   s->directory);
+    }
     host_journal_close(&s->spool);
     (void)close(s->folder);
+    return error->code;
 }

@@ -39,7 +39,8 @@ int host_state_begin(struct host_run_options *options,
                      const struct host_points *points,
                      struct host_error *error);
 
-/* The following do what is to be done without a state, too: NULL. */
+/* `state` may be NULL: there is no --resume.  Then these functions do nothing
+ * but order the points. */
 
 /* As host_order_make, or the order of the earlier run. */
 int host_state_order(struct host_state *state, struct host_order *order,
@@ -69,8 +70,13 @@ int host_state_order_kept(struct host_state *state,
                           struct host_run_result *result,
                           struct host_error *error);
 
-/* The run has succeeded, outputs included: removes the state.  Else it stays,
- * and a note says how to go on. */
-void host_state_end(struct host_state *state, bool done);
+/* Whether work of an earlier run is used. */
+bool host_state_is_resumed(const struct host_state *state);
+
+/* The end of a run.  If it has succeeded, its outputs are synced, and the state
+ * is removed.  If its result was wrong, what was kept is dropped.  Else it
+ * stays, and a note says how to go on.  0, or error->code. */
+int host_state_end(const struct host_run_options *options,
+                   struct host_error *error);
 
 #endif

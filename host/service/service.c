@@ -252,6 +252,8 @@ void host_service_end(struct host_service *service) {
     s->machine->stop(s->machine->context);
     host_audit_free(&s->audit);
     host_ledger_free(&s->ledger);
+    struct host_error unkept = {0}; /* what it costs is work done again */
+    (void)host_kept_lose(s->kept, s->tets, &unkept);
     host_kept_free(s->kept);
     host_spill_free(&s->spill);
     free(s->node);

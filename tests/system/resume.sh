@@ -104,7 +104,7 @@ before=$(cat "$kept"/* | cksum)
 incode gen uniform 100000 --seed 5 -o "$scratch/other.npy"
 exits 'resume/other points' 3 incode run "$scratch/other.npy" -q --resume "$kept"
 check 'resume/other points: message' "$(last "$scratch/errors")" \
-    grep -q "state: is of another run (the points' digest .* there, .* now); give" \
+    grep -q "state: belongs to another run (the points' digest .* there, .* now); give" \
     "$scratch/errors"
 exits 'resume/other options' 2 incode run "$scratch/small.npy" -q \
     --resume "$kept" --nodes 2

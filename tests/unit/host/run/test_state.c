@@ -13,7 +13,7 @@
 #include "tests/unit/test.h"
 #include "transport/frame.h"
 
-enum { REGIONS = 4, COPY = 1024 };
+enum { REGIONS = 4, COPY = 4096 };
 
 static char above[64], folder[80], file[3][96];
 static struct host_points points;
@@ -56,6 +56,12 @@ static int begin(void) {
     return host_state_begin(&options, &points, &error);
 }
 
+/* The end of a run, with that error. */
+static void end(int code) {
+    struct host_error of_run = {.code = code};
+    assert_int_equal(host_state_end(&options, &of_run), code);
+}
+
 /* A run up to its work, in the course of which it ends. */
 static void run(bool done) {
     result = (struct host_run_result){
@@ -67,7 +73,7 @@ static void run(bool done) {
     assert_int_equal(host_state_start(options.state, &order, &result, &error),
                      0);
     assert_int_equal(host_state_order_kept(options.state, &result, &error), 0);
-    host_state_end(options.state, done);
+    end(done ? 0 : HOST_BROKEN);
 }
 
 static size_t read_file(const char *path, char *bytes, size_t most) {
@@ -159,7 +165,7 @@ TEST_WITH(test_what_is_open, set_up, tear_down) {
     assert_int_equal(begin(), 0);
     assert_int_equal(options.nodes, REGIONS);
     assert_ptr_equal(options.strategy, host_strategy_named("spatial"));
-    host_state_end(options.state, false);
+    end(HOST_BROKEN);
 }
 
 TEST_WITH(test_another_run, set_up, tear_down) {
@@ -224,7 +230,7 @@ TEST_WITH(test_a_damaged_state, set_up, tear_down) {
         options.nodes = 0;
         assert_int_equal(begin(), 0);
         assert_int_equal(options.nodes, copies == 3 ? 0 : REGIONS);
-        host_state_end(options.state, false);
+        end(HOST_BROKEN);
     }
 }
 
@@ -247,24 +253,6 @@ TEST_WITH(test_other_files, set_up, tear_down) {
         }
         assert_int_equal(unlink(file[i]), 0);
     }
-}
-
-TEST_WITH(test_one_process, set_up, tear_down) {
-    struct host_run_options second;
-    (void)fixture;
-    set_options();
-    second = options;
-    assert_int_equal(begin(), 0);
-    pid_t child = fork();
-    if (child == 0)
-        _exit(host_state_begin(&second, &points, &error) == HOST_INPUT &&
-                      strstr(error.text, "in use by another run") != NULL
-                  ? 0
-                  : 1);
-    int status;
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_int_equal(status, 0);
-    host_state_end(options.state, true);
 }
 
 /* The same order, bit for bit; or none. */
@@ -290,6 +278,92 @@ static void assert_order(const struct host_order *o) {
         assert_memory_equal(here, there, n);
     }
     host_order_free(&right);
+}
+
+/* Files of others that are as long as a copy of `state` is, or shorter. */
+TEST_WITH(test_long_files, set_up, tear_down) {
+    char bytes[COPY];
+    (void)fixture;
+    memset(bytes, 'x', sizeof bytes);
+    assert_int_equal(mkdir(folder, 0700), 0);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(close(open(file[i], O_CREAT | O_WRONLY, 0600)), 0);
+    for (size_t n = 0; n <= COPY; n += COPY / 4) {
+        write_file(file[0], bytes, n);
+        write_file(file[1], "precious", 8);
+        set_options();
+        assert_int_equal(begin(), HOST_INPUT);
+        assert_non_null(strstr(error.text, "order: was not made by incode"));
+    }
+    write_file(file[1], "", 0);
+    set_options();
+    assert_int_equal(begin(), HOST_INPUT);
+    assert_non_null(strstr(error.text, "state: was not made by incode"));
+}
+
+/* What a loss of power may leave. */
+TEST_WITH(test_zeros, set_up, tear_down) {
+    static const char zeros[2 * COPY];
+    (void)fixture;
+    set_options();
+    run(false);
+    host_order_free(&order);
+    write_file(file[0], zeros, sizeof zeros);
+    run(false);
+    assert_order(&order);
+    host_order_free(&order);
+    set_options();
+    run(true);
+    host_order_free(&order);
+}
+
+/* What was kept was part of it. */
+TEST_WITH(test_wrong_result, set_up, tear_down) {
+    struct host_journal_head head = {.kind = 1};
+    struct stat spool;
+    (void)fixture;
+    set_options();
+    run(false);
+    host_order_free(&order);
+    set_options();
+    result = (struct host_run_result){
+        .strategy = host_strategy_named("spatial"), .nodes = REGIONS};
+    assert_int_equal(begin(), 0);
+    assert_int_equal(host_state_order(options.state, &order, "test", &points,
+                                      HOST_ADAPTIVE, REGIONS, false, &error),
+                     0);
+    assert_int_equal(host_state_start(options.state, &order, &result, &error),
+                     0);
+    assert_true(host_state_is_resumed(options.state));
+    assert_int_equal(
+        host_journal_append(host_state_kept(options.state)->journal, &head,
+                            NULL, 0, &error),
+        0);
+    assert_int_equal(stat(file[2], &spool), 0);
+    assert_true(spool.st_size > 0);
+    assert_int_equal(host_state_order_kept(options.state, &result, &error), 0);
+    end(HOST_UNVERIFIED);
+    assert_int_equal(stat(file[2], &spool), 0);
+    assert_int_equal(spool.st_size, 0);
+    host_order_free(&order);
+}
+
+TEST_WITH(test_one_process, set_up, tear_down) {
+    struct host_run_options second;
+    (void)fixture;
+    set_options();
+    second = options;
+    assert_int_equal(begin(), 0);
+    pid_t child = fork();
+    if (child == 0)
+        _exit(host_state_begin(&second, &points, &error) == HOST_INPUT &&
+                      strstr(error.text, "in use by another run") != NULL
+                  ? 0
+                  : 1);
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+    end(0);
 }
 
 TEST_WITH(test_orders, set_up, tear_down) {
@@ -321,7 +395,7 @@ TEST_WITH(test_orders_with_a_grid, set_up, tear_down) {
             host_state_start(options.state, &order, &result, &error), 0);
         assert_int_equal(host_state_order_kept(options.state, &result, &error),
                          0);
-        host_state_end(options.state, false);
+        end(HOST_BROKEN);
         if (i == 0)
             host_order_free(&order);
     }
