@@ -117,9 +117,8 @@ struct host_service {
     unsigned window;                 /* frames; 0: a large one */
     uint64_t patience_us; /* for a silent node; 0: HOST_PATIENCE_US */
     enum host_verifying verifying;
-    struct host_kept
-        *kept;    /* what goes to a journal, and comes from it; NULL */
-    bool foreign; /* the nodes are of a cube file, or ranks */
+    struct host_kept *kept; /* in a journal; or NULL */
+    bool foreign;           /* the nodes are of a cube file, or ranks */
     /* Of a node, and the cube file that says so (NULL: an option does), for
      * what paging.h tells; 0: it tells nothing. */
     uint64_t memory;
@@ -146,12 +145,11 @@ struct host_service {
     bool reporting, dealt; /* statistics are asked for; first jobs are out */
     bool over, late; /* all is here that is needed; a loss came after that */
     struct host_audit audit;
-    uint32_t generation; /* of the wiring that is followed; */
+    uint32_t generation; /* of the wiring that is followed */
     bool loss;           /* a new one is due */
     unsigned blamed;     /* the node of the last loss, as far as is known */
     struct host_fault fault;
-    /* Losses in a row without a brick between them that was committed. */
-    unsigned fruitless;
+    unsigned fruitless; /* losses in a row without a commit between them */
     uint32_t committed_before;
     uint64_t undoubted_us;               /* since a node was doubted */
     bool wire_lost;                      /* the one in use is dead */
@@ -171,8 +169,8 @@ struct host_service {
     uint64_t uncabled_us; /* time without that, while all nodes answer */
     bool probe, probing; /* nodes are pinged one by one: in the next generation;
                             now, until all have answered */
-    unsigned up, ready;  /* living nodes that are up; that have their setup */
-    unsigned working;    /* that have a job */
+    /* Living nodes that are up; that have their setup; a job. */
+    unsigned up, ready, working;
     unsigned turn, ping_turn; /* the node to be served, and pinged, next */
     struct host_watching watching;
     uint64_t ping_us, check_us, began_us, wire_down_us;
