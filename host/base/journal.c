@@ -201,11 +201,17 @@ static void start_thread(struct host_journal *j) {
 
 bool host_journal_is(int folder, const char *name) {
     struct stat about;
-    uint64_t magic = 0;
+    static const char zeros[SEARCH];
+    char head[SEARCH] = "";
     int file = host_folder_file(folder, name, O_RDONLY);
-    bool is = file >= 0 && fstat(file, &about) == 0 &&
-              (about.st_size == 0 || (read_at(file, &magic, sizeof magic, 0) &&
-                                      (magic == MAGIC || magic == 0)));
+    bool is = file >= 0 && fstat(file, &about) == 0;
+    if (is && about.st_size > 0) {
+        const uint64_t magic = MAGIC;
+        size_t n = about.st_size < SEARCH ? (size_t)about.st_size : SEARCH;
+        is = read_at(file, head, n, 0) &&
+             (memcmp(head, &magic, sizeof magic) == 0 ||
+              memcmp(head, zeros, n) == 0);
+    }
     if (file >= 0)
         (void)close(file);
     return is;

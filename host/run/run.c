@@ -355,6 +355,7 @@ static const char *points_file(const struct host_run_options *options) {
 static int check_claims(const struct host_run_options *options,
                         struct host_error *error) {
     struct host_claims claims = {0};
+    char state[3][HOST_PATH_MAX];
     host_claims_read(&claims, options->input, error);
     if (options->cube != NULL)
         host_claims_read(&claims, options->cube, error);
@@ -364,6 +365,12 @@ static int check_claims(const struct host_run_options *options,
     }
     if (options->stats != NULL)
         host_claims_write(&claims, "--stats ", options->stats, NULL, error);
+    for (int i = 0; i < 3 && options->resume != NULL; i++) {
+        static const char *const kept[] = {"state", "order", "spool"};
+        (void)snprintf(state[i], sizeof state[i], "%s/%s", options->resume,
+                       kept[i]);
+        host_claims_write(&claims, "--resume ", state[i], NULL, error);
+    }
     host_claims_free(&claims);
     return error->code;
 }

@@ -273,7 +273,7 @@ static void digest_points(const struct host_points *points, char text[VALUE]) {
 
 static void set_values(struct values *v, const struct host_run_options *o,
                        const struct host_points *points) {
-    set(v, FORMAT, "1");
+    set(v, FORMAT, "2");
     set(v, VERSION, NODE_VERSION);
     set_number(v, POINTS, points->count);
     digest_points(points, v->of[INPUT]);

@@ -113,6 +113,11 @@ check 'resume/other options: message' "$(last "$scratch/errors")" \
 check 'resume/refused: nothing has changed' "$(ls -l "$kept")" \
     [ "$(cat "$kept"/* | cksum)" = "$before" ]
 
+exits 'resume/an output in its place' 2 incode run "$scratch/small.npy" -q \
+    --resume "$kept" --stats "$kept/spool"
+check 'resume/an output in its place: nothing has changed' "$(ls -l "$kept")" \
+    [ "$(cat "$kept"/* | cksum)" = "$before" ]
+
 # A process that has the folder, and waits for the reader of its output.
 mkfifo "$scratch/pipe"
 exec {pipe}<> "$scratch/pipe"

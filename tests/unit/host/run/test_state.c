@@ -206,7 +206,7 @@ TEST_WITH(test_another_version, set_up, tear_down) {
     assert_refused(HOST_INPUT, "(the version 0.0.1 there, ");
     put_line("incode-state 9");
     set_options();
-    assert_refused(HOST_INPUT, "(the format 9 there, 1 now)");
+    assert_refused(HOST_INPUT, "(the format 9 there, 2 now)");
 }
 
 /* One copy is enough; a run of which no copy is sound begins anew. */
@@ -295,6 +295,11 @@ TEST_WITH(test_long_files, set_up, tear_down) {
         assert_int_equal(begin(), HOST_INPUT);
         assert_non_null(strstr(error.text, "order: was not made by incode"));
     }
+    memset(bytes, 0, 64);
+    write_file(file[1], bytes, sizeof bytes);
+    set_options();
+    assert_int_equal(begin(), HOST_INPUT);
+    assert_non_null(strstr(error.text, "order: was not made by incode"));
     write_file(file[1], "", 0);
     set_options();
     assert_int_equal(begin(), HOST_INPUT);
