@@ -40,6 +40,7 @@ end_boards wires
 
 # Noise on the wires of RISC-V.
 need_boards wires/icicle icicle
+rm -rf "$cube.d" # flash of the other board; this one has a card
 emulate icicle 2
 join 115200 flip=3000 drop=5000 burst=10000 fifo=512 seed=1
 computes 'wires/icicle: noise' '--strategy spatial'

@@ -238,8 +238,8 @@ TEST(every_row_once_where_they_are_aside) {
     struct host_error error = {0};
     struct host_call call = {
         .threads = 4, .memory_max = UINT64_MAX, .scratch = &scratch};
-    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 1 << 20, 4, &error),
-                     0);
+    assert_int_equal(
+        host_scratch_begin_own(&scratch, "/tmp", 1 << 20, 4, &error), 0);
     host_call_enter(&call);
     for (size_t i = 0; i < sizeof levels / sizeof *levels; i++) {
         struct host_order order;

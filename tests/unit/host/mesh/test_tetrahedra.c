@@ -107,8 +107,8 @@ TEST(order_is_canonical_where_rows_are_aside) {
     struct host_error error = {0};
     struct host_call call = {
         .threads = 2, .memory_max = UINT64_MAX, .scratch = &scratch};
-    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 16 << 20, 2, &error),
-                     0);
+    assert_int_equal(
+        host_scratch_begin_own(&scratch, "/tmp", 16 << 20, 2, &error), 0);
     host_call_enter(&call);
     check_sort(100000, 70000, 70000);
     check_sort(200000, 20000000, 5000);

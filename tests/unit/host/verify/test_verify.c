@@ -192,8 +192,8 @@ TEST(what_is_put_aside_is_checked_alike) {
     memcpy(f.points.xyz + 3 * 17, f.points.xyz + 3 * 4100, 24); /* a repeat */
     host_tetrahedra_free(&f.tets);
     reference_delaunay(f.points.xyz, 6000, &f.tets);
-    assert_int_equal(host_scratch_begin(&scratch, "/tmp", 1 << 18, 4, &error),
-                     0);
+    assert_int_equal(
+        host_scratch_begin_own(&scratch, "/tmp", 1 << 18, 4, &error), 0);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         struct host_check_report in_memory, aside;
         uint32_t *v = &f.tets.v[7000][1], before = *v;
