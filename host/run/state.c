@@ -202,32 +202,34 @@ static bool is_journal(const struct host_state *s, int file) {
     return !exists(s, file) || host_journal_is(s->folder, names[file]);
 }
 
-/* The earlier run's values; is_new where there are none. */
+/* The earlier run's values; is_new where there are none: then the other files
+ * have to be journals, too. */
 static int read_values(struct host_state *s, struct values *v,
                        struct host_error *error) {
     char both[2][COPY] = {{0}};
+    bool is_there = exists(s, STATE_FILE);
     s->is_new = true;
+    if (is_there) {
+        int file = host_folder_file(s->folder, names[STATE_FILE], O_RDONLY);
+        ssize_t n = file < 0 ? -1 : read(file, both, sizeof both);
+        if (file >= 0)
+            (void)close(file);
+        if (n < 0) {
+            return host_fail(error, HOST_INPUT, "%s: %s; give another folder",
+                             s->path[STATE_FILE], strerror(errno));
+        }
+        s->is_new = !scan_values(v, both[0]) && !scan_values(v, both[1]);
+        if (!s->is_new)
+            return 0;
+        if (!is_ours(both[0]) || !is_ours(both[1]) ||
+            (n == 0 && !exists(s, SPOOL_FILE)))
+            return not_a_state(s, STATE_FILE, error);
+    }
     for (int i = ORDER_FILE; i < FILES; i++)
         if (!is_journal(s, i))
             return not_a_state(s, i, error);
-    if (!exists(s, STATE_FILE))
-        return 0;
-    int file = host_folder_file(s->folder, names[STATE_FILE], O_RDONLY);
-    ssize_t n = file < 0 ? -1 : read(file, both, sizeof both);
-    if (file >= 0)
-        (void)close(file);
-    if (n < 0) {
-        return host_fail(error, HOST_INPUT, "%s: %s; give another folder",
-                         s->path[STATE_FILE], strerror(errno));
-    }
-    s->is_new = !scan_values(v, both[0]) && !scan_values(v, both[1]);
-    if (!s->is_new)
-        return 0;
-    if (!is_ours(both[0]) || !is_ours(both[1]) ||
-        (n == 0 && !exists(s, SPOOL_FILE)))
-        return not_a_state(s, STATE_FILE, error);
-    if (!s->is_quiet)
-        host_note("%s: is damaged, so the run begins anew",
+    if (is_there && !s->is_quiet)
+        host_note("%s: is damaged, so the run starts over",
                   s->path[STATE_FILE]);
     return 0;
 }

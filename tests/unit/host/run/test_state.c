@@ -293,17 +293,38 @@ TEST_WITH(test_long_files, set_up, tear_down) {
         write_file(file[1], "precious", 8);
         set_options();
         assert_int_equal(begin(), HOST_INPUT);
-        assert_non_null(strstr(error.text, "order: was not made by incode"));
+        assert_non_null(strstr(error.text, n == 0
+                                               ? "order: was not made by incode"
+                                               : "state: was not made by "));
     }
+    write_file(file[0], "", 0);
     memset(bytes, 0, 64);
     write_file(file[1], bytes, sizeof bytes);
     set_options();
     assert_int_equal(begin(), HOST_INPUT);
     assert_non_null(strstr(error.text, "order: was not made by incode"));
+    write_file(file[0], bytes + COPY / 2, COPY / 2);
     write_file(file[1], "", 0);
     set_options();
     assert_int_equal(begin(), HOST_INPUT);
     assert_non_null(strstr(error.text, "state: was not made by incode"));
+}
+
+/* A run that was killed before the head of its first record was written. */
+TEST_WITH(test_no_head, set_up, tear_down) {
+    char bytes[COPY];
+    (void)fixture;
+    set_options();
+    run(false);
+    host_order_free(&order);
+    memset(bytes, 'x', sizeof bytes);
+    memset(bytes, 0, 64);
+    write_file(file[2], bytes, sizeof bytes);
+    set_options();
+    run(true);
+    assert_order(&order);
+    host_order_free(&order);
+    assert_int_equal(access(folder, F_OK), -1);
 }
 
 /* What a loss of power may leave. */
