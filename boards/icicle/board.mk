@@ -8,8 +8,8 @@ code_at   = 0x20220000
 code_end  = 0x20240000
 image_at  = 0x80000000
 image_end = 0x80200000
-# For tests/stack: who reports faults, and what start.S takes first of the
-# handlers' stack.
+# For tests/stack: the function that reports faults, and what start.S takes first
+# of the handlers' stack.
 fault = icicle_fault
 exception_bytes = 128
 # A loader is small rather than fast, but for its handlers.

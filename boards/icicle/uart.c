@@ -41,8 +41,7 @@ static const struct {
                            {(registers *)0x20104000, &bare_uart[3]},
                            {(registers *)0x20106000, &bare_uart[4]}};
 
-/* A look at the state takes the mark of an overrun away: who looks counts it.
- */
+/* Reading the state clears the mark of an overrun, so each read counts it. */
 BARE_INLINE void count(struct bare_uart *uart, uint32_t states) {
     uart->overruns += states / OVERRUN % 2;
 }

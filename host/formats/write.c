@@ -95,6 +95,18 @@ bool host_write_leaves(const char *input, const char *name) {
            from.st_dev == to.st_dev && from.st_ino == to.st_ino;
 }
 
+void host_write_files(const char *const *path, unsigned count,
+                      void (*act)(void *context, const char *file),
+                      void *context) {
+    char name[HOST_PATH_MAX];
+    const char *file;
+    for (unsigned i = 0; i < count; i++)
+        for (unsigned k = 0;
+             (file = host_write_file(path[i], k, name, sizeof name)) != NULL;
+             k++)
+            act(context, file);
+}
+
 int host_write_probe(const char *path, const char *input,
                      struct host_error *error) {
     char name[HOST_PATH_MAX];

@@ -68,6 +68,11 @@ int host_write_check(const char *path, struct host_error *error);
 const char *host_write_file(const char *path, unsigned k, char *name,
                             size_t size);
 
+/* Calls act(context, file) for each file of the outputs path[count]. */
+void host_write_files(const char *const *path, unsigned count,
+                      void (*act)(void *context, const char *file),
+                      void *context);
+
 /* 0 where a file can be made beside `path`, else HOST_INPUT.  `input`: as of
  * host_write. */
 int host_write_probe(const char *path, const char *input,

@@ -35,8 +35,8 @@ struct direct {
     struct host_tetrahedra *tets; /* [threads] */
     struct host_tetrahedra *left; /* [threads] not final: vertex numbers */
     uint8_t *mark;                /* [64 * bricks] or NULL: not alone */
-    unsigned level; /* 0: its bricks count, for who watches, and its
-                       tetrahedra go to the sink */
+    unsigned level;               /* 0: its bricks count as progress, and its
+                                     tetrahedra go to the sink */
     const struct host_direct_store *store; /* or NULL */
     uint64_t key;                          /* then: of the order */
     unsigned threads;

@@ -332,15 +332,13 @@ int host_triangulate(const struct host_run_options *options,
     return status;
 }
 
+static void clean(void *context, const char *file) {
+    const pid_t *writer = context;
+    host_output_clean(file, *writer);
+}
+
 void host_run_clean(const struct host_run_options *options, pid_t writer) {
-    char name[HOST_PATH_MAX];
-    const char *file;
-    for (unsigned i = 0; i < options->outputs; i++)
-        for (unsigned k = 0;
-             (file = host_write_file(options->output[i], k, name,
-                                     sizeof name)) != NULL;
-             k++)
-            host_output_clean(file, writer);
+    host_write_files(options->output, options->outputs, clean, &writer);
     if (options->stats != NULL)
         host_output_clean(options->stats, writer);
 }

@@ -581,7 +581,7 @@ int host_state_start(struct host_state *state, const struct host_order *order,
         s->is_new = true;
         if (!s->is_quiet)
             host_note("%s: the points are in another order now, so the run "
-                      "begins anew",
+                      "starts over",
                       s->directory);
     }
     if (s->is_new) {
@@ -653,18 +653,10 @@ static void remove_all(const struct host_state *s) {
 }
 
 /* The outputs outlive a loss of power before the state goes. */
-static void make_durable(const struct host_run_options *options,
-                         struct host_error *error) {
-    char name[HOST_PATH_MAX];
-    const char *file;
-    for (unsigned i = 0; i < options->outputs; i++)
-        for (unsigned k = 0;
-             (file = host_write_file(options->output[i], k, name,
-                                     sizeof name)) != NULL;
-             k++)
-            (void)host_output_sync(file, error);
-    if (options->stats != NULL)
-        (void)host_output_sync(options->stats, error);
+static void make_durable(void *context, const char *file) {
+    struct host_error *error = context;
+    if (error->code == 0)
+        (void)host_output_sync(file, error);
 }
 
 int host_state_end(const struct host_run_options *options,
@@ -680,7 +672,10 @@ int host_state_end(const struct host_run_options *options,
         host_note("%s: damaged records: %u; what was in them was done again",
                   s->path[SPOOL_FILE], unsound);
     if (error->code == 0)
-        make_durable(options, error);
+        host_write_files(options->output, options->outputs, make_durable,
+                         error);
+    if (error->code == 0 && options->stats != NULL)
+        make_durable(error, options->stats);
     if (error->code == 0) {
         remove_all(s);
     } else if (error->code == HOST_UNVERIFIED && s->spool.path != NULL) {

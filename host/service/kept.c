@@ -91,7 +91,7 @@ void host_kept_lost(struct host_kept *kept, const struct host_ledger *ledger,
 
 /* --- reading -------------------------------------------------------------- */
 
-/* One who reads all records. */
+/* What host_kept_load works on. */
 struct reading {
     struct host_kept *kept;
     struct host_ledger *ledger;

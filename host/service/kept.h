@@ -40,8 +40,8 @@ struct host_kept {
     uint32_t generation;
 };
 
-/* The number, as that of a node, of those who did what an earlier run of the
- * host has kept. */
+/* What an earlier run of the host has kept counts as the work of a node of this
+ * number, which no node has. */
 static inline uint32_t host_kept_by(const struct host_ledger *ledger) {
     return ledger->nodes;
 }

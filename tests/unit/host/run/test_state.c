@@ -62,8 +62,8 @@ static void end(int code) {
     assert_int_equal(host_state_end(&options, &of_run), code);
 }
 
-/* A run up to its work, in the course of which it ends. */
-static void run(bool done) {
+/* A run up to its work. */
+static void start(void) {
     result = (struct host_run_result){
         .strategy = host_strategy_named("spatial"), .nodes = REGIONS};
     assert_int_equal(begin(), 0);
@@ -72,6 +72,11 @@ static void run(bool done) {
                      0);
     assert_int_equal(host_state_start(options.state, &order, &result, &error),
                      0);
+}
+
+/* The same, and its end in the course of the work. */
+static void run(bool done) {
+    start();
     assert_int_equal(host_state_order_kept(options.state, &result, &error), 0);
     end(done ? 0 : HOST_BROKEN);
 }
@@ -352,14 +357,7 @@ TEST_WITH(test_wrong_result, set_up, tear_down) {
     run(false);
     host_order_free(&order);
     set_options();
-    result = (struct host_run_result){
-        .strategy = host_strategy_named("spatial"), .nodes = REGIONS};
-    assert_int_equal(begin(), 0);
-    assert_int_equal(host_state_order(options.state, &order, "test", &points,
-                                      HOST_ADAPTIVE, REGIONS, false, &error),
-                     0);
-    assert_int_equal(host_state_start(options.state, &order, &result, &error),
-                     0);
+    start();
     assert_true(host_state_is_resumed(options.state));
     assert_int_equal(
         host_journal_append(host_state_kept(options.state)->journal, &head,
